@@ -20,7 +20,7 @@ from benchmarks.large_map import RENDERED, views
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.stages.candidates.appearance_vectors import appearance_vectors
 from omninav.stages.candidates.exact_search import ExactSearch, short_vectors
-from omninav.stages.candidates.index import IndexedCandidates, search_in
+from omninav.stages.candidates.index import LISTS, search_in
 from omninav.stages.geometry.appearance.segments import similarities, turned_views
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
@@ -74,7 +74,7 @@ def in_large_map(folder: Path, references: int) -> dict[int, list[float]]:
     for view, own, gap in zip(asked, alike, near, strict=True):
         best, closest = np.argsort(-own, kind="stable")[:BEST], np.argsort(gap, kind="stable")[:BEST]
         for number, rows in shares.items():
-            found = search.nearest(vectors_of(view), number, IndexedCandidates.lists)
+            found = search.nearest(vectors_of(view), number, LISTS)
             reached = np.sort(own[found])[::-1][:BEST].mean() / own[best].mean()
             rows.append([best[0] in found, np.isin(best, found).mean(), np.isin(closest, found).mean(), reached])
     return {number: np.mean(rows, axis=0).tolist() for number, rows in shares.items()}

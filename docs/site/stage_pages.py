@@ -10,9 +10,10 @@ from itertools import groupby
 from port_drawing import drawing
 
 from omninav.pipeline.cli.config_groups import options_with
+from omninav.pipeline.graph.parameters import Parameter
 from omninav.pipeline.graph.ports import type_name
 from omninav.pipeline.graph.registry import Entry, entries, resolve
-from omninav.pipeline.graph.signature import Parameter, signature
+from omninav.pipeline.graph.signature import signature
 
 
 def role_pages() -> dict[str, str]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from omninav.pipeline.engine.codec import BadEncoding, decode, encode, encode_state, restore_state
 from omninav.pipeline.graph.contents import wrong_output
-from omninav.pipeline.graph.signature import BadStage, Signature, first_line, signature
+from omninav.pipeline.graph.parameters import BadStage, first_line
+from omninav.pipeline.graph.signature import Signature, signature
 from omninav.pipeline.graph.stage import Context, Stage, State
 from omninav.pipeline.graph.value import Value
 

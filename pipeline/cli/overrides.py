@@ -18,9 +18,10 @@ from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
+from omninav.pipeline.graph.parameters import BadStage
 from omninav.pipeline.graph.problems import BadInput, Problem, shown, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
-from omninav.pipeline.graph.signature import BadStage, signature
+from omninav.pipeline.graph.signature import signature
 
 from .composition_cache import compose
 from .config_groups import replaced, suggest_option

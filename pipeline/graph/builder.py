@@ -9,10 +9,11 @@ import networkx as nx
 
 from .graph import ARTIFACTS, LIFETIMES, Graph, Lifetime, Node, Wire
 from .ground_truth import truth_in_the_loop
+from .parameters import BadStage
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
 from .registry import UnknownStage, entries, resolve
-from .signature import BadStage, Port, Signature, signature
+from .signature import Port, Signature, signature
 from .stage import Stage
 from .value import Tick
 

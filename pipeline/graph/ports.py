@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+from .parameters import read_parameters, split_optional
 from .problems import Problem, cut, nearest, suggest
-from .signature import read_parameters, split_optional
 from .stage import Bounds
 
 

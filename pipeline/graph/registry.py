@@ -29,8 +29,8 @@ from typing import Any
 
 from omninav.pipeline.files import digest_text, user_path
 
+from .parameters import first_line
 from .problems import BadInput, cut
-from .signature import first_line
 from .stage import Source, Stage
 from .value import Value
 

@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds, Context, Outputs
 from omninav.stages.geometry.plane.point_cells import distinct, sort_into_cells, within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 
 from .background import with_background
@@ -32,12 +32,10 @@ class AroundBelief:
     misses some."""
     recovery_radius: Annotated[float, Bounds(ge=0)] = 1.0
     """The same around recovery particles."""
-    background_references: Annotated[int, Bounds(ge=0)] = 128
-    """References compared of all others, the same at each image."""
     compare_all_up_to: Annotated[int, Bounds(ge=0)] = 1000
     """References of a map up to which all are compared."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Appearance length scale where the port `length_scale` is not wired."""
+    background_references: Annotated[int, Bounds(ge=0)] = 128
+    """References compared of all others, the same at each image."""
 
     class Out(Outputs):
         """The references to compare with the view."""
@@ -53,7 +51,7 @@ class AroundBelief:
         """The references near the belief: ascending indices; none without a belief."""
         if near is None:
             return np.empty(0, np.int64)
-        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        unit = metres_of(length_scale)
         radii = self.radius * unit, self.recovery_radius * unit
         if map is not self._map or len(map) != self._length:
             self._cells = [sort_into_cells(map.poses, radius or 1.0) for radius in radii]

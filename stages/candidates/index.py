@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import turned_views
+from omninav.stages.geometry.appearance.segments import HEADINGS, turned_views
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
@@ -20,6 +20,11 @@ from .appearance_vectors import appearance_vectors
 from .around_belief import AroundBelief
 from .exact_search import ExactSearch
 from .inverted_file import InvertedFile, faiss_or_none
+
+LISTS = 64
+"""Lists of similar references that are searched in a large map for each heading, without a belief."""
+SIMILAR_LISTS = 4
+"""The same number with a belief."""
 
 
 class IndexedCandidates(AroundBelief, Stage):
@@ -36,12 +41,6 @@ class IndexedCandidates(AroundBelief, Stage):
     """References from the index beside those near the belief."""
     global_references: Annotated[int, Bounds(ge=1)] = 4800
     """References from the index where it is not known where the robot is."""
-    headings: Annotated[int, Bounds(ge=1)] = 36
-    """Headings at which the view is looked up."""
-    lists: Annotated[int, Bounds(ge=1)] = 64
-    """Lists of similar references that are searched in a large map for each heading without a belief."""
-    similar_lists: Annotated[int, Bounds(ge=1)] = 4
-    """The same with one."""
 
     def setup(self, ctx: Context) -> None:
         """Forget the index of an earlier map."""
@@ -63,14 +62,14 @@ class IndexedCandidates(AroundBelief, Stage):
         search, turned = self._ready(index, map), self._turned(features, map)
         around = self.around(map, near, length_scale)
         known = 0 < len(around) <= self.global_references
-        asked = (self.similar_references, self.similar_lists) if known else (self.global_references, self.lists)
+        asked = (self.similar_references, SIMILAR_LISTS) if known else (self.global_references, LISTS)
         similar = search.nearest(turned, *asked)
         chosen = distinct(np.concatenate([around, similar])) if known else similar
         return self.Out(candidates=self.with_others(chosen, map))
 
     def _turned(self, features: SegmentFeatures, map: ReferenceGraph) -> npt.NDArray[np.float32]:
         windows = isinstance(features, SegmentHistograms) and features.directions is not None
-        views = features.values[:, None] if windows else turned_views(features.values, self.headings)
+        views = features.values[:, None] if windows else turned_views(features.values, HEADINGS)
         if views.shape[1:] != map.features.shape[1:]:
             raise BadInput(
                 f"map: its views are of {map.features.shape[1]} segments x {map.features.shape[2]} bins, the current "

@@ -9,6 +9,11 @@ from omninav.stages.values.reference_index import ReferenceIndex
 from .exact_search import short_vectors
 from .inverted_file import build, faiss_or_none
 
+MIN_REFERENCES = 1000
+"""Smallest map that gets an index, references."""
+REBUILD_GROWTH = 2.0
+"""Growth of a map, as a factor, at which its index is built anew."""
+
 
 class BuildReferenceIndexState(State):
     """Number of references that the index was built from."""
@@ -23,17 +28,13 @@ class BuildReferenceIndex(Stage):
     with the view's; in a map of more than `exact_up_to` they lie in an inverted file, with four bits for each two
     dimensions (faiss; Jégou, Douze & Schmid 2011; `pip install 'omninav[index]'`, without which it takes longer). The
     index of a finished map is kept in the cache. That of a map that grows is built anew when the map has grown by
-    `rebuild_growth`; until then references are appended to it.
+    `REBUILD_GROWTH`; until then references are appended to it.
     """
 
     dimensions: Annotated[int, Bounds(ge=2)] = 128
     """Numbers that are kept of each reference."""
-    min_references: Annotated[int, Bounds(ge=16)] = 1000
-    """References that a map needs to have an index."""
     exact_up_to: Annotated[int, Bounds(ge=0)] = 30_000
     """References whose short vectors are compared one and all: 10 ms at 36 headings."""
-    rebuild_growth: Annotated[float, Bounds(gt=1)] = 2.0
-    """Growth of a map, as a factor, at which its index is built anew."""
 
     class Out(Outputs):
         """The index; absent for a small map."""
@@ -47,9 +48,9 @@ class BuildReferenceIndex(Stage):
 
     def step(self, ctx: Context, map: ReferenceGraph, state: BuildReferenceIndexState) -> Out:
         """Give the map's index."""
-        if len(map) < self.min_references:
+        if len(map) < MIN_REFERENCES:
             return self.Out()
-        if len(map) >= self.rebuild_growth * state.references:
+        if len(map) >= REBUILD_GROWTH * state.references:
             state.references, self._index = len(map), None
         if self._index is None or map is not self._map:
             ctx.doing("indexing the map's references")

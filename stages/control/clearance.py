@@ -4,6 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 F64 = npt.NDArray[np.float64]
+LOOKAHEAD_M = 0.8
+"""Free distance that a direction needs where the target is not closer, metres."""
 
 
 def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:

@@ -11,12 +11,24 @@ from omninav.stages.values.command import Command
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
-from .clearance import free_ahead, free_direction
+from .clearance import LOOKAHEAD_M, free_ahead, free_direction
 
 NARROW_MARGIN, NARROW_SPEED = 0.2, 0.5
 """Shares of the margin and of the speed with which the robot passes where there is no room for all of the margin."""
 SLOW_RATIO = 0.3
 """Share of the way to the last view at which a robot that knows no metres begins to slow down."""
+HEADING_GAIN = 1.5
+"""Angular speed over the angle that is left, 1/s."""
+APPROACH_GAIN = 0.7
+"""Largest speed over the metres that are left to the last view, 1/s."""
+MIN_SPEED = 0.05
+"""Smallest speed close to the last view, m/s."""
+TURN_IN_PLACE_DEG = 35.0
+"""Angle beyond which the robot turns on the spot, degrees."""
+STOP_DISTANCE_M = 0.15
+"""Free distance straight ahead at which the robot stops, metres."""
+BLOCKED_AFTER_S = 2.0
+"""Time for which the robot waits for a free direction, or goes on towards a lost target, seconds."""
 
 
 class FollowHomingState(State):
@@ -39,24 +51,10 @@ class FollowHoming(Stage):
     """m/s."""
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
     """rad/s."""
-    heading_gain: Annotated[float, Bounds(gt=0)] = 1.5
-    """Angular speed over the angle that is left (1/s)."""
-    approach_gain: Annotated[float, Bounds(gt=0)] = 0.7
-    """Largest speed over the metres that are left to the last view (1/s)."""
-    min_speed: Annotated[float, Bounds(gt=0)] = 0.05
-    """Close to the last view (m/s)."""
-    turn_in_place_deg: Annotated[float, Bounds(gt=0)] = 35.0
-    """Angle beyond which the robot turns on the spot."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
     """Of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
-    lookahead_m: Annotated[float, Bounds(gt=0)] = 0.8
-    """Free distance, or what is left of the way, that a direction needs."""
-    stop_distance_m: Annotated[float, Bounds(gt=0)] = 0.15
-    """Free distance straight ahead at which the robot stops."""
-    blocked_after_s: Annotated[float, Bounds(gt=0)] = 2.0
-    """Time for which the robot waits for a free direction, or goes on towards a lost target."""
     wander_after_s: Annotated[float, Bounds(gt=0)] = 5.0
     """Time after which a robot whose target is lost wanders."""
 
@@ -81,7 +79,7 @@ class FollowHoming(Stage):
         if vector is None:
             return self._stand("waiting", "there is no target")
         state.lost_since, lost_s = _since(state.lost_since, vector.state == "lost", tick)
-        if vector.state == "lost" and (lost_s >= self.blocked_after_s or vector.metres is None):
+        if vector.state == "lost" and (lost_s >= BLOCKED_AFTER_S or vector.metres is None):
             if wander is not None and lost_s >= self.wander_after_s:
                 ctx.count("wandered_lost")
                 return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
@@ -96,20 +94,20 @@ class FollowHoming(Stage):
         direction, speed = self._free_direction(vector, scan, left)
         state.blocked_since, blocked_s = _since(state.blocked_since, direction is None, tick)
         if direction is None:
-            if blocked_s < self.blocked_after_s:  # somebody may be passing by
+            if blocked_s < BLOCKED_AFTER_S:  # somebody may be passing by
                 return self._stand("driving", "waiting for a way through")
             ctx.count("stood_blocked")
-            return self._stand("blocked", f"nothing is free for {self.lookahead_m:g} m towards the target")
-        if abs(direction) > math.radians(self.turn_in_place_deg):
+            return self._stand("blocked", f"nothing is free for {LOOKAHEAD_M:g} m towards the target")
+        if abs(direction) > math.radians(TURN_IN_PLACE_DEG):
             return self.Out(command=Command(0.0, self._turn(direction)), status=DrivingStatus("driving"))
         speed *= math.cos(direction)
         if progress is None or progress.last:
             known = vector.metres is not None
-            slowed = self.approach_gain * left if known else self.max_speed * vector.ratio / SLOW_RATIO
-            speed = min(speed, max(self.min_speed, slowed))
+            slowed = APPROACH_GAIN * left if known else self.max_speed * vector.ratio / SLOW_RATIO
+            speed = min(speed, max(MIN_SPEED, slowed))
         if scan is not None:
             ranges = np.minimum(scan.ranges, scan.farthest)
-            if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(self.stop_distance_m, left):
+            if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(STOP_DISTANCE_M, left):
                 speed = 0.0
         return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
 
@@ -117,7 +115,7 @@ class FollowHoming(Stage):
         """Direction to drive (rad), None where nothing is free, and the largest speed."""
         if scan is None:
             return float(wrap(vector.direction)), self.max_speed
-        ranges, room = np.minimum(scan.ranges, scan.farthest), min(self.lookahead_m, left)
+        ranges, room = np.minimum(scan.ranges, scan.farthest), min(LOOKAHEAD_M, left)
         for margin, speed in ((1.0, 1.0), (NARROW_MARGIN, NARROW_SPEED)):
             direction = free_direction(
                 ranges, scan.azimuths(), vector.direction, room, self.robot_radius_m, margin * self.margin_m
@@ -127,7 +125,7 @@ class FollowHoming(Stage):
         return None, 0.0
 
     def _turn(self, angle: float) -> float:
-        return max(-self.max_angular_speed, min(self.max_angular_speed, self.heading_gain * angle))
+        return max(-self.max_angular_speed, min(self.max_angular_speed, HEADING_GAIN * angle))
 
     def _stand(self, state: Literal["waiting", "driving", "arrived", "lost", "blocked"], why: str) -> Out:
         return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))

@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
-from .clearance import free_ahead
+from .clearance import LOOKAHEAD_M, free_ahead
 
 CLOSER = 0.9
 """Share of the smallest distance so far that counts as having come closer."""
@@ -44,8 +44,6 @@ class StallMonitor(Stage):
     """Of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides."""
-    lookahead_m: Annotated[float, Bounds(gt=0)] = 0.8
-    """Free distance at which the direct way counts as free."""
     detour_s: Annotated[float, Bounds(gt=0)] = 10.0
     """Time around an obstacle that may lead no closer."""
     stalled_after_s: Annotated[float, Bounds(gt=0)] = 30.0
@@ -88,6 +86,6 @@ class StallMonitor(Stage):
 
     def _obstructed(self, vector: HomingVector, scan: Scan) -> bool:
         ranges = np.minimum(scan.ranges, scan.farthest)
-        left = self.lookahead_m if vector.metres is None else min(self.lookahead_m, vector.metres)
+        left = LOOKAHEAD_M if vector.metres is None else min(LOOKAHEAD_M, vector.metres)
         margin = NARROW_MARGIN * self.margin_m
         return free_ahead(ranges, scan.azimuths() - vector.direction, self.robot_radius_m, margin) < left

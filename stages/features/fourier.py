@@ -14,6 +14,10 @@ from .averaged_strip import Channels, Contrast, averaged_strip
 
 FloatArray = npt.NDArray[np.float32]
 Complex = npt.NDArray[np.complex128]
+BANDS = 8
+"""Bands from top to bottom; each band and channel is a signal of its own."""
+FREQUENCIES = 8
+"""Coefficients kept of each signal, with the mean."""
 
 
 def spectrum_around(strip: FloatArray, frequencies: int, mean: bool = True) -> Complex:
@@ -37,12 +41,8 @@ class SegmentSpectrum(Stage):
     do not change when the robot turns; the turn between two views follows from circular cross-correlation.
     """
 
-    segments: Annotated[int, Bounds(ge=2)] = 36
+    segments: Annotated[int, Bounds(ge=2 * FREQUENCIES - 2)] = 36
     """Segments around the robot, the samples of each signal."""
-    bands: Annotated[int, Bounds(ge=1)] = 8
-    """Bands from top to bottom; each band and channel is a signal of its own."""
-    frequencies: Annotated[int, Bounds(ge=2)] = 8
-    """Coefficients kept of each signal, with the mean."""
     mean: bool = True
     """Whether the mean, the brightness of the band, counts; else it is 0."""
     channels: Channels = "colour"
@@ -55,13 +55,8 @@ class SegmentSpectrum(Stage):
 
         view: Spectrum
 
-    def __post_init__(self) -> None:
-        """A signal has no more frequencies than half its samples and one."""
-        if self.frequencies > self.segments // 2 + 1:
-            raise ValueError(f"frequencies: {self.segments} segments have {self.segments // 2 + 1} at most")
-
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        strip = averaged_strip(panorama.pixels, self.bands, self.segments, self.channels, self.contrast)
-        spectrum = spectrum_around(strip, self.frequencies, self.mean)
+        strip = averaged_strip(panorama.pixels, BANDS, self.segments, self.channels, self.contrast)
+        spectrum = spectrum_around(strip, FREQUENCIES, self.mean)
         return self.Out(view=Spectrum(packed(spectrum), len(spectrum), self.segments))

@@ -1,12 +1,15 @@
 """Makes a panorama a small grey strip."""
 
-from typing import Annotated
-
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.image import Panorama, Strip, Windows
+
+COLUMNS = 90
+"""Columns of the strip, pixels: 4 degrees each."""
+ROWS = 8
+"""Rows of the strip, pixels."""
 
 
 class GreyStrip(Stage):
@@ -14,11 +17,6 @@ class GreyStrip(Stage):
 
     A stage of its own so that it can be cached with the log's other features.
     """
-
-    columns: Annotated[int, Bounds(ge=8)] = 90
-    """Columns of the strip (pixels): 4 degrees each."""
-    rows: Annotated[int, Bounds(ge=1)] = 8
-    """Rows of the strip (pixels)."""
 
     class Out(Outputs):
         """The strip; absent where the image is not a full circle."""
@@ -30,6 +28,6 @@ class GreyStrip(Stage):
         if isinstance(panorama, Windows):
             return self.Out()
         grey = cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2GRAY)
-        size = (self.columns, self.rows)
+        size = (COLUMNS, ROWS)
         small = cv2.resize(grey.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         return self.Out(strip=Strip(np.asarray(small, np.float32)))

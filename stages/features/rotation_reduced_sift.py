@@ -20,6 +20,10 @@ SEAM = 48
 """Columns that are repeated beyond both edges of a full circle, so that what lies across the seam is found too."""
 COLOUR_RADIUS = 3.0
 """Radius of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
+EDGE_RATIO = 10.0
+"""Largest ratio of principal curvatures of a feature, above which it lies on an edge: OpenCV's default."""
+BLUR_PX = 1.6
+"""Blur of the first octave, pixels: OpenCV's default."""
 
 
 class RotationReducedSift(Stage):
@@ -39,10 +43,6 @@ class RotationReducedSift(Stage):
     """Larger images are made smaller; 320 x 240 is the paper's size."""
     contrast: Annotated[float, Bounds(ge=0)] = 0.04
     """OpenCV's threshold; at 0.02 features of floors and walls that repeat come in, and maps get wrong loops."""
-    edge: Annotated[float, Bounds(gt=1)] = 10.0
-    """OpenCV's threshold of the ratio of principal curvatures."""
-    sigma: Annotated[float, Bounds(gt=0)] = 1.6
-    """Blur of the first octave (px)."""
 
     class Out(Outputs):
         """Features that were found, the strongest first; there may be none."""
@@ -52,7 +52,7 @@ class RotationReducedSift(Stage):
     def setup(self, ctx: Context) -> None:
         """Make the detector; without the precise form it finds fine points a quarter of a pixel off."""
         self._sift = cv2.SIFT.create(
-            contrastThreshold=self.contrast, edgeThreshold=self.edge, sigma=self.sigma, enable_precise_upscale=True
+            contrastThreshold=self.contrast, edgeThreshold=EDGE_RATIO, sigma=BLUR_PX, enable_precise_upscale=True
         )
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:

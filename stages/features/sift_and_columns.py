@@ -1,14 +1,16 @@
 """Both kinds of local features: SIFT for a robot on a floor, and columns between two edges."""
 
 from dataclasses import replace
-from typing import Annotated
 
-from omninav.pipeline import Bounds, Context
+from omninav.pipeline import Context
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Image, Panorama
 
 from .rotation_reduced_sift import RotationReducedSift
 from .vertical_segments import FindVerticalSegments
+
+MAX_COLUMNS = 200
+"""Prototypes that are kept of an image: those that stand for most columns."""
 
 
 class SiftAndColumns(RotationReducedSift):
@@ -18,13 +20,10 @@ class SiftAndColumns(RotationReducedSift):
     without a camera.
     """
 
-    max_columns: Annotated[int, Bounds(ge=1)] = 200
-    """The prototypes that stand for most columns are kept."""
-
     def setup(self, ctx: Context) -> None:
         """Make both detectors."""
         super().setup(ctx)
-        self._columns = FindVerticalSegments(max_segments=self.max_columns, max_pixels=self.max_pixels)
+        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> RotationReducedSift.Out:
         """Describe one image."""

@@ -31,6 +31,10 @@ MIN_LENGTH_PX = 8.0
 """Shortest segment, pixels."""
 AZIMUTH_SIGMA_DEG = 3.0
 """Difference in azimuth that counts as one in the distance of two segments, degrees."""
+LINES = 360
+"""Radii of a mirror image along which segments are searched."""
+MARGIN = 0.2
+"""Share of its length by which a segment is widened at both ends for its colours."""
 
 
 def profile_basis() -> Floats:
@@ -106,7 +110,7 @@ def segments_of(
     An edge is a local maximum along a column of the intensity's gradient, of the image smoothed by `blur` pixels,
     above `min_gradient` standard deviations of its intensity per pixel: neither scale nor offset of the light changes
     it. Every two neighbouring edges at least `min_length` pixels apart make a segment. Descriptors: colour correlations
-    over the segment widened by `margin` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8
+    over the segment widened by `MARGIN` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8
     samples, its mean taken out and its length made 1. `circle`: the columns go around.
     """
     seam = min(max(2, math.ceil(3.0 * blur)), pixels.shape[1]) if circle else 0
@@ -226,12 +230,8 @@ class FindVerticalSegments(Stage):
 
     max_segments: Annotated[int, Bounds(ge=1)] = 200
     """The heaviest prototypes are kept."""
-    lines: Annotated[int, Bounds(ge=8)] = 360
-    """Radii of a mirror image."""
     max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
     """Larger images are made smaller; 320 x 240 is the paper's size."""
-    margin: Annotated[float, Bounds(ge=0)] = 0.2
-    """Share of its length by which a segment is widened at both ends for its colours."""
     cluster_distance: Annotated[float, Bounds(gt=0)] = 2.0
     """Mahalanobis distance within which neighbours become one."""
 
@@ -244,7 +244,7 @@ class FindVerticalSegments(Stage):
         """Describe one image."""
         read = prepared_image(image, camera, self.max_pixels)
         pixels, circle = self._upright(read)
-        settings = BLUR_PX, MIN_GRADIENT, MIN_LENGTH_PX, self.margin
+        settings = BLUR_PX, MIN_GRADIENT, MIN_LENGTH_PX, MARGIN
         found = segments_of(pixels, circle, *settings)
         width = pixels.shape[1]
         kept, weights = prototypes(found, width, AZIMUTH_SIGMA_DEG * width / 360.0, self.cluster_distance, circle)
@@ -263,7 +263,7 @@ class FindVerticalSegments(Stage):
         """The image with its upright lines as columns, the outer end of a radius at the top."""
         if read.ring is None:
             return read.pixels, read.circle
-        lines, rows = np.meshgrid(np.arange(self.lines), np.arange(int(read.ring.outer - read.ring.inner) + 1))
+        lines, rows = np.meshgrid(np.arange(LINES), np.arange(int(read.ring.outer - read.ring.inner) + 1))
         points = self._back(np.stack([lines, rows], axis=-1).astype(np.float64), read).astype(np.float32)
         upright = cv2.remap(read.pixels, points[..., 0], points[..., 1], cv2.INTER_LINEAR)
         return cast(Pixels, upright), True
@@ -272,7 +272,7 @@ class FindVerticalSegments(Stage):
         """Points (..., 2) of the upright image as points of the image that was read."""
         if read.ring is None:
             return points
-        angle = 2.0 * math.pi * points[..., 0] / self.lines
+        angle = 2.0 * math.pi * points[..., 0] / LINES
         radius = read.ring.outer - points[..., 1]
         around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         middle = np.array([read.ring.centre_x, read.ring.centre_y])

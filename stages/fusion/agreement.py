@@ -26,8 +26,8 @@ class Agreement(Stage):
     * Agreement above `agree_above`: all particles are resampled by pi_i p(y|x_i) and get weight 1/N. This is what the
       paper describes. It is importance resampling (SIR), although the paper cites the auxiliary filter (erratum 15 in
       docs/papers.md).
-    * Agreement below: a share `keep` of the particles, chosen at random and not by weight (erratum 17a), stays with
-      total weight `keep`; the others are drawn from the hypothesis by lambda w and share the rest equally (erratum 17).
+    * Agreement below: 0.8 of the particles, chosen at random and not by weight (erratum 17a), stay with total weight
+      0.8; the others are drawn from the hypothesis by lambda w and share the rest equally (erratum 17).
     * Without a hypothesis the belief stays as it is.
     """
 
@@ -35,11 +35,11 @@ class Agreement(Stage):
     """Resampling where both agree: `auxiliary` is Pitt & Shephard's filter (1999), which needs `before` and `model`."""
     agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
     """Agreement, 1/(m^2 rad), above which both agree; the paper gives 10^-4 without a unit (erratum 14)."""
-    keep: Annotated[float, Bounds(ge=0, le=1)] = 0.8
-    """Share of the particles that stays where belief and map disagree."""
     outlier_probability: Annotated[float, Bounds(ge=0, le=1)] = 0.0
     """Probability that a view matches one it has nothing to do with; the density becomes (1 - q) p(y|x) + q times the
     agreement, so that one false match does not end a belief. 0 is the paper's filter."""
+    keep: Annotated[float, Bounds(ge=0, le=1)] = 0.8
+    """Share of the particles that stays where belief and map disagree."""
 
     class Out(Outputs):
         """The belief after the image."""

@@ -18,6 +18,8 @@ from omninav.stages.values.belief import GaussianMixture
 
 Array = npt.NDArray[np.float64]
 Rule = Literal["det_ratio", "det_min"]
+MAX_DISTANCE = 7.81
+"""Squared Mahalanobis distance below which two components correspond: 95 % with 3 degrees of freedom."""
 
 
 def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: float = 1.0) -> float:
@@ -169,8 +171,6 @@ class CovarianceIntersection(Stage):
     `max_components` stay. Covariances do not shrink where sources agree (erratum 4).
     """
 
-    gamma: Annotated[float, Bounds(gt=0)] = 7.81
-    """Squared Mahalanobis distance below which two components correspond; 7.81: 95 % with 3 degrees of freedom."""
     alpha: Rule = "det_ratio"
     """Weight of the second covariance: `det_ratio` (the paper's), or `det_min`, the smallest determinant."""
     weighted: bool = True
@@ -200,7 +200,7 @@ class CovarianceIntersection(Stage):
         belief = _positive(prediction)
         for source in (hypothesis, fixes, other):
             if source is not None:
-                belief = fuse(belief, _positive(source), self.gamma, self.alpha, self.weighted)
+                belief = fuse(belief, _positive(source), MAX_DISTANCE, self.alpha, self.weighted)
         if not len(belief[2]):
             return self.Out(belief=prediction)
         return self.Out(belief=GaussianMixture(*self._simplified(*belief)))

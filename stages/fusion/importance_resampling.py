@@ -16,6 +16,8 @@ KLD_ERROR = 0.05
 """Kullback-Leibler distance allowed with `adapt: kld` (Fox 2001)."""
 CELL_M = 0.25
 """Width of the cells counted with `adapt: kld`, metres."""
+CELL_DEG = 10.0
+"""Height of a cell in heading, degrees."""
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
@@ -55,8 +57,6 @@ class ImportanceResampling(Stage):
     """Probability per image of full novelty that the robot was kidnapped."""
     recovery_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
     """Share of the particles that are recovery particles."""
-    cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
-    """Height of these cells in heading."""
 
     class Out(Outputs):
         """The belief after the image."""
@@ -113,5 +113,5 @@ class ImportanceResampling(Stage):
     def _wanted(self, poses: Array) -> int:
         if self.adapt == "none":
             return self.number
-        cells = occupied_cells(poses, CELL_M, math.radians(self.cell_deg))
+        cells = occupied_cells(poses, CELL_M, math.radians(CELL_DEG))
         return min(max(kld_number(cells, KLD_ERROR, 0.99), self.min_particles), self.number)

@@ -1,12 +1,11 @@
 """Summarises particles as a few Gaussians."""
 
 import math
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.probability.clusters import clusters
 from omninav.stages.geometry.probability.gaussians import floored
 from omninav.stages.geometry.probability.particles import weighted_moments
@@ -16,24 +15,23 @@ Array = npt.NDArray[np.float64]
 
 CELL_M = 0.5
 """Width of a cell, metres."""
+CELL_DEG = 30.0
+"""Height of a cell in heading, degrees."""
+MIN_WEIGHT = 0.01
+"""Weight below which a cluster is dropped."""
+MIN_SIGMA_M = 0.01
+"""Smallest standard deviation of a Gaussian, metres: equal particles have no spread (erratum 18 in docs/papers.md)."""
+MIN_SIGMA_DEG = 0.5
+"""Smallest standard deviation of its heading, degrees."""
 
 
 class ParticleClustering(Stage):
     """Replaces each cluster of particles by a Gaussian with its mean, covariance and weight.
 
     Porta & Kroese 2004, section 3.2. Particles belong to one cluster where their cells of `cell_m` x `cell_m` x
-    `cell_deg` touch, directly or over other occupied cells, so that a cluster has any shape. The heading's mean is
+    `CELL_DEG` touch, directly or over other occupied cells, so that a cluster has any shape. The heading's mean is
     circular. Weights are normalised to sum 1. No Gaussian where no cluster is heavy enough: the pose is unknown.
     """
-
-    cell_deg: Annotated[float, Bounds(gt=0, le=120)] = 30.0
-    """Height of a cell in heading."""
-    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    """Weight below which a cluster is dropped."""
-    min_sigma_m: Annotated[float, Bounds(gt=0)] = 0.01
-    """Smallest standard deviation of a Gaussian: equal particles have no spread (erratum 18 in docs/papers.md)."""
-    min_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
-    """Smallest standard deviation of its heading."""
 
     class Out(Outputs):
         """The belief as Gaussians, none where no cluster is heavy enough."""
@@ -42,9 +40,9 @@ class ParticleClustering(Stage):
 
     def step(self, ctx: Context, particles: Particles) -> Out:
         """Cluster the particles."""
-        floor = (self.min_sigma_m, self.min_sigma_m, math.radians(self.min_sigma_deg))
-        close = (CELL_M, math.radians(self.cell_deg))
-        return self.Out(state=cluster_gaussians(particles, close, self.min_weight, floor))
+        floor = (MIN_SIGMA_M, MIN_SIGMA_M, math.radians(MIN_SIGMA_DEG))
+        close = (CELL_M, math.radians(CELL_DEG))
+        return self.Out(state=cluster_gaussians(particles, close, MIN_WEIGHT, floor))
 
 
 def cluster_gaussians(

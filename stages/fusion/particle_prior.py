@@ -10,10 +10,13 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.particles import uniform_around
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose, StartPose
 from omninav.stages.values.requests import Restart
+
+RADIUS = 2.0
+"""Distance from a reference, in appearance length scales, up to which a uniform belief extends without `area`."""
 
 
 class ParticlePrior(Stage):
@@ -28,10 +31,6 @@ class ParticlePrior(Stage):
     `truth` or `origin`, with sigmas of 0.1 m and 0.1 rad; or [x, y, heading, sigma_xy, sigma_heading] (m, rad)."""
     number: Annotated[int, Bounds(ge=1)] = 5000
     """Particles."""
-    radius: Annotated[float, Bounds(gt=0)] = 2.0
-    """Distance from a reference, in appearance length scales, up to which a uniform belief extends without `area`."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Appearance length scale where the port `length_scale` is not wired."""
 
     class Out(Outputs):
         """The belief to begin with; absent at all later images."""
@@ -58,8 +57,8 @@ class ParticlePrior(Stage):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
                 )
-            unit = self.length_scale_m if length_scale is None else length_scale.metres
-            poses = uniform_around(map.poses, self.radius * unit, self.number, ctx.rng)
+            unit = metres_of(length_scale)
+            poses = uniform_around(map.poses, RADIUS * unit, self.number, ctx.rng)
         else:
             if where == "truth":
                 if truth is None:

@@ -1,10 +1,12 @@
 """The pose that a belief stands for."""
 
+import math
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.values.belief import Belief, PoseEstimate
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.belief import MODE_RADIUS, Belief, PoseEstimate
+from omninav.stages.values.length_scale import LengthScale, metres_of
 
 
 class BeliefEstimate(Stage):
@@ -17,13 +19,18 @@ class BeliefEstimate(Stage):
     taken: Literal["mode", "mean"] = "mode"
     """The pose that is measured and acted upon: the heaviest `mode`, or the `mean` of the whole belief, as in Wolf,
     Burgard & Burkhardt 2005, section VI-B (erratum 47 in docs/papers.md). Covariance and share are the mode's."""
+    mode_radius: Annotated[float, Bounds(gt=0)] | None = None
+    """Radius of a mode of particles, in length scales of the map; null: 1 m."""
+    mode_radius_deg: Annotated[float, Bounds(gt=0, le=90)] = 30.0
+    """The same in heading."""
 
     class Out(Outputs):
         """`estimate`: mode, covariance, share of the belief, mean."""
 
         estimate: PoseEstimate
 
-    def step(self, ctx: Context, belief: Belief) -> Out:
+    def step(self, ctx: Context, belief: Belief, length_scale: LengthScale | None = None) -> Out:
         """One belief, one estimate."""
-        estimate = belief.estimate()
+        metres = MODE_RADIUS[0] if self.mode_radius is None else self.mode_radius * metres_of(length_scale)
+        estimate = belief.estimate((metres, math.radians(self.mode_radius_deg)))
         return self.Out(estimate=replace(estimate, pose=estimate.mean) if self.taken == "mean" else estimate)

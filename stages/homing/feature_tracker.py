@@ -1,12 +1,11 @@
 """Tracks the features of a local map from image to image."""
 
 from dataclasses import field
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, LocalMap, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
@@ -21,6 +20,24 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 EDGE_PX = 2.0
 """Points closer to the image's edge are not tracked."""
+MAX_PIXELS = 76800
+"""Pixels of the image that is tracked in, larger ones are made smaller: 320 x 240, the paper's size."""
+START_RADIUS_PX = 3
+"""Radius around a feature within which the most trackable point is chosen, pixels."""
+WINDOW_PX = 15
+"""Side of the window that Lucas and Kanade's method compares, pixels."""
+PYRAMID_LEVELS = 3
+"""Times that the image is halved for large displacements."""
+MAX_FORWARD_BACKWARD_PX = 1.0
+"""Largest distance from where it began of a point that is tracked forward and backward again, pixels."""
+SEARCH_RADIUS_PX = 8.0
+"""Radius around its expected position in which a lost point is searched, pixels."""
+PATCH_RADIUS_PX = 5
+"""Radius of the disc whose intensity histogram describes a point, pixels."""
+MAX_HISTOGRAM_DIFFERENCE = 0.25
+"""Half the sum of absolute differences up to which a lost point is recognised."""
+MIN_TRACKABILITY = 0.01
+"""Smallest trackability at which a lost point is searched, as a share of the image's largest."""
 
 
 class FeatureTrackerState(State):
@@ -47,25 +64,6 @@ class FeatureTracker(Stage):
     and the map expect them. Raises BadInput for an image without bearings.
     """
 
-    max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
-    """Larger images are made smaller; 320 x 240 is the paper's size."""
-    start_radius_px: Annotated[int, Bounds(ge=0)] = 3
-    """Radius around a feature within which the most trackable point is chosen."""
-    window_px: Annotated[int, Bounds(ge=3)] = 15
-    """Side of the window that Lucas and Kanade's method compares."""
-    pyramid_levels: Annotated[int, Bounds(ge=0)] = 3
-    """How often the image is halved for large displacements."""
-    max_forward_backward_px: Annotated[float, Bounds(gt=0)] = 1.0
-    """A point that is tracked forward and backward again must end this close to where it began."""
-    search_radius_px: Annotated[float, Bounds(gt=0)] = 8.0
-    """Radius around its expected position in which a lost point is searched."""
-    patch_radius_px: Annotated[int, Bounds(ge=1)] = 5
-    """Radius of the disc whose intensity histogram describes a point."""
-    max_histogram_difference: Annotated[float, Bounds(ge=0, le=1)] = 0.25
-    """Half the sum of absolute differences up to which a lost point is recognised."""
-    min_trackability: Annotated[float, Bounds(ge=0)] = 0.01
-    """Of a point where a lost one is searched, as a share of the image's most trackable point."""
-
     class Out(Outputs):
         """Absent where there is no local map."""
 
@@ -81,7 +79,7 @@ class FeatureTracker(Stage):
         motion: Motion | None = None,
     ) -> Out:
         """Track into this image; `local_map` is that of the tick before, `motion` what was driven since."""
-        seen = working_image(image, camera, self.max_pixels)
+        seen = working_image(image, camera, MAX_PIXELS)
         if local_map is None or not len(local_map):
             state.number, state.image = -1, seen.grey
             return self.Out()
@@ -107,7 +105,7 @@ class FeatureTracker(Stage):
         strength = trackability(before)
         self._start(state, before, strength, local_map, np.flatnonzero(kinds == MATCHED))
         steady = np.flatnonzero(state.alive)
-        state.histograms[steady] = histograms(before, state.points[steady], self.patch_radius_px)
+        state.histograms[steady] = histograms(before, state.points[steady], PATCH_RADIUS_PX)
         expected = _expected(state, before, local_map)
         lost = np.flatnonzero(~state.alive & before.inside(expected, EDGE_PX))
         points, found = find_again(
@@ -115,10 +113,10 @@ class FeatureTracker(Stage):
             strength,
             expected[lost],
             state.histograms[lost],
-            self.search_radius_px,
-            self.patch_radius_px,
-            self.max_histogram_difference,
-            self.min_trackability,
+            SEARCH_RADIUS_PX,
+            PATCH_RADIUS_PX,
+            MAX_HISTOGRAM_DIFFERENCE,
+            MIN_TRACKABILITY,
         )
         state.points[lost[found]], state.alive[lost[found]] = points[found], True
         return lost[found]
@@ -132,7 +130,7 @@ class FeatureTracker(Stage):
             expected = before.from_original(local_map.points[rows])
         inside = before.inside(expected, EDGE_PX)
         rows, expected = rows[inside], expected[inside]
-        points = best_nearby(strength, before, expected, self.start_radius_px)
+        points = best_nearby(strength, before, expected, START_RADIUS_PX)
         bearings = before.bearings(points)
         usable = np.isfinite(bearings).all(axis=1) & before.inside(points, EDGE_PX)
         rows, points, bearings = rows[usable], points[usable], bearings[usable]
@@ -151,9 +149,9 @@ class FeatureTracker(Stage):
             seen,
             state.points[old],
             guesses,
-            self.window_px,
-            self.pyramid_levels,
-            self.max_forward_backward_px,
+            WINDOW_PX,
+            PYRAMID_LEVELS,
+            MAX_FORWARD_BACKWARD_PX,
         )
         rows = old[kept]
         points[rows] = state.points[rows] = found[kept]

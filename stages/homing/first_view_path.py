@@ -1,10 +1,11 @@
 """The place where a log began, as one to come back to."""
 
-from typing import Annotated
-
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
+from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.values.homing import ImagePath
 from omninav.stages.values.local_features import LocalFeatures
+
+DELAY_S = 1.0
+"""Time after the first view at which the path is given, seconds: the robot has been put elsewhere."""
 
 
 class FirstViewPathState(State):
@@ -20,9 +21,6 @@ class FirstViewPath(Stage):
     The path is given once; its reader holds it: `{from: first_view.path, hold: true}`.
     """
 
-    delay_s: Annotated[float, Bounds(gt=0)] = 1.0
-    """Time after the first view at which the path is given, when the robot has been put elsewhere."""
-
     class Out(Outputs):
         path: ImagePath | None = None
 
@@ -30,7 +28,7 @@ class FirstViewPath(Stage):
         """The path, once."""
         if tick.first_of_log:
             state.views, state.stamp = (features,), tick.stamp
-        elif state.views and tick.stamp - state.stamp >= self.delay_s * 1e9:
+        elif state.views and tick.stamp - state.stamp >= DELAY_S * 1e9:
             path = ImagePath(tick.log, state.views, ("the start",))
             state.views = ()
             return self.Out(path=path)

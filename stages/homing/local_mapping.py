@@ -33,6 +33,10 @@ ARRIVAL_DISTANCE = 0.05
 """Distance to the target, over the features' typical distance, below which the two views must look the same."""
 MAX_OUTLIER_DEG = 10.0
 """Largest angle between most matched bearings at the target, after the turn, degrees."""
+MIN_INLIERS = 6
+"""Features that must agree with a pose."""
+MIN_REBUILD_DISTANCE = 0.1
+"""Distance to the target, over the features' typical distance, below which the baseline is too short for a new map."""
 
 
 class Matches(NamedTuple):
@@ -62,7 +66,7 @@ class LocalMapping(Stage):
     by chance is accepted. From then on three-point resection in samples gives the robot's pose from tracked features
     and from those that are matched with the target view again, whose tracks start again.
 
-    With fewer than `min_inliers` the map is rebuilt from the matches of the same tick, with the old map's scale, or the
+    With fewer than `MIN_INLIERS` the map is rebuilt from the matches of the same tick, with the old map's scale, or the
     target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
     says the target is reached, where the two views still differ, is discarded.
 
@@ -79,13 +83,8 @@ class LocalMapping(Stage):
     too."""
     refine: bool = True
     """Whether poses that samples agree on are brought to their local optimum; the paper keeps the best sample's."""
-    min_inliers: Annotated[int, Bounds(ge=4)] = 6
-    """Features that must agree with a pose."""
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
-    min_rebuild_distance: Annotated[float, Bounds(ge=0)] = 0.1
-    """Distance to the target, over the features' typical distance, below which the baseline is too short for a new
-    map."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
@@ -140,7 +139,7 @@ class LocalMapping(Stage):
                 local_map = LocalMap(-1, local_map.target, "lost")
             else:
                 why = f"{local_map.why}; "
-        new, reason = self._made(ctx, state, local_map, matches, self.min_inliers)
+        new, reason = self._made(ctx, state, local_map, matches, MIN_INLIERS)
         if new is not None:
             return new
         ctx.count("lost_target")
@@ -171,8 +170,8 @@ class LocalMapping(Stage):
         if found is not None:
             agrees[usable] = found.inliers
         inliers = len(np.unique(np.append(tracked, owners)[agrees]))  # tracked and matched is one feature
-        if found is None or inliers < self.min_inliers:
-            why = f"{inliers} tracked features agree on where the robot is, {self.min_inliers} are needed"
+        if found is None or inliers < MIN_INLIERS:
+            why = f"{inliers} tracked features agree on where the robot is, {MIN_INLIERS} are needed"
             return replace(local_map, state="lost", inliers=inliers, why=why)
         kinds[tracked[~agrees[: len(tracked)]]] = LOST
         started = agrees[len(tracked) :] & (kinds[owners] == LOST)
@@ -193,7 +192,7 @@ class LocalMapping(Stage):
 
     def _could_be_better(self, local_map: LocalMap, matches: int) -> bool:
         # Closer to the target more is matched with it; at the target the baseline is too short.
-        far = local_map.distance() > self.min_rebuild_distance * local_map.depth()
+        far = local_map.distance() > MIN_REBUILD_DISTANCE * local_map.depth()
         return far and matches > REBUILD_RATIO * local_map.first_inliers
 
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
@@ -216,8 +215,8 @@ class LocalMapping(Stage):
         found = relative_pose(first, second, ctx.rng, self.solver, threshold, refine=self.refine)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         agree = f"{inliers} of {len(first)} matches with the target view agree"
-        if found is None or inliers < max(self.min_inliers, min_inliers):
-            return None, f"{agree}, {self.min_inliers} are needed"
+        if found is None or inliers < max(MIN_INLIERS, min_inliers):
+            return None, f"{agree}, {MIN_INLIERS} are needed"
         if false_alarms(found, first, second, threshold) > self.max_false_alarms:
             return None, f"{agree}, as they might by chance"
         places = triangulate(first, second, found.rotation, found.translation)

@@ -1,15 +1,19 @@
 """Relative pose of a second view, seen from the first."""
 
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.two_views.generate_and_select import generate_and_select
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, relative_pose
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 MAX_ERROR_DEG = 0.5
 """Largest angle by which the two bearings of a pair may together miss the pose, degrees."""
+CONFIDENCE = 0.9999
+"""Probability that a sample without a wrong pair is among those that are drawn."""
+MAX_SAMPLES = 5000
+"""Samples that are drawn at most."""
 
 
 class TwoViewPose(Stage):
@@ -22,10 +26,6 @@ class TwoViewPose(Stage):
     solver: Solver | Literal["generate_and_select"] = "planar"
     """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's;
     `generate_and_select`, which draws no samples and refines nothing."""
-    confidence: Annotated[float, Bounds(gt=0, lt=1)] = 0.9999
-    """Probability that a sample without a wrong pair is among those that are drawn."""
-    max_samples: Annotated[int, Bounds(ge=1)] = 5000
-    """That are drawn at most."""
     refine: bool = True
     """Whether the best sample's pose is brought to its local optimum."""
 
@@ -40,7 +40,7 @@ class TwoViewPose(Stage):
         if self.solver == "generate_and_select":
             found = generate_and_select(pairs.first, pairs.second, threshold)
         else:
-            by = ctx.rng, self.solver, threshold, self.confidence, self.max_samples, self.refine
+            by = ctx.rng, self.solver, threshold, CONFIDENCE, MAX_SAMPLES, self.refine
             found = relative_pose(pairs.first, pairs.second, *by)
         if found is None:
             ctx.count("no_relative_pose")

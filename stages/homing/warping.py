@@ -20,6 +20,10 @@ HALF_WINDOW = 1
 """Columns on both sides of one that are compared together with it."""
 MIN_FEATURES = 18
 """Features that must agree with a vector of two views alone; with fewer, whole images decide."""
+COLUMNS = 180
+"""Columns that an image is brought to; a multiple of 4."""
+MIN_COLUMNS = 20
+"""Columns that must match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 
 
 class WarpingVectorState(State):
@@ -41,13 +45,9 @@ class WarpingVector(Stage):
     BadInput for an image without its camera, and a camera that does not see the full circle.
     """
 
-    columns: Annotated[int, Bounds(ge=24, le=720)] = 180
-    """Columns that an image is brought to; a multiple of 4."""
     max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
     """Largest turn to both sides by which the target's heading may differ from the robot's; 180: any. With a compass
     less."""
-    min_columns: Annotated[int, Bounds(ge=1)] = 20
-    """That match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 
     class Out(Outputs):
         """Absent where there is no target."""
@@ -56,9 +56,7 @@ class WarpingVector(Stage):
 
     def setup(self, ctx: Context) -> None:
         """No tables yet: the camera comes with the first image."""
-        if self.columns % 4:
-            raise BadInput(f"columns: {self.columns} is no multiple of 4; write nodes.homing.columns=180")
-        self._table = ColumnTable(self.columns)
+        self._table = ColumnTable(COLUMNS)
         self._target: tuple[Image | Panorama, Columns] | None = None
 
     def step(
@@ -81,10 +79,10 @@ class WarpingVector(Stage):
         here = self._columns(image, camera)
         noise = (NOISE_LEVELS / 255.0) ** 2
         found = warped(here, self._target[1], noise, HALF_WINDOW, 2, math.radians(self.max_turn_deg))
-        if found.columns < self.min_columns:
+        if found.columns < MIN_COLUMNS:
             ctx.count("too_few_columns")
             if vector.state == "lost":
-                why = f"{vector.why}; {found.columns} columns of the image match, {self.min_columns} are needed"
+                why = f"{vector.why}; {found.columns} columns of the image match, {MIN_COLUMNS} are needed"
                 vector = replace(vector, why=why)
             return self.Out(vector=vector)
         state.nearness = state.nearness or max(found.nearness, 1e-3)

@@ -1,11 +1,21 @@
 """The waypoints of a path of images: which one to go to now."""
 
 import math
-from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.values.homing import HomingTarget, HomingVector, ImagePath, PathProgress
 from omninav.stages.values.local_features import LocalFeatures
+
+REACHED_RATIO = 0.2
+"""Share of the way to a view that is left where it counts as reached, but for the last."""
+ARRIVAL_DISTANCE_M = 0.04
+"""Distance to the last view at which the robot has arrived, where odometry tells metres."""
+ARRIVAL_NEARNESS = 0.007
+"""Nearness of the last view at which the robot has arrived."""
+PASSED_NEARNESS = 0.03
+"""Nearness of a view that hardly differs from the present one, reached at once; of the last, where it lies behind."""
+MAX_HEADING_ERROR_DEG = 3.0
+"""Largest heading error at the last view, degrees."""
 
 
 class WaypointImagesState(State):
@@ -29,17 +39,6 @@ class WaypointImages(Stage):
     does not count. `vector` is the one of the tick before, by a delayed wire. A path with another number starts again
     at its first view. Nearness is the distance over that of a typical feature.
     """
-
-    reached_ratio: Annotated[float, Bounds(gt=0, lt=1)] = 0.2
-    """Share of the way to a view that is left where it counts as reached, but for the last."""
-    arrival_distance_m: Annotated[float, Bounds(gt=0)] = 0.04
-    """To the last view, where odometry tells metres."""
-    arrival_nearness: Annotated[float, Bounds(gt=0)] = 0.007
-    """Of the last view, where the robot has arrived."""
-    passed_nearness: Annotated[float, Bounds(gt=0)] = 0.03
-    """Of a view that hardly differs from the present one, reached at once; of the last, where it lies behind."""
-    max_heading_error_deg: Annotated[float, Bounds(gt=0)] = 3.0
-    """At the last view."""
 
     class Out(Outputs):
         """`features` are the target's. Absent where there is no path, or an empty one, or the robot has arrived."""
@@ -75,14 +74,14 @@ class WaypointImages(Stage):
         return self.Out(target=HomingTarget(state.target, view, last, name), features=view, progress=progress)
 
     def _go_on(self, state: WaypointImagesState, vector: HomingVector, views: int) -> None:
-        behind, close = math.cos(vector.direction) < 0.0, vector.nearness <= self.passed_nearness
+        behind, close = math.cos(vector.direction) < 0.0, vector.nearness <= PASSED_NEARNESS
         if state.reached < views - 1:
-            if close or vector.ratio <= self.reached_ratio or (behind and vector.ratio < 0.5):
+            if close or vector.ratio <= REACHED_RATIO or (behind and vector.ratio < 0.5):
                 state.reached += 1
                 state.target += 1
             return
-        there = vector.nearness <= self.arrival_nearness or (close and behind)
-        there = there or (vector.metres is not None and vector.metres <= self.arrival_distance_m)
+        there = vector.nearness <= ARRIVAL_NEARNESS or (close and behind)
+        there = there or (vector.metres is not None and vector.metres <= ARRIVAL_DISTANCE_M)
         state.docking = state.docking or there
-        if state.docking and abs(vector.turn) <= math.radians(self.max_heading_error_deg):
+        if state.docking and abs(vector.turn) <= math.radians(MAX_HEADING_ERROR_DEG):
             state.reached, state.arrived = views, True

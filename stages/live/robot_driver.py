@@ -28,6 +28,10 @@ CAMERA = "omni_camera"
 TWISTS = ("geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist")
 NOTE_S = 5.0
 """Seconds between two notes of how it goes."""
+COMMAND_S = 0.5
+"""Time that a command holds, seconds: without another one the robot then stops."""
+ODOMETRY_HZ = 20.0
+"""Odometry messages a second; between ticks the pose is interpolated."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class RobotDriver(Stage):
     | `/cmd_vel` (read) | Twist or TwistStamped, whichever is published |
 
     Stamps are this computer's time at the first tick, and run with the ticks from there on. In real time the command
-    for the next tick is what has come when the tick is over; it holds until another comes, for `command_s` at most.
+    for the next tick is what has come when the tick is over; it holds until another comes, for `COMMAND_S` at most.
     """
 
     transport: Literal["ros2"] | TransportName = "ros2"
@@ -82,10 +86,6 @@ class RobotDriver(Stage):
     """A second takes a second, where the computer is fast enough; else ticks follow each other at once."""
     command_topic: str = "/cmd_vel"
     """Where commands come from."""
-    command_s: Annotated[float, Bounds(gt=0)] = 0.5
-    """Seconds that a command holds: without another one the robot then stops."""
-    odometry_hz: Annotated[float, Bounds(gt=0)] = 20.0
-    """Odometry messages a second; between ticks the pose is interpolated."""
     camera_file: str | None = None
     """Where to write the camera's description for `omninav live camera=…`: a mirror does not fit CameraInfo."""
     camera_stops: tuple[CameraStop, ...] = ()
@@ -133,7 +133,7 @@ class RobotDriver(Stage):
         robot.stamp, robot.odometry = tick.stamp, np.array([odometry.x, odometry.y, odometry.heading])
         self._wait(ctx, robot, seconds + period - 1.5 * self._worked, tick.stamp)
         self._free = time.monotonic()
-        fresh = robot.commanded is not None and tick.stamp - robot.commanded < self.command_s * 1e9
+        fresh = robot.commanded is not None and tick.stamp - robot.commanded < COMMAND_S * 1e9
         speed, turning = robot.command.tolist()
         command = Command(speed, turning) if fresh else None
         return self.Out(command=command, tick=Tick(tick.index, stamp, first_of_log=tick.first_of_log, frame=tick.frame))
@@ -208,7 +208,7 @@ class RobotDriver(Stage):
 
     def _odometry(self, robot: RobotDriverState, now: int, pose: Array) -> Iterator[tuple[int, Array]]:
         """Stamps and poses since the tick before, up to this one."""
-        steps = max(1, round(self.odometry_hz * (now - robot.stamp) / 1e9)) if robot.stamp else 1
+        steps = max(1, round(ODOMETRY_HZ * (now - robot.stamp) / 1e9)) if robot.stamp else 1
         shares = np.arange(1, steps + 1) / steps
         poses = interpolate(np.array([0.0, 1.0]), np.stack([robot.odometry, pose]), shares) if steps > 1 else [pose]
         for share, row in zip(shares.tolist(), poses, strict=True):

@@ -33,6 +33,12 @@ DEFAULT_LENGTH_SCALE_M = 0.3
 Forgetting = Literal["active", "passive", "none"]
 StateCovariance = Literal["first", "every_update"]
 Components = tuple[Array, Array, Array, Array]
+MIN_SIMILARITY = 0.2
+"""Similarity from which a view learns the state."""
+MERGE_BELOW = 7.81
+"""Squared Mahalanobis distance below which components are merged."""
+FITS_BELOW = 7.81
+"""Squared Mahalanobis distance up to which a component fits the state."""
 
 
 class AdaptiveViews(Stage):
@@ -41,18 +47,18 @@ class AdaptiveViews(Stage):
     Gross, Koenig & Mueller 2005, section 2.3, for each update (a view and the state in which it was seen):
 
     1. A view at or above the novelty threshold (E_max) from all others is inserted as a new one, without components.
-    2. Views with a similarity S of at least `min_similarity` get the state as a new component, its heading turned to
+    2. Views with a similarity S of at least `MIN_SIMILARITY` get the state as a new component, its heading turned to
        theirs (erratum 12 in docs/papers.md), with weight 0 and count S over the sum of S of all views (equation 11,
-       erratum 6). Components closer than `merge_below` are merged (equations 12 to 14, divided by the counts' sum:
+       erratum 6). Components closer than `MERGE_BELOW` are merged (equations 12 to 14, divided by the counts' sum:
        erratum 7), weights added and capped at 1 (erratum 8).
     3. Weights of views within the threshold: w = beta S + (1 - beta S) w of components that fit the state, at squared
-       distance <= `fits_below` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
+       distance <= `FITS_BELOW` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
        With `forgetting: active`, components of all other views near the state: w = (1 - b) w with b = beta_forget
        max(1 - distance / forget_fade_m, 0) forget_gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
     4. Components below `min_weight` are removed, and views without any (erratum 9: after the weights have grown).
 
     Updates wait until there is a threshold, all but a map's first. The paper does not learn from a state of several
-    modes. Here each mode of weight p updates the views with S p >= `min_similarity`, with p times the count, and w =
+    modes. Here each mode of weight p updates the views with S p >= `MIN_SIMILARITY`, with p times the count, and w =
     beta S p + (1 - beta S) w with p of all modes that fit.
     """
 
@@ -62,12 +68,6 @@ class AdaptiveViews(Stage):
     """`active`; `passive`, the model of Porta & Kroese that Table 1 compares with; or `none`."""
     beta: Annotated[float, Bounds(gt=0, le=1)] = 0.1
     """Learning rate of the weights."""
-    min_similarity: Annotated[float, Bounds(gt=0, le=1)] = 0.2
-    """Similarity from which a view learns the state."""
-    merge_below: Annotated[float, Bounds(ge=0)] = 7.81
-    """Squared Mahalanobis distance below which components are merged."""
-    fits_below: Annotated[float, Bounds(gt=0)] = 7.81
-    """Squared Mahalanobis distance up to which a component fits the state."""
     state_covariance: StateCovariance = "first"
     """How often a state's covariance counts: in the `first` update of a component, or in `every_update` (equation 14 to
     the letter). The state has most of its covariance from the same map, so that with `every_update` covariances grow
@@ -82,14 +82,14 @@ class AdaptiveViews(Stage):
     """Distance over which forgetting falls to 0; null: the same."""
     forget_gain_m: Annotated[float, Bounds(gt=0)] | None = None
     """Sum of a state's sigmas at which it forgets with `beta_forget`; null: twice that distance."""
-    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    """Weight below which a component is removed; below beta * min_similarity, so that none is removed at once."""
     min_sigma_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Smallest standard deviation of a state's position: a view looks similar over some distance."""
     min_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
     """Smallest standard deviation of its heading."""
     max_views: Annotated[int, Bounds(ge=0)] = 0
     """Views of the map, above which the weakest are removed; 0: no limit."""
+    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    """Weight below which a component is removed; below 0.2 beta, so that none is removed at once."""
 
     class Out(Outputs):
         """The map and its changes in this tick."""
@@ -99,10 +99,10 @@ class AdaptiveViews(Stage):
 
     def __post_init__(self) -> None:
         """A component's first weight must be above `min_weight`."""
-        if self.min_weight > (1.0 - 1e-9) * self.beta * self.min_similarity:
+        if (1.0 - 1e-9) * self.beta * MIN_SIMILARITY < self.min_weight:
             raise ValueError(
-                f"min_weight: {self.min_weight:g} is not below beta * min_similarity = "
-                f"{self.beta * self.min_similarity:g}, so that a new place could be dropped as it is learned"
+                f"min_weight: {self.min_weight:g} is not below {MIN_SIMILARITY:g} beta = "
+                f"{self.beta * MIN_SIMILARITY:g}, so that a new place could be dropped as it is learned"
             )
 
     def step(
@@ -167,7 +167,7 @@ class AdaptiveViews(Stage):
             similarities,
             turns,
             self.beta,
-            self.fits_below,
+            FITS_BELOW,
             self.forgetting != "none",
             self.beta_forget if self.forgetting == "active" else 0.0,
             self.forget_radius_m or length_scale_m,
@@ -184,11 +184,11 @@ class AdaptiveViews(Stage):
     def _add_components(self, state: GaussianMixture, similarities: Array, turns: Array, map: ViewMixtures) -> None:
         # Phase 2: the state becomes a component of each view that is similar enough.
         total = similarities.sum()
-        rows = np.flatnonzero(similarities * state.weights.max() >= self.min_similarity)
+        rows = np.flatnonzero(similarities * state.weights.max() >= MIN_SIMILARITY)
         min_covariance = np.diag([self.min_sigma_m, self.min_sigma_m, np.radians(self.min_sigma_deg)]) ** 2
         mixtures = []
         for row in rows.tolist():
-            kept = similarities[row] * state.weights >= self.min_similarity
+            kept = similarities[row] * state.weights >= MIN_SIMILARITY
             means = state.means[kept]
             means[:, 2] = wrap(means[:, 2] - turns[row])
             mine = map.owner == row
@@ -196,9 +196,9 @@ class AdaptiveViews(Stage):
             counts = state.weights[kept] * (similarities[row] / total)
             new = (means, state.covariances[kept], counts, np.zeros(len(means)))
             if self.state_covariance == "first":
-                known, new = _confirm(known, new, self.merge_below, min_covariance)
+                known, new = _confirm(known, new, MERGE_BELOW, min_covariance)
             means, covariances, counts, weights = (np.concatenate(both) for both in zip(known, new, strict=True))
-            mixtures.append(merged(means, covariances, counts, self.merge_below, shares=weights))
+            mixtures.append(merged(means, covariances, counts, MERGE_BELOW, shares=weights))
         if len(rows):
             means, covariances, counts, weights = (np.concatenate(each) for each in zip(*mixtures, strict=True))
             owners = np.repeat(rows, [len(parts[0]) for parts in mixtures])

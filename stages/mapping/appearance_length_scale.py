@@ -1,11 +1,8 @@
 """Measures the appearance length scale of a finished map."""
 
-import math
-from typing import Annotated
-
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import DEFAULT_M, LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 
@@ -17,19 +14,6 @@ class AppearanceLengthScale(Stage):
     compared only with those of about the same heading. Manifest fact `appearance_length_scale_m`.
     """
 
-    samples: Annotated[int, Bounds(ge=1)] = 40
-    """References, spread evenly over the map, that are compared with all others."""
-    share: Annotated[float, Bounds(gt=0, lt=1)] = 0.5
-    """Excess similarity left at the length scale."""
-    headings: Annotated[int, Bounds(ge=1)] = 36
-    """Headings at which views are compared."""
-    max_heading_difference_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
-    """Difference of heading up to which views of one segment are compared, about half of the field of view."""
-    min_references: Annotated[int, Bounds(ge=2)] = 10
-    """References a map needs to be measured."""
-    default_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Length scale of a map that cannot be measured."""
-
     class Out(Outputs):
         """The length scale of the map's views."""
 
@@ -37,10 +21,7 @@ class AppearanceLengthScale(Stage):
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Measure one map."""
-        limit = math.radians(self.max_heading_difference_deg)
-        metres = length_scale(
-            map.poses, map.features, map.kind, self.samples, self.share, self.headings, limit, self.min_references
-        )
-        metres = self.default_m if metres is None else metres
+        metres = length_scale(map.poses, map.features, map.kind)
+        metres = DEFAULT_M if metres is None else metres
         ctx.fact("appearance_length_scale_m", round(metres, 3))
         return self.Out(length_scale=LengthScale(metres))

@@ -14,6 +14,8 @@ from omninav.stages.values.views import NoveltyThreshold, WholeView
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
+MIN_MOVE_M = 0.01
+"""Distance driven between two views that count, metres."""
 
 
 class CalibratedThresholdState(State):
@@ -49,8 +51,6 @@ class CalibratedThreshold(Stage):
     """Views between the two of a pair, at least; 1: all pairs."""
     share: Annotated[float, Bounds(gt=0)] = 0.5
     """Share of the median distance."""
-    min_move_m: Annotated[float, Bounds(ge=0)] = 0.01
-    """Distance driven between two views that count."""
 
     class Out(Outputs):
         """The threshold, once there is one."""
@@ -76,7 +76,7 @@ class CalibratedThreshold(Stage):
             ctx.fact("novelty_threshold", round(state.threshold.distance, 4))
         if state.threshold is None or not state.threshold.settled:
             state.since_m += 0.0 if motion is None else math.hypot(motion.x, motion.y)
-            if not len(state.views) or state.since_m >= self.min_move_m:
+            if not len(state.views) or state.since_m >= MIN_MOVE_M:
                 add_view(view, state)
                 self._measure(ctx, state)
         return self.Out(threshold=state.threshold)

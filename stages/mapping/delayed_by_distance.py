@@ -10,6 +10,9 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.views import WholeView
 
+MAX_WAITING = 500
+"""Views that wait, however long the robot stands."""
+
 
 class DelayedByDistanceState(State):
     """Updates that wait, the distance driven (m) at which each was seen, and the distance driven so far (m)."""
@@ -31,8 +34,6 @@ class DelayedByDistance(Stage):
 
     distance_m: Annotated[float, Bounds(ge=0)] = 4.0
     """Distance driven before a view is learned."""
-    max_waiting: Annotated[int, Bounds(ge=0)] = 500
-    """Views that wait, however long the robot stands."""
 
     class Out(Outputs):
         """The updates that are due, in the order in which their views were seen, and those that wait."""
@@ -56,7 +57,7 @@ class DelayedByDistance(Stage):
             queue.waiting.append(MapUpdate(view, state, ctx.tick.index))
             queue.seen_at_m.append(queue.driven_m)
         due = sum(1 for at in queue.seen_at_m if at <= queue.driven_m - self.distance_m)
-        due = max(due, len(queue.waiting) - self.max_waiting)
+        due = max(due, len(queue.waiting) - MAX_WAITING)
         if ctx.tick.first_of_log:
             due = max(due, sum(1 for update in queue.waiting if update.index < ctx.tick.index))
         ready, queue.waiting, queue.seen_at_m = queue.waiting[:due], queue.waiting[due:], queue.seen_at_m[due:]

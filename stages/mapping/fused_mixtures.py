@@ -25,6 +25,10 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Parts = tuple[Array, Array, Array, Array]
 Average = Literal["visits", "halves"]
+MERGE_BELOW = 7.81
+"""Squared Mahalanobis distance below which components are merged: equal at 95 %."""
+MIN_WEIGHT = 0.01
+"""Weight below which a component is removed."""
 
 
 class FusedMixturesState(BeforeThreshold):
@@ -46,8 +50,6 @@ class FusedMixtures(Stage):
     and applied redone with the new states. No view is inserted or removed by this.
     """
 
-    merge_below: Annotated[float, Bounds(ge=0)] = 7.81
-    """Squared Mahalanobis distance below which components are merged; 7.81: equal at 95 %."""
     spread: bool = True
     """Whether a merged covariance includes the spread of the means; the paper's does not and is over-confident
     (erratum 16 in docs/papers.md)."""
@@ -55,8 +57,6 @@ class FusedMixtures(Stage):
     """Shares of merged components. `halves`: their weights, as in the paper: the last state counts as much as all
     before, so that the map drifts (docs/experiments/cml_defaults.md). `visits`: the number of visits, weighted by
     similarity (eta of Gross, Koenig & Mueller 2005, equations 11 to 14)."""
-    min_weight: Annotated[float, Bounds(ge=0, lt=0.5)] = 0.01
-    """Weight below which a component is removed."""
     max_views: Annotated[int, Bounds(ge=0)] = 0
     """Views of the map, above which the weakest are removed; 0: no limit."""
 
@@ -134,7 +134,7 @@ class FusedMixtures(Stage):
     ) -> AppliedUpdate:
         applied = record_update(state, index, ids, turns, similarities, map)
         mixtures = [
-            fuse([places, parts(state, turn, s)], self.merge_below, self.spread, self.min_weight, self.average)
+            fuse([places, parts(state, turn, s)], MERGE_BELOW, self.spread, MIN_WEIGHT, self.average)
             for places, turn, s in zip(applied.places(), turns.tolist(), similarities.tolist(), strict=True)
         ]
         owners = np.repeat(applied.rows(map), [len(weights) for _, _, weights, _ in mixtures])

@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
@@ -19,6 +18,8 @@ from .unimodality import unimodal_state
 Array = npt.NDArray[np.float64]
 MAX_SIGMA_DEG = 45.0
 """Largest standard deviation of a believed heading, degrees; an unknown one has 104."""
+MIN_MOVE_M = 0.01
+"""Way between two views that are kept, metres."""
 
 
 class KeepSessions(Stage):
@@ -29,9 +30,6 @@ class KeepSessions(Stage):
     saved without its drives, as one of stated poses is, would be forgotten where it is learned again: with one none are
     kept. Manifest fact `map_straightened` says so.
     """
-
-    min_move_m: Annotated[float, Bounds(ge=0)] = 0.01
-    """Way between two views that are kept."""
 
     class Out(Outputs):
         """All drives so far, those of a known map among them; absent where that has none."""
@@ -59,7 +57,7 @@ class KeepSessions(Stage):
         begins = ctx.tick.first_of_log or motion is None
         if motion is not None:
             kept.move(np.array([motion.x, motion.y, motion.turn]))
-        if begins or math.hypot(kept.since[0], kept.since[1]) >= self.min_move_m:
+        if begins or math.hypot(kept.since[0], kept.since[1]) >= MIN_MOVE_M:
             kept.keep(view, _believed(state), begins, ctx.tick.index)
         return self.Out(sessions=kept)
 

@@ -27,8 +27,6 @@ class LoopClosure(Stage):
 
     place_size: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest visual distance between two views of a cluster."""
-    max_gap: Annotated[int, Bounds(ge=0)] = 0
-    """Views in a row that may belong elsewhere, within a subcluster."""
     between: Literal["nearest", "medoids"] = "nearest"
     """Which views stand for two subclusters: the `nearest` two, or the paper's `medoids`, which lie apart where a drive
     returns between its images."""
@@ -38,14 +36,16 @@ class LoopClosure(Stage):
     similarity: Literal["ratio", "exponential", "gaussian"] = "gaussian"
     """Function that turns a visual distance into a similarity, scaled by the root mean square distance within
     subclusters."""
-    ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
-    """Ignorance of a hypothesis before its neighbours have spoken."""
-    neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
-    """Views along the drive within which another hypothesis is a neighbour."""
     min_support: Annotated[float, Bounds(ge=0, le=1)] = 0.5
     """Support that an accepted hypothesis must exceed."""
     accepted: Literal["merge", "link"] = "merge"
     """Whether the subclusters of an accepted hypothesis become one place, or two that are linked."""
+    ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
+    """Ignorance of a hypothesis before its neighbours have spoken."""
+    max_gap: Annotated[int, Bounds(ge=0)] = 0
+    """Views in a row that may belong elsewhere, within a subcluster."""
+    neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
+    """Views along the drive within which another hypothesis is a neighbour."""
 
     class Out(Outputs):
         """The place of each view, and what became of each hypothesis."""

@@ -10,6 +10,11 @@ from omninav.stages.geometry.appearance.place_merging import merged_places, same
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.topological_map import LoopHypotheses
 
+MIN_SHARE = 0.4
+"""Share of the features that match, for views of two passes to show one spot."""
+NEIGHBOUR_VIEWS = 20.0
+"""Views along the drive, on both passes together, within which an accepted hypothesis speaks for such a pair."""
+
 
 class MergePlaces(Stage):
     """Merges places that stand side by side, and gives each view to the place whose medoid is nearest along the drive.
@@ -23,10 +28,6 @@ class MergePlaces(Stage):
 
     min_spacing: Annotated[float, Bounds(ge=0)] = 0.1
     """Visual distance along the drive, of the medoids of two places that are not merged; 0: all stay as they are."""
-    min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
-    """Share of the features that match, for views of two passes to show one spot."""
-    neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
-    """Views along the drive, on both passes together, within which an accepted hypothesis speaks for such a pair."""
 
     class Out(Outputs):
         """The hypotheses, with the merged place of each view."""
@@ -38,7 +39,7 @@ class MergePlaces(Stage):
         if not self.min_spacing:
             return self.Out(hypotheses=hypotheses)
         accepted = hypotheses.pairs[hypotheses.accepted]
-        spots = same_spots(views.shares, views.orders, accepted, self.min_share, self.neighbour_distance)
+        spots = same_spots(views.shares, views.orders, accepted, MIN_SHARE, NEIGHBOUR_VIEWS)
         row = np.arange(len(views) - 1)
         row = row[(views.tours[:-1] == views.tours[1:]) & (views.tours[:-1] > 0)]
         known = np.flatnonzero(views.owners >= 0)

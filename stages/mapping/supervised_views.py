@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
+
+SIGMA_M = 0.25
+"""Standard deviation of a learned position, metres."""
+SIGMA_DEG = 10.0
+"""Standard deviation of its heading, degrees."""
 
 
 class SupervisedViews(Stage):
@@ -21,11 +25,6 @@ class SupervisedViews(Stage):
     given. With `projection` wired, views are projected by it first. Views without a true pose are left out. Raises
     BadInput where none has one.
     """
-
-    sigma_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Standard deviation of the position."""
-    sigma_deg: Annotated[float, Bounds(gt=0)] = 10.0
-    """Standard deviation of the heading."""
 
     class Out(Outputs):
         """The map."""
@@ -42,7 +41,7 @@ class SupervisedViews(Stage):
         """Make the map of a whole tour."""
         map = ViewMixtures.empty()
         map.take_poses_from("truth")
-        covariance = np.diag([self.sigma_m**2, self.sigma_m**2, math.radians(self.sigma_deg) ** 2])
+        covariance = np.diag([SIGMA_M**2, SIGMA_M**2, math.radians(SIGMA_DEG) ** 2])
         for view, pose in zip(views, truth, strict=True):
             if view is None or pose is None:
                 ctx.count("view_without_pose", detail="without ground truth no pose is known (mapping)")

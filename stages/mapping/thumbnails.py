@@ -13,6 +13,9 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 
+QUALITY = 75
+"""JPEG quality of a thumbnail, per cent."""
+
 
 class ReferenceThumbnails(Value):
     """Thumbnails of the references that a tick added to a map, as JPEG bytes, in the map's order."""
@@ -34,8 +37,6 @@ class ReferenceSnapshot(Stage):
 
     columns: Annotated[int, Bounds(ge=16)] = 160
     """Largest width (pixels)."""
-    quality: Annotated[int, Bounds(ge=1, le=100)] = 75
-    """JPEG quality."""
 
     class Out(Outputs):
         """`snapshots`: absent where the map did not grow."""
@@ -49,7 +50,7 @@ class ReferenceSnapshot(Stage):
         seen = list(panorama.pixels) if isinstance(panorama, Windows) else [panorama.pixels]
         new = len(map) - thumbnails.references
         thumbnails.references = len(map)
-        jpegs = (thumbnail(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
+        jpegs = (thumbnail(pixels, None, self.columns).jpeg(QUALITY) for pixels in seen[:new])
         return self.Out(snapshots=ReferenceThumbnails(tuple(jpegs)))
 
 
@@ -74,8 +75,6 @@ class TourSnapshot(Stage):
 
     columns: Annotated[int, Bounds(ge=16)] = 240
     """Largest width (pixels)."""
-    quality: Annotated[int, Bounds(ge=1, le=100)] = 75
-    """JPEG quality."""
 
     class Out(Outputs):
         """One thumbnail."""
@@ -84,7 +83,7 @@ class TourSnapshot(Stage):
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """One tick."""
-        jpeg = thumbnail(image.pixels, camera, self.columns).jpeg(self.quality)
+        jpeg = thumbnail(image.pixels, camera, self.columns).jpeg(QUALITY)
         return self.Out(snapshots=ReferenceThumbnails((jpeg,)))
 
 

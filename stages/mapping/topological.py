@@ -18,6 +18,10 @@ from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, 
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+MAX_PATH_STEP = 5
+"""Views of the drive from one path image to the next, the paper's 1 to 5 m."""
+WINDOW = 3
+"""Views before and after, in which a patch should be found again."""
 
 
 class TopologicalMapping(Stage):
@@ -33,14 +37,10 @@ class TopologicalMapping(Stage):
     min_path_matches: Annotated[int, Bounds(ge=0)] = 20
     """Features that a path image shares with the one before; 0: no path images, as in the paper, whose paths lead from
     medoid to medoid."""
-    max_path_step: Annotated[int, Bounds(ge=1)] = 5
-    """Views of the drive from one path image to the next, the paper's 1 to 5 m."""
     max_patches: Annotated[int, Bounds(ge=1)] = 80
     """Patches of a view that the map keeps."""
     max_segments: Annotated[int, Bounds(ge=0)] = 60
     """Vertical segments of a view that the map keeps."""
-    window: Annotated[int, Bounds(ge=1)] = 3
-    """Views before and after, in which a patch should be found again."""
 
     class Out(Outputs):
         map: TopologicalMap
@@ -82,7 +82,7 @@ class TopologicalMapping(Stage):
             if pair not in ways and pair[::-1] not in ways:
                 between = np.empty(0, np.int64)
                 if self.min_path_matches:
-                    between = place_clusters.waypoint_views(matches, way, self.min_path_matches, self.max_path_step)
+                    between = place_clusters.waypoint_views(matches, way, self.min_path_matches, MAX_PATH_STEP)
                 ways[pair] = between, DRIVEN
         pairs = sorted(ways)
         images = [ways[pair][0] for pair in pairs]
@@ -120,7 +120,7 @@ class TopologicalMapping(Stage):
         if len(whole) <= self.max_patches:
             return whole
         seen, options = np.zeros(len(whole)), views.comparison_options()
-        for other in range(max(0, view - self.window), min(len(views), view + self.window + 1)):
+        for other in range(max(0, view - WINDOW), min(len(views), view + WINDOW + 1)):
             if other != view and views.tours[other] == views.tours[view]:
                 seen[match_patches(patches[view], patches[other], options).first] += 1.0
         return whole.chosen(np.sort(np.argsort(-seen, kind="stable")[: self.max_patches]))

@@ -18,6 +18,8 @@ from .unimodality import unimodal_state
 
 NEAR_BELOW = 7.81
 """Squared Mahalanobis distance that counts as near: the 95 % quantile for three degrees of freedom."""
+MAX_WAITING = 500
+"""Views between two unimodal states, beyond which they are dropped."""
 
 
 class UnimodalQueueState(State):
@@ -57,8 +59,6 @@ class UnimodalQueue(Stage):
     odometry_gate: Annotated[float, Bounds(ge=0)] = 16.3
     """Squared Mahalanobis distance up to which odometry explains a state; 16.3: 99.9 % of drives without kidnapping; 0:
     any."""
-    max_waiting: Annotated[int, Bounds(ge=0)] = 500
-    """Views between two unimodal states, beyond which they are dropped."""
 
     class Out(Outputs):
         """The updates that are due, in the order in which their views were seen, and those that wait."""
@@ -88,7 +88,7 @@ class UnimodalQueue(Stage):
             update = MapUpdate(view, single, now)
             pending.queue += [*self._between(ctx, pending, single), update]
             pending.last, pending.seen, pending.motions = single, [], []
-        elif pending.last is None or not self.reconstruct or len(pending.seen) >= self.max_waiting:
+        elif pending.last is None or not self.reconstruct or len(pending.seen) >= MAX_WAITING:
             self._drop_path(ctx, pending)
             ctx.count("view_not_learned", detail="the belief had several modes (map_update)")
         else:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.visual_distance import (
+    MAX_GLOBAL_DISTANCE,
     ComparisonOptions,
     ViewFeatures,
     colour_distances,
@@ -51,18 +52,8 @@ class ViewComparison(Stage):
 
     every_s: Annotated[float, Bounds(ge=0)] = 1.0
     """Shortest time between two views; images in between are passed over."""
-    max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the global colours of two views, for their local features to be compared."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
-    segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """The same of vertical segments."""
-    max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
-    min_matches: Annotated[int, Bounds(ge=2)] = 8
-    """Smallest number of matches with which two views have something in common."""
-    min_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
-    """Smallest mean angle between matches that counts."""
     supervised: Supervised = "auto"
     """Source of poses: the tour's `truth`, its `odometry`, or `auto`: the truth where there is one."""
 
@@ -97,15 +88,9 @@ class ViewComparison(Stage):
         if not views:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
         ctx.doing(f"comparing {len(views)} views")
-        options = ComparisonOptions(
-            self.ratio,
-            self.segment_ratio,
-            self.max_colour_distance,
-            min_matches=self.min_matches,
-            min_angle=math.radians(self.min_angle_deg),
-        )
+        options = ComparisonOptions(self.ratio)
         colours = np.stack([view.descriptor.values for view in views]).astype(np.float64)
-        close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance
+        close = colour_distances(colours[:, None], colours[None]) <= MAX_GLOBAL_DISTANCE
         prepared = [view_features(view.features) for view in views]
         known_number = sum(view.owner >= 0 for view in views)
         distances, shares = compare_all(ctx, prepared, close, known_number, options)

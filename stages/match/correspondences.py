@@ -24,10 +24,6 @@ class MatchFeatures(Stage):
 
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
-    segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """The same of columns."""
-    max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
     search: Literal["all", "kd_tree"] = "all"
     """Through all descriptors, or by kd-trees, which find the same pairs."""
 
@@ -38,9 +34,9 @@ class MatchFeatures(Stage):
 
     def step(self, ctx: Context, features: LocalFeatures, target: LocalFeatures) -> Out:
         """Match two views."""
-        options = ComparisonOptions(self.ratio, max_colour_distance=self.max_colour_distance, search=self.search)
+        options = ComparisonOptions(self.ratio, search=self.search)
         pairs = match_patches(features.patches(), target.patches(), options)
-        first, second, distance = column_ends(features, target, self.segment_ratio)
+        first, second, distance = column_ends(features, target, options.segment_ratio)
         return self.Out(
             correspondences=Correspondences(
                 np.concatenate([pairs.first, first]),

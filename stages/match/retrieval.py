@@ -25,6 +25,8 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 LANES = 8
 """Turns of the query are padded to a multiple of this, so that the inner loops are whole vector instructions."""
+BEST = 9
+"""References in `answers`, each at its best heading."""
 
 
 @compiled(nogil=True)
@@ -111,8 +113,6 @@ class Retrieval(Stage):
 
     headings: Annotated[int, Bounds(ge=1)] = 36
     """Headings at which each reference is compared, evenly spaced over the circle."""
-    best: Annotated[int, Bounds(ge=1)] = 9
-    """References in `answers`, each at its best heading."""
 
     class Out(Outputs):
         """Similarities of view and references, the most similar references, and what similarities say of the place."""
@@ -143,7 +143,7 @@ class Retrieval(Stage):
         candidates = candidates or Candidates()
         values = normalised_intersections(map.features, queries, features.scales, candidates.references)
         similarities = Similarities(values, candidates.references, candidates.sampling_weight)
-        answers = best_answers(similarities, self.best) if len(map) and ctx.is_read("answers") else None
+        answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None
         calibration = None
         if ctx.is_read("calibration"):
 

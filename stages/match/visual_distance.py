@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.many_views import ManyViews
-from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, colour_distances
+from omninav.stages.geometry.appearance.visual_distance import MAX_GLOBAL_DISTANCE, ComparisonOptions, colour_distances
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -22,18 +22,8 @@ class MatchPlaces(Stage):
     descriptors are of another kind.
     """
 
-    max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the global colours of two views (Euclidean, of three correlations)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
-    segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """The same of vertical segments."""
-    max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
-    min_matches: Annotated[int, Bounds(ge=2)] = 8
-    """Smallest number of matches with which two views have something in common."""
-    min_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
-    """Smallest mean angle between matches that counts."""
 
     class Out(Outputs):
         """Visual distance to each place."""
@@ -62,14 +52,8 @@ class MatchPlaces(Stage):
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make a new map"
             )
         here = view_features(features)
-        options = ComparisonOptions(
-            self.ratio,
-            self.segment_ratio,
-            self.max_colour_distance,
-            min_matches=self.min_matches,
-            min_angle=math.radians(self.min_angle_deg),
-        )
-        close = colour_distances(map.views.moments[map.places], descriptor.values) <= self.max_global_distance
+        options = ComparisonOptions(self.ratio)
+        close = colour_distances(map.views.moments[map.places], descriptor.values) <= MAX_GLOBAL_DISTANCE
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
         compared = np.flatnonzero(close)

@@ -2,12 +2,11 @@
 
 import itertools
 import math
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Array, Drive, known
@@ -20,6 +19,8 @@ QUANTITIES = {
 
 JUMP_M = 0.5
 """Distance between true motion and odometry of one frame from which the robot was lifted, metres."""
+JUMP_DEG = 15.0
+"""Largest difference of their turns, degrees."""
 
 
 class AfterLifts(MetricStage):
@@ -34,16 +35,13 @@ class AfterLifts(MetricStage):
     it never was. Nothing where it was not lifted, or without ground truth.
     """
 
-    jump_deg: Annotated[float, Bounds(gt=0)] = 15.0
-    """The same of their turns (degrees)."""
-
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         log = drive.last_log
         log = log.at(known(log.truth) & known(log.estimate))
         if not len(log):
             return self.Out()
-        starts = lifted(log, JUMP_M, self.jump_deg).tolist()
+        starts = lifted(log, JUMP_M, JUMP_DEG).tolist()
         if not starts:
             return self.Out()
         metres, degrees = position_errors(log.estimate, log.truth), heading_errors_deg(log.estimate, log.truth)

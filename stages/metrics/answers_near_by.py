@@ -1,11 +1,10 @@
 """Share of the most similar images that were taken near by."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
@@ -18,21 +17,20 @@ QUANTITIES = {
     "answers.first_similarity": Quantity(title="Similarity of the first retrieved image"),
     "answers.last_similarity": Quantity(title="Similarity of the last retrieved image"),
 }
+WITHIN_M = 5.0
+"""Distance up to which an image was taken near by, metres."""
+WITHIN_DEG = 30.0
+"""Largest difference of the directions in which both look, by half of a window's field, degrees."""
 
 
 class AnswersNearBy(MetricStage):
     """Measures what share of a query's most similar images show the same scene.
 
     Wolf, Burgard & Burkhardt 2005, Figure 5: nine answers to a query. Of the last log, under `answers`, on average over
-    the images: `nearby_rate`, the share of the answers that were taken within `within_m` of the robot and look the same
+    the images: `nearby_rate`, the share of the answers that were taken within `WITHIN_M` of the robot and look the same
     way; `first_nearby_rate`, that of the first ones; `background_rate`, that share of the whole map; the similarities
     of the first and the last answer. Images that nothing near by was taken of count too. Gives nothing without truth.
     """
-
-    within_m: Annotated[float, Bounds(gt=0)] = 5.0
-    """Distance (m) up to which an image was taken near by."""
-    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
-    """Largest difference of the directions in which both look, by half of a window's field."""
 
     def step(
         self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph
@@ -45,10 +43,10 @@ class AnswersNearBy(MetricStage):
             given = answers[row]
             if given is None or not len(given.references):
                 continue
-            near = np.hypot(*(map.poses[:, :2] - pose[:2]).T) <= self.within_m
+            near = np.hypot(*(map.poses[:, :2] - pose[:2]).T) <= WITHIN_M
             turned = np.abs(np.degrees(wrap(map.poses[given.references, 2] + given.turns - pose[2])))
-            right = near[given.references] & (turned <= self.within_deg)
-            same_way = np.abs(np.degrees(wrap(map.poses[:, 2] - pose[2]))) <= self.within_deg
+            right = near[given.references] & (turned <= WITHIN_DEG)
+            same_way = np.abs(np.degrees(wrap(map.poses[:, 2] - pose[2]))) <= WITHIN_DEG
             by_chance = (near & same_way).mean()
             rows.append((right.mean(), right[0], by_chance, given.similarities[0], given.similarities[-1]))
         if not rows:

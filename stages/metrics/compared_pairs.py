@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import spearmanr
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
-from omninav.stages.geometry.appearance.visual_distance import colour_distances
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.appearance.visual_distance import MAX_GLOBAL_DISTANCE, colour_distances
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.rooms import Rooms
@@ -25,6 +25,8 @@ QUANTITIES = {
     ),
     "comparison.rank_correlation": Quantity(title="Rank correlation of visual distance and metres"),
 }
+WITHIN_M = 8.0
+"""Distance of views up to which visual distances are looked at, metres."""
 
 
 class ComparedPairs(MetricStage):
@@ -32,16 +34,11 @@ class ComparedPairs(MetricStage):
 
     Under `comparison`: `passed_rate`, the share of pairs whose global colours are close enough for their local features
     to be compared; `other_rooms_left_out` and `own_room_left_out`, the shares of pairs of two rooms, and of one, that
-    are not; of pairs with something in common, at most `within_m` apart, `rank_correlation` of visual distance and
+    are not; of pairs with something in common, at most `WITHIN_M` apart, `rank_correlation` of visual distance and
     metres (Spearman), and `by_metres`: medians of visual distance out to each of `to_m`. None where poses or rooms are
     not known. With global colours in other light, under `two_lights`: `passed_rate`, the share of pairs of a view and
     its own place in that light that pass; `change`, the median distance of their colours over that of two rooms' views.
     """
-
-    max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance between the global colours of two views, for their local features to be compared."""
-    within_m: Annotated[float, Bounds(gt=0)] = 8.0
-    """Distance of views (m) up to which visual distances are looked at."""
 
     def step(
         self,
@@ -54,7 +51,7 @@ class ComparedPairs(MetricStage):
         one, other = np.triu_indices(len(views), 1)
         colours = np.stack([each.values for each in views.descriptors]).astype(np.float64)
         apart = colour_distances(colours[one], colours[other])
-        passed = apart <= self.max_global_distance
+        passed = apart <= MAX_GLOBAL_DISTANCE
         found: dict[str, Any] = {"passed_rate": _share(passed), "own_room_left_out": None, "other_rooms_left_out": None}
         known, of_two_rooms = views.pose_source == "truth", np.zeros(0)
         if known and rooms is not None:
@@ -65,8 +62,8 @@ class ComparedPairs(MetricStage):
             of_two_rooms = apart[inside & ~same]
         if known:
             metres = np.hypot(*(views.poses[one] - views.poses[other])[:, :2].T)
-            near = (metres <= self.within_m) & np.isfinite(views.distances[one, other])
-            found |= against_metres(views.distances[one, other][near], metres[near], self.within_m)
+            near = (metres <= WITHIN_M) & np.isfinite(views.distances[one, other])
+            found |= against_metres(views.distances[one, other][near], metres[near], WITHIN_M)
         if other_light:
             found["two_lights"] = self._two_lights(views, colours, other_light, of_two_rooms)
         return self.Out(metrics=Metrics({"comparison": found}, QUANTITIES))
@@ -83,7 +80,7 @@ class ComparedPairs(MetricStage):
             return {"passed_rate": None, "change": None}
         apart = colour_distances(*(np.stack(each) for each in zip(*pairs, strict=True)))
         change = float(np.median(apart) / np.median(of_two_rooms)) if len(of_two_rooms) else None
-        return {"passed_rate": _share(apart <= self.max_global_distance), "change": change}
+        return {"passed_rate": _share(apart <= MAX_GLOBAL_DISTANCE), "change": change}
 
 
 def against_metres(distances: Array, metres: Array, within: float) -> dict[str, Any]:

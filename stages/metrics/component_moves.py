@@ -1,13 +1,19 @@
 """Distance that an update moves a place in the map that has had so many before."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage
+from omninav.pipeline import Context, Metrics, MetricStage
 from omninav.stages.values.drive import Array
 from omninav.stages.values.view_mixtures import MixturesNow
+
+NEAR_M = 1.0
+"""Distance beyond which a component is another one, metres."""
+MIN_MOVES = 3
+"""Moves of a component that counts; those with fewer are left out."""
+MIN_COMPONENTS = 10
+"""Components that a curve needs."""
 
 
 class ComponentMoves(MetricStage):
@@ -15,27 +21,20 @@ class ComponentMoves(MetricStage):
 
     Gross, Koenig & Müller 2005, section 2.3: "the influence of a single update step decreases with time, and the MoG
     stabilizes gradually". A component is followed to the nearest one of the same view after an update, where that lies
-    within `near_m`; an update that leaves its mean as it was (one of its weight alone) does not count.
+    within `NEAR_M`; an update that leaves its mean as it was (one of its weight alone) does not count.
 
-    `component_moves`: lists with an entry for each of a component's first `moves` moves: `updates`, how many it had had
-    before, from 0 on; `moved_m`, the mean distance in x and y. They are the same components in each entry, those that
-    move at least so often: others are seen elsewhere. `components`: how many they are; the lists are empty where there
-    are fewer than `min_components`.
+    `component_moves`: lists with an entry for each of a component's first `MIN_MOVES` moves: `updates`, how many it had
+    had before, from 0 on; `moved_m`, the mean distance in x and y. They are the same components in each entry, those
+    that move at least so often: others are seen elsewhere. `components`: how many they are; the lists are empty where
+    there are fewer than `MIN_COMPONENTS`.
     """
-
-    near_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Distance (m) beyond which a component is another one."""
-    moves: Annotated[int, Bounds(ge=2)] = 3
-    """Moves of a component that count; those of fewer are left out."""
-    min_components: Annotated[int, Bounds(ge=1)] = 10
-    """Components that a curve needs."""
 
     def step(self, ctx: Context, mixtures: Sequence[MixturesNow | None]) -> MetricStage.Out:
         """The whole run at once."""
-        often = [moved[: self.moves] for moved in moves(mixtures, self.near_m) if len(moved) >= self.moves]
-        enough = len(often) >= self.min_components
+        often = [moved[:MIN_MOVES] for moved in moves(mixtures, NEAR_M) if len(moved) >= MIN_MOVES]
+        enough = len(often) >= MIN_COMPONENTS
         values = {
-            "updates": list(range(self.moves)) if enough else [],
+            "updates": list(range(MIN_MOVES)) if enough else [],
             "moved_m": np.mean(often, axis=0).tolist() if enough else [],
             "components": len(often),
         }

@@ -1,11 +1,11 @@
 """Summary of a run's confidence where no ground truth says how right it was."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.drive import Array, Drive, known
@@ -35,8 +35,8 @@ MAX_SIGMA_M = 1.0
 class Confidence(MetricStage):
     """Measures a run without ground truth: how sure it was, and whether its estimates agree with odometry.
 
-    Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `min_weight` of it
-    and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that
+    Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `MIN_WEIGHT` of it
+    and its position's largest standard deviation is at most `MAX_SIGMA_M`; that says how sure the method is, not that
     it is right (`confident_share`, `first_confident_frame`).
     `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
     belief is always a single pose. `probability`: the confidence that a monitor states (median), `doubtful_share`: the
@@ -46,16 +46,11 @@ class Confidence(MetricStage):
     comparison has one. Gives nothing where the log has ground truth.
     """
 
-    min_weight: Annotated[float, Bounds(ge=0, le=1)] = MIN_WEIGHT
-    """Share of the belief that a confident estimate holds."""
-    max_sigma_m: Annotated[float, Bounds(gt=0)] = MAX_SIGMA_M
-    """Largest standard deviation of a confident estimate's position."""
-
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
-        values = confidence_of(drive.last_log, self.min_weight, self.max_sigma_m)
+        values = confidence_of(drive.last_log, MIN_WEIGHT, MAX_SIGMA_M)
         shown = (
             "probability",
             "doubtful_share",

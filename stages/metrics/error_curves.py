@@ -1,15 +1,21 @@
 """Errors along a drive: lap by lap, over the steps, and over the distance from the start."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage
+from omninav.pipeline import Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
 Index = npt.NDArray[np.int64]
+HOME_M = 2.0
+"""Radius of the circle around the start, metres; a lap leaves twice as far and comes back into it."""
+POINTS = 60
+"""Length of the lists of `over_steps`."""
+STEP_M = 1.0
+"""Width of a step of `over_distance`, metres."""
 
 
 class ErrorCurves(MetricStage):
@@ -25,13 +31,6 @@ class ErrorCurves(MetricStage):
     Odometry alone starts at the first true pose and is not aligned. Nothing without ground truth.
     """
 
-    home_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Radius (m) of the circle around the start; a lap leaves twice as far and comes back into it."""
-    points: Annotated[int, Bounds(ge=1)] = 60
-    """Length of the lists of `over_steps`."""
-    distance_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Width (m) of a step of `over_distance`."""
-
     def step(
         self,
         ctx: Context,
@@ -39,9 +38,7 @@ class ErrorCurves(MetricStage):
     ) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
-        return self.Out(
-            metrics=Metrics(error_curves(logs[-1], self.home_m, self.points, self.distance_m) if logs else {})
-        )
+        return self.Out(metrics=Metrics(error_curves(logs[-1], HOME_M, POINTS, STEP_M) if logs else {}))
 
 
 def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) -> dict[str, Any]:

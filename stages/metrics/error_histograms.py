@@ -12,6 +12,10 @@ SMALL_M = 0.4
 """Largest error that is small, metres."""
 LARGE_M = 2.0
 """Error above which it is large, metres."""
+BIN_M = 0.2
+"""Width of a bin, metres."""
+BINS = 16
+"""Number of bins."""
 
 
 class ErrorHistograms(MetricStage):
@@ -22,10 +26,6 @@ class ErrorHistograms(MetricStage):
     with errors of at most `small_m` and of more than `large_m`. The last bin holds everything larger.
     """
 
-    bin_m: Annotated[float, Bounds(gt=0)] = 0.2
-    """Width (m) of a bin."""
-    bins: Annotated[int, Bounds(ge=2)] = 16
-    """Number of bins."""
     skip: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
     """Share of each log's frames, from its start, that does not count."""
 
@@ -37,10 +37,10 @@ class ErrorHistograms(MetricStage):
         return self.Out(metrics=Metrics({"error_histograms": [self._histogram(each) for each in errors]}))
 
     def _histogram(self, errors: Array) -> dict[str, list[float] | float]:
-        bins = np.minimum((errors / self.bin_m).astype(np.int64), self.bins - 1)
+        bins = np.minimum((errors / BIN_M).astype(np.int64), BINS - 1)
         return {
-            "error_m": ((np.arange(self.bins) + 0.5) * self.bin_m).tolist(),
-            "share": (np.bincount(bins, minlength=self.bins) / len(errors)).tolist(),
+            "error_m": ((np.arange(BINS) + 0.5) * BIN_M).tolist(),
+            "share": (np.bincount(bins, minlength=BINS) / len(errors)).tolist(),
             "small": float((errors <= SMALL_M).mean()),
             "large": float((errors > LARGE_M).mean()),
         }

@@ -25,6 +25,10 @@ COLUMN_RATIO = 0.8
 """Largest ratio of the nearest to the second nearest distance of vertical segments that match."""
 COLUMN_WITHIN_DEG = 3.0
 """Largest angle by which a right match of vertical segments may miss the true bearings of their ends, degrees."""
+WITHIN_DEG = 2.0
+"""Largest angle between a patch and where its partner's point is seen, degrees."""
+EPIPOLAR_DEG = 1.0
+"""Largest angle to the epipolar plane, where depths are not known, degrees."""
 
 
 class Judged(NamedTuple):
@@ -69,8 +73,6 @@ class FirstMatches(MetricStage):
     partners that would be counted as right. Raises BadInput where no truth says where images were taken.
     """
 
-    apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
-    """Distances (m) between the images of a pair."""
     pairs: Annotated[int, Bounds(ge=1)] = 30
     """Pairs for each distance."""
     by: Literal["patches", "columns", "both"] = "patches"
@@ -85,10 +87,8 @@ class FirstMatches(MetricStage):
     """Largest ratio of the nearest to the second nearest patch."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance between the colours of two patches."""
-    within_deg: Annotated[float, Bounds(gt=0)] = 2.0
-    """Largest angle (degrees) between a patch and where its partner's point is seen."""
-    epipolar_deg: Annotated[float, Bounds(gt=0)] = 1.0
-    """Largest angle (degrees) to the epipolar plane, where depths are not known."""
+    apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """Distances (m) between the images of a pair."""
 
     def step(
         self,
@@ -161,8 +161,8 @@ class FirstMatches(MetricStage):
         assert other.patches is not None
         first, second = one.patches.bearings[pairs.first], other.patches.bearings[pairs.second]
         if one.depths is None or other.depths is None:
-            return right_by_epipolar(first, second, moved, math.radians(self.epipolar_deg))
-        limit = np.full(len(first), math.radians(self.within_deg))
+            return right_by_epipolar(first, second, moved, math.radians(EPIPOLAR_DEG))
+        limit = np.full(len(first), math.radians(WITHIN_DEG))
         if lens is not None:
             limit = np.maximum(limit, half_widths(one.patches, lens)[pairs.first])
         near, far = one.depths.patches[pairs.first], other.depths.patches[pairs.second]
@@ -175,7 +175,7 @@ class FirstMatches(MetricStage):
         first, second = one.columns.bearings()[pairs.first], other.columns.bearings()[pairs.second]
         for end in (0, 1):
             if one.depths is None or other.depths is None:
-                limit = math.radians(self.epipolar_deg)
+                limit = math.radians(EPIPOLAR_DEG)
                 right &= right_by_epipolar(first[:, end], second[:, end], moved, limit)
             else:
                 near, far = one.depths.ends[pairs.first, end], other.depths.ends[pairs.second, end]

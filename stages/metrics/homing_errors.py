@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
@@ -29,25 +28,23 @@ HEADLINES = tuple(
     f"homing.{name}"
     for name in ("reached", "end_error_m", "end_turn_deg", "time_s", "direction_error_deg.median", "lost_rate")
 )
+FROM_M = 0.3
+"""Distance to the target beyond which the homing direction is measured, metres."""
+WITHIN_M = 0.5
+"""Largest distance from the target at which it is reached, metres."""
 
 
 class HomingErrors(MetricStage):
     """Measures how close a robot comes to its first pose by homing, and the errors of its homing vectors.
 
     It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
-    how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `within_m` of the
+    how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `WITHIN_M` of the
     target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and `end`, the same as experiments
     that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost;
     `direction_error_deg` (median, p90, max), between the homing vector and the true direction of the target; `inliers`,
     median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target
     was not found at first. Gives nothing where there was never a vector, or no truth.
     """
-
-    from_m: Annotated[float, Bounds(ge=0)] = 0.3
-    """Distance (m) to the target beyond which the homing direction is measured."""
-
-    within_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance (m) from the target at which it is reached."""
 
     def step(
         self,
@@ -68,12 +65,12 @@ class HomingErrors(MetricStage):
             return self.Out()
         found = {k: vector for k, vector in after.items() if vector.state != "lost"}
         off = {k: _errors_deg(vector, targets[k]) for k, vector in found.items()}
-        far = [off[k][0] for k in off if math.hypot(*targets[k, :2]) > self.from_m]
+        far = [off[k][0] for k in off if math.hypot(*targets[k, :2]) > FROM_M]
         arrived = next((k for k, at in enumerate(progress) if at is not None and at.arrived and k > away), None)
         first = min(after)
         values = {
             "start_m": float(math.hypot(*targets[away, :2])),
-            "reached": int(arrived is not None and math.hypot(*targets[arrived, :2]) <= self.within_m),
+            "reached": int(arrived is not None and math.hypot(*targets[arrived, :2]) <= WITHIN_M),
             "arrived": int(arrived is not None),
             "end_error_m": float(math.hypot(*targets[-1, :2])),
             "end": {"error_m": {"mean": float(math.hypot(*targets[-1, :2])), "std": 0.0}, "frames": 1},

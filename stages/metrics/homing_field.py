@@ -25,6 +25,8 @@ QUANTITIES = {
     "homing_field.of_found_deg": Quantity(title="Error of the direction where found, median", better="lower"),
     "homing_field.turn_deg": Quantity(title="Error of the turn, median", better="lower"),
 }
+WIDTH_M = 1.0
+"""Width of a ring, metres."""
 
 
 class HomingFieldErrors(Stage):
@@ -36,8 +38,6 @@ class HomingFieldErrors(Stage):
     each ring's outer edge. None where no view is.
     """
 
-    width_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Width (m) of a ring."""
     rings: Annotated[int, Bounds(ge=1)] = 8
     """Number of rings around the target."""
 
@@ -55,7 +55,7 @@ class HomingFieldErrors(Stage):
             return self.Out()
         found = field_of(poses, rows, [vectors[row] for row in rows])
         turns = np.array([_turn_error(poses, row, vectors[row]) for row in rows])
-        edges = self.width_m * np.arange(self.rings + 1)
+        edges = WIDTH_M * np.arange(self.rings + 1)
         metres = found.metres - 1e-9
         rings = [(metres >= low) & (metres < high) for low, high in pairwise(edges)]
         values: dict[str, Any] = summary(found.errors, turns)

@@ -1,12 +1,12 @@
 """Precision and recall of a topological map's loop closures, and the map's size."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Figure, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.geometry.probability.dempster_shafer import support, unknown
@@ -30,6 +30,10 @@ QUANTITIES = {
     "map.step_m": Quantity(title="Distance between path images"),
 }
 HEADLINES = ("loops.loop_closures.precision", "loops.loop_closures.recall")
+NEAR_M = 2.5
+"""Largest distance between two images of one place, metres."""
+MIN_IMAGES_BETWEEN = 10
+"""Images of the tour that must lie between two views for their hypothesis to be a loop closure."""
 
 
 class LoopClosures(Stage):
@@ -46,11 +50,6 @@ class LoopClosures(Stage):
     tour that it does not know. `step_m`: how far apart neighbouring path images were taken. `size_bytes`: of the map's
     file, but for what it says of its making.
     """
-
-    near_m: Annotated[float, Bounds(gt=0)] = 2.5
-    """Largest distance (m) between two images of one place."""
-    min_images_between: Annotated[int, Bounds(ge=1)] = 10
-    """Images of the tour that must lie between two views for their hypothesis to be a loop closure."""
 
     class Out(Outputs):
         """`metrics`: the entries `map` and `loops` of metrics.json; `figure`: absent where no loop closure is right."""
@@ -75,20 +74,20 @@ class LoopClosures(Stage):
             held["step_m"] = {"median": float(np.median(steps)), "p90": float(np.quantile(steps, 0.9)),
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
-        far = np.abs(hypotheses.pairs[:, 1] - hypotheses.pairs[:, 0]) >= self.min_images_between
+        far = np.abs(hypotheses.pairs[:, 1] - hypotheses.pairs[:, 0]) >= MIN_IMAGES_BETWEEN
         one, other = hypotheses.place[hypotheses.pairs].T
         supports, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
-            **counted(hypotheses.accepted, gaps, self.near_m),
+            **counted(hypotheses.accepted, gaps, NEAR_M),
             "loop_closures": {
-                **counted(hypotheses.accepted[far], near, self.near_m),
-                "average_precision": None if near is None else average_precision(supports[far], near <= self.near_m),
+                **counted(hypotheses.accepted[far], near, NEAR_M),
+                "average_precision": None if near is None else average_precision(supports[far], near <= NEAR_M),
             },
-            "merged": counted((one == other)[far], near, self.near_m),
-            "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], near, self.near_m),
-            "at_supports": at_supports(supports[far], near, self.near_m),
+            "merged": counted((one == other)[far], near, NEAR_M),
+            "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], near, NEAR_M),
+            "at_supports": at_supports(supports[far], near, NEAR_M),
         }
-        figure = None if near is None else _drawn(supports[far], near <= self.near_m)
+        figure = None if near is None else _drawn(supports[far], near <= NEAR_M)
         return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), figure=figure)
 
 

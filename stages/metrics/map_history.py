@@ -11,7 +11,7 @@ from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, positi
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
 
-from .error_curves import lap_ends
+from .error_curves import HOME_M, lap_ends
 from .trajectory_errors import spread
 
 Ints = npt.NDArray[np.int64]
@@ -40,8 +40,6 @@ class MapHistory(MetricStage):
     and no errors.
     """
 
-    home_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Radius (m) of the circle around the start within which a lap ends, and around any place that is no new ground."""
     points: Annotated[int, Bounds(ge=1)] = 60
     """Length of the lists of `map_over_steps`."""
 
@@ -57,7 +55,7 @@ class MapHistory(MetricStage):
         counts = counted(events, after_last)
         if not len(counts):
             return self.Out(metrics=Metrics({}))
-        parts = parts_of(logs, self.home_m)
+        parts = parts_of(logs, HOME_M)
         came, went = (np.diff(column, prepend=0) for column in counts[:, 2:].T)
         ends = np.cumsum(parts) - 1
         starts = ends - parts + 1
@@ -78,7 +76,7 @@ class MapHistory(MetricStage):
             },
         }
         if logs[0].has_truth:
-            values["first_map"] = first_map(logs[0], self.home_m)
+            values["first_map"] = first_map(logs[0], HOME_M)
         return self.Out(metrics=Metrics(values, QUANTITIES, details=("first_map",)))
 
 

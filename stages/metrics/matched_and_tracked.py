@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
 from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
@@ -24,6 +24,10 @@ QUANTITIES = {
     "pairs.matched.noise_deg": Quantity(title="Angle by which right matches miss the epipolar plane", better="lower"),
     "pairs.tracked.noise_deg": Quantity(title="Angle by which right tracks miss the epipolar plane", better="lower"),
 }
+RIGHT_DEG = 1.0
+"""Largest angle of a pair to the true epipolar plane that is right, degrees."""
+APART_M = 0.3
+"""Distance below which two images are not compared, metres: a map that was not tracked so far has no tracks."""
 
 
 class Span(NamedTuple):
@@ -56,19 +60,14 @@ class MatchedAndTracked(MetricStage):
     less influenced by noise" than tracked features. Matches: between the image in which the map was made and the
     target's, which was taken at the drive's first pose. Tracks: between the same image and the last in which the map
     was tracked, without those that contradict the robot's pose then, and without features that were matched anew on the
-    way. Every map that was made `apart_m` from the target or farther counts.
+    way. Every map that was made `APART_M` from the target or farther counts.
 
-    A pair is right where its bearings lie within `right_deg` of a plane with the true baseline and meet in front of
+    A pair is right where its bearings lie within `RIGHT_DEG` of a plane with the true baseline and meet in front of
     both views; errors along that plane are not seen. Under `pairs`: `maps`, how many; for `matched` and `tracked` each
     `used` and `right`, per map, `noise_deg`, the median angle of the features that are right as both, and `apart_m`,
     the mean distance of the two images; `kept`, right tracks over right matches; `noise_ratio`, the noise of matches
     over that of tracks. Nothing where no map was made, or without truth.
     """
-
-    right_deg: Annotated[float, Bounds(gt=0)] = 1.0
-    """Largest angle (degrees) of a pair that is right: local_map.max_epipolar_error_deg, here to the true plane."""
-    apart_m: Annotated[float, Bounds(gt=0)] = 0.3
-    """Images closer than this (m) are not compared: a map that was not tracked so far has no tracks."""
 
     def step(
         self,
@@ -89,7 +88,7 @@ class MatchedAndTracked(MetricStage):
             made, target = maps[span.made], targets[span.made]
             seen, pairs = features[span.made], correspondences[span.made]
             home = between(poses[span.made], poses[0])
-            if made is None or target is None or seen is None or pairs is None or metres(home) < self.apart_m:
+            if made is None or target is None or seen is None or pairs is None or metres(home) < APART_M:
                 continue
             partner = dict(zip(pairs.second.tolist(), pairs.first.tolist(), strict=True))
             here = seen.point_bearings()[[partner[row] for row in made.rows.tolist()]]
@@ -122,7 +121,7 @@ class MatchedAndTracked(MetricStage):
             return none
         start, end, last = tracks[span.first], tracks[span.last], maps[span.last]
         moved = between(poses[span.made], poses[span.last])
-        if start is None or end is None or last is None or metres(moved) < self.apart_m:
+        if start is None or end is None or last is None or metres(moved) < APART_M:
             return none
         # The tracker lays each place along the bearing of the point that it tracks, in the image the map was made in.
         held = (end.kinds != LOST) & (last.kinds != LOST) & np.isfinite(end.bearings).all(axis=1)
@@ -137,7 +136,7 @@ class MatchedAndTracked(MetricStage):
         x, y, turn = (float(each) for each in moved)
         way = np.array([x, y, 0.0]) / metres(moved)
         angles = np.degrees(shared_residuals(turn_about_vertical(turn), way, first, second))
-        right = right_by_epipolar(first, second, (x, y, turn), math.radians(self.right_deg))
+        right = right_by_epipolar(first, second, (x, y, turn), math.radians(RIGHT_DEG))
         return Judged(metres(moved), angles, right)
 
 

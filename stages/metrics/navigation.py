@@ -3,13 +3,13 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Any
 
 import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
@@ -35,6 +35,8 @@ HEADLINES = tuple(
     f"navigation.{name}"
     for name in ("reached_rate", "end_error_m", "collisions", "time_s", "path_length_ratio", "routes", "reason")
 )
+WITHIN_M = 0.5
+"""Largest distance from the goal at which it is reached, metres."""
 
 
 class Navigation(MetricStage):
@@ -49,9 +51,6 @@ class Navigation(MetricStage):
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Truth of the map's poses
     that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
     """
-
-    within_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Largest distance (m) from the goal at which it is reached."""
 
     def step(
         self,
@@ -89,7 +88,7 @@ class Navigation(MetricStage):
             "reason": last.why,
         }
         if map.pose_source == "truth":
-            reached = last.state == "arrived" and apart is not None and apart <= self.within_m
+            reached = last.state == "arrived" and apart is not None and apart <= WITHIN_M
             found |= {"reached": reached, "reached_rate": float(reached)}
             if collisions is not None:
                 found["collision_free_rate"] = float(reached and collisions == 0)

@@ -1,12 +1,12 @@
 """Success rate after the first correct estimate."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
+
+from .success_rate import WITHIN_DEG, WITHIN_M
 
 QUANTITIES = {
     "once_right.after_frames": Quantity(
@@ -25,11 +25,6 @@ class OnceRight(MetricStage):
     Gives nothing without ground truth.
     """
 
-    within_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Largest position error (m) of a right estimate."""
-    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
-    """Largest heading error (degrees) of a right estimate."""
-
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
@@ -37,8 +32,8 @@ class OnceRight(MetricStage):
         if not scored.any():
             return self.Out()
         truth, estimate = last.truth[scored], last.estimate[scored]
-        near = position_errors(estimate, truth) <= self.within_m
-        right = near & (heading_errors_deg(estimate, truth) <= self.within_deg)  # a frame without estimate is not
+        near = position_errors(estimate, truth) <= WITHIN_M
+        right = near & (heading_errors_deg(estimate, truth) <= WITHIN_DEG)  # a frame without estimate is not
         first = int(np.argmax(right)) if right.any() else None
         found = {
             "after_frames": None if first is None else int(np.flatnonzero(scored)[first]),

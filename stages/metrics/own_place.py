@@ -1,11 +1,10 @@
 """Similarity of a view to the map's view of its own place, and how well it is told from other places."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Outputs, Quantity, Stage, Value
+from omninav.pipeline import BadInput, Context, Metrics, MetricStage, Outputs, Quantity, Stage, Value
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -24,6 +23,10 @@ NEARBY_M = (0.5, 1.5)
 """Distances between which a view is nearby, metres."""
 ELSEWHERE_M = 5.0
 """Distance from which a view is of another place, metres."""
+OWN_M = 0.1
+"""Distance up to which a reference is of the same place, metres."""
+WITHIN_DEG = 5.0
+"""Largest difference between the robot's heading and that of a reference, turned as compared, degrees."""
 
 
 class Likeness(Value):
@@ -44,11 +47,6 @@ class OwnPlace(Stage):
     the map has no view of the place.
     """
 
-    own_m: Annotated[float, Bounds(gt=0)] = 0.1
-    """Distance (m) up to which a reference is of the same place."""
-    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
-    """Largest difference between the robot's heading and that of a reference, turned as compared."""
-
     class Out(Outputs):
         """`likeness`: of one view."""
 
@@ -64,8 +62,8 @@ class OwnPlace(Stage):
         away = np.hypot(*(map.poses[:, :2] - (truth.x, truth.y)).T)
         column = np.round((truth.heading - map.poses[:, 2]) * headings / (2 * np.pi)).astype(np.int64) % headings
         turned = wrap(map.poses[:, 2] + 2 * np.pi * column / headings - truth.heading)
-        alike, same_way = values[np.arange(len(values)), column], np.abs(np.degrees(turned)) <= self.within_deg
-        own, elsewhere = (away <= self.own_m) & same_way, away >= ELSEWHERE_M
+        alike, same_way = values[np.arange(len(values)), column], np.abs(np.degrees(turned)) <= WITHIN_DEG
+        own, elsewhere = (away <= OWN_M) & same_way, away >= ELSEWHERE_M
         nearby = (away >= NEARBY_M[0]) & (away <= NEARBY_M[1]) & same_way
         if not own.any() or not elsewhere.any():
             return self.Out()

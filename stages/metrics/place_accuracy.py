@@ -1,11 +1,11 @@
 """Share of images whose most probable place is the right one."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Drive, known
@@ -22,6 +22,8 @@ HEADLINES = tuple(f"localisation.{name}" for name in ("accuracy", "adjacent_accu
 
 TOLERANCE_M = 0.5
 """Distance by which a medoid may be farther than the closest for `tolerant_accuracy_after`, metres."""
+UPDATES = 5
+"""Length of the lists by update."""
 
 
 class PlaceAccuracy(MetricStage):
@@ -36,9 +38,6 @@ class PlaceAccuracy(MetricStage):
     `place_distance_m`: the median distance between the believed place's medoid and the truth, and
     `nearest_place_distance_m`, the closest one's. Gives nothing where poses or the map's are not ground truth.
     """
-
-    updates: Annotated[int, Bounds(ge=1)] = 5
-    """Length of the lists by update."""
 
     def step(
         self,
@@ -69,10 +68,10 @@ class PlaceAccuracy(MetricStage):
             "images": len(rows),
             "accuracy": float(rights.mean()),
             "adjacent_accuracy": float(nears.mean()),
-            "accuracy_after": _after(rights, after, self.updates),
-            "adjacent_accuracy_after": _after(nears, after, self.updates),
-            "image_accuracy_after": _after(within, after, self.updates),
-            "tolerant_accuracy_after": _after(metres_off - least <= TOLERANCE_M, after, self.updates),
+            "accuracy_after": _after(rights, after, UPDATES),
+            "adjacent_accuracy_after": _after(nears, after, UPDATES),
+            "image_accuracy_after": _after(within, after, UPDATES),
+            "tolerant_accuracy_after": _after(metres_off - least <= TOLERANCE_M, after, UPDATES),
             "place_distance_m": float(np.median(metres_off)),
             "nearest_place_distance_m": float(np.median(least)),
         }

@@ -16,6 +16,10 @@ from omninav.stages.values.visual_words import PlaceWords
 
 RANKS = (1, 5, 10)
 """Numbers of references of which one must be right."""
+BEST = 10
+"""References that are kept of an image."""
+DISTANCES_M = (0.5, 1.0, 2.0, 5.0)
+"""Distances of the table, metres."""
 
 
 class RankedReferences(Value):
@@ -27,9 +31,6 @@ class RankedReferences(Value):
 class RankReferences(Stage):
     """Ranks references by their similarity to the present image at the heading at which that is largest."""
 
-    best: Annotated[int, Bounds(ge=1)] = 10
-    """References that are kept."""
-
     class Out(Outputs):
         """`ranked`: the most similar references."""
 
@@ -37,7 +38,7 @@ class RankReferences(Stage):
 
     def step(self, ctx: Context, similarities: Similarities) -> Out:
         """One image."""
-        order = (-similarities.best).argsort(kind="stable")[: self.best]
+        order = (-similarities.best).argsort(kind="stable")[:BEST]
         candidates = similarities.candidates
         return self.Out(ranked=RankedReferences(order if candidates is None else candidates[order]))
 
@@ -53,8 +54,6 @@ class PlaceRecognition(Stage):
 
     distance_m: Annotated[float, Bounds(gt=0)] = 2.0
     """Largest distance (m) between the true position and where a right reference was taken."""
-    distances_m: tuple[Annotated[float, Bounds(gt=0)], ...] = (0.5, 1.0, 2.0, 5.0)
-    """Distances (m) of the table."""
 
     class Out(Outputs):
         """Absent where truth, or the truth of the map's poses, is not known."""
@@ -77,7 +76,7 @@ class PlaceRecognition(Stage):
         lists = [entry.references if (entry := ranked[row]) is not None else np.array([], int) for row in last.row]
         given = last.truth[:, :2], lists, map.poses[:, :2]
         found = recalls(*given, self.distance_m)
-        rows = [recalls(*given, distance) for distance in self.distances_m]
+        rows = [recalls(*given, distance) for distance in DISTANCES_M]
         found["at_distances"] = {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
         headlines = ("place_recognition.recall_at_1",)
         metrics = Metrics({"place_recognition": found}, quantities(self.distance_m), headlines)

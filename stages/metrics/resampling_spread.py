@@ -1,16 +1,17 @@
 """Spread of the particles before and after resampling."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
 
 QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles, after resampling / before")}
+AGREE_ABOVE = 0.0001
+"""Mean density above which both agree, 1/(m² rad)."""
 
 
 class ResamplingSpread(MetricStage):
@@ -18,14 +19,11 @@ class ResamplingSpread(MetricStage):
 
     Porta & Kröse 2004, section 3.1: resampling by pi p(y|x) gives "a concentration of the particles in the
     prior-likelihood intersection". The spread is the root of the summed variances of x and y (m); belief and map agree
-    where the particles' mean density under the map's hypothesis is above `agree_above` (as `Agreement` decides).
+    where the particles' mean density under the map's hypothesis is above `AGREE_ABOVE` (as `Agreement` decides).
 
     Under `resampling`: `frames`, where they agree; `before_m` and `after_m`, the mean spreads there; `ratio`, the
     second over the first. Only `frames` where they never agree.
     """
-
-    agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
-    """Mean density, 1/(m^2 rad), above which both agree."""
 
     def step(
         self,
@@ -39,7 +37,7 @@ class ResamplingSpread(MetricStage):
         for before, hypothesis, after in zip(predictions, hypotheses, beliefs, strict=True):
             if hypothesis is None or not isinstance(before, Particles) or not isinstance(after, Particles):
                 continue  # a mixture is not resampled
-            if agreement(before, hypothesis) > self.agree_above:
+            if agreement(before, hypothesis) > AGREE_ABOVE:
                 spreads.append((spread(before), spread(after)))
         values: dict[str, float | int] = {"frames": len(spreads)}
         if spreads:

@@ -1,14 +1,15 @@
 """Error each time the robot comes back to where it began."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage
+from omninav.pipeline import Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Drive, known
 
-from .error_curves import lap_ends
+from .error_curves import HOME_M, lap_ends
+
+FRAMES = 5
+"""Frames at the start that count."""
 
 
 class ReturnsHome(MetricStage):
@@ -18,11 +19,6 @@ class ReturnsHome(MetricStage):
     the start; `position_error_m`, the mean of the estimate's over that frame and those that follow it;
     `odometry_error_m`, that of odometry alone, from the first true pose on. Nothing without ground truth.
     """
-
-    home_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Radius (m) of the circle around the start."""
-    frames: Annotated[int, Bounds(ge=1)] = 5
-    """Frames at the start that count."""
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
@@ -36,9 +32,9 @@ class ReturnsHome(MetricStage):
         returns = [
             {
                 "step": int(log.frames[rows[end]]),
-                "position_error_m": float(errors[end : end + self.frames].mean()),
-                "odometry_error_m": None if odometry is None else float(odometry[end : end + self.frames].mean()),
+                "position_error_m": float(errors[end : end + FRAMES].mean()),
+                "odometry_error_m": None if odometry is None else float(odometry[end : end + FRAMES].mean()),
             }
-            for end in lap_ends(truth, log.truth[np.argmax(known(log.truth))], self.home_m)
+            for end in lap_ends(truth, log.truth[np.argmax(known(log.truth))], HOME_M)
         ]
         return self.Out(metrics=Metrics({"returns": returns}))

@@ -11,6 +11,9 @@ from omninav.stages.values.drive import Array, Drive, known
 
 from .trajectory_errors import pose_errors, quantities
 
+WINDOW = 50
+"""Frames before it that a pose uses, with a `lag`."""
+
 
 class SmoothTrajectory(Stage):
     """Smooths each log's trajectory: what is seen later tells where the robot was before.
@@ -25,8 +28,6 @@ class SmoothTrajectory(Stage):
     """Position error (m) above which the robot counts as lost."""
     lag: Annotated[int, Bounds(ge=0)] | None = None
     """Frames after it that a pose may use, as a run would that tells each pose so late; null: all of the log."""
-    window: Annotated[int, Bounds(ge=1)] = 50
-    """Frames before it that a pose uses, with a `lag`."""
 
     class Out(Outputs):
         """`drive`: with smoothed estimates; absent without odometry. `metrics`: absent without ground truth too."""
@@ -53,4 +54,4 @@ class SmoothTrajectory(Stage):
     def _smoothed(self, log: Drive) -> Array:
         trust = np.where(np.isfinite(log.confidence), log.confidence, 1.0)
         given = log.estimate, log.covariance, trust, np.nan_to_num(log.motion)
-        return smoothed(*given) if self.lag is None else smoothed_with_lag(*given, self.lag, self.window)
+        return smoothed(*given) if self.lag is None else smoothed_with_lag(*given, self.lag, WINDOW)

@@ -1,11 +1,11 @@
 """Share of images with a good estimate, and how soon one follows a bad one."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
@@ -14,6 +14,10 @@ UNIMODAL_SHARE = 0.5
 """Share of the belief that its heaviest mode must hold to be the only one; from a half on no other is as heavy."""
 KIDNAPPED_M = 1.0
 """Distance between true motion and odometry that counts as a kidnapping, metres."""
+WITHIN_M = 2.0
+"""Largest position error of a good frame, metres."""
+WITHIN_DEG = 35.0
+"""Largest heading error of a good frame, degrees."""
 
 
 class SuccessRate(MetricStage):
@@ -27,11 +31,6 @@ class SuccessRate(MetricStage):
     the frame, and `recovered_after_frames` how many frames later the estimate is good for ten in a row. Gives nothing
     without ground truth.
     """
-
-    within_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Largest position error (m) of a good frame."""
-    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
-    """Largest heading error (degrees) of a good frame."""
 
     def step(
         self,
@@ -47,11 +46,9 @@ class SuccessRate(MetricStage):
 
     def _quantities(self) -> dict[str, Quantity]:
         return {
-            "success.within_rate": Quantity(
-                title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", better="higher"
-            ),
+            "success.within_rate": Quantity(title=f"Frames within {WITHIN_M:g} m and {WITHIN_DEG:g}°", better="higher"),
             "success.at_end": Quantity(
-                title=f"Last pose within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
+                title=f"Last pose within {WITHIN_M:g} m and {WITHIN_DEG:g}°", unit="%", better="higher"
             ),
             "success.unimodal_after_frames": Quantity(
                 title="Images until one hypothesis is left", unit="", better="lower", absent="never"
@@ -66,7 +63,7 @@ class SuccessRate(MetricStage):
         scored = known(drive.truth)
         truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
         position, heading = position_errors(estimate, truth), heading_errors_deg(estimate, truth)
-        good = (position <= self.within_m) & (heading <= self.within_deg)  # a frame without estimate is not
+        good = (position <= WITHIN_M) & (heading <= WITHIN_DEG)  # a frame without estimate is not
         single = good & (drive.mode_weight[scored] >= UNIMODAL_SHARE)
         result: dict[str, Any] = {
             "within_rate": float(good.mean()),
@@ -77,7 +74,7 @@ class SuccessRate(MetricStage):
         if len(kidnapped):
             at = int(kidnapped[-1])
             later = int(np.searchsorted(frames, at))
-            again = first_settled(position[later:], heading[later:], self.within_m, self.within_deg)
+            again = first_settled(position[later:], heading[later:], WITHIN_M, WITHIN_DEG)
             result |= {
                 "kidnapped_at": at,
                 "recovered_after_frames": None if again is None else int(frames[later + again]) - at,

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.two_views import RelativeView
 
 QUANTITIES = {
@@ -15,6 +14,8 @@ QUANTITIES = {
     "two_views.direction_error_deg": Quantity(title="Error of the translation's direction", better="lower"),
     "two_views.samples": Quantity(title="RANSAC samples, median", better="lower"),
 }
+WITHIN_DEG = 3.0
+"""Largest error of rotation and of direction at which a problem counts as solved, degrees."""
 
 
 class TwoViewErrors(MetricStage):
@@ -25,9 +26,6 @@ class TwoViewErrors(MetricStage):
     solved; `samples`, median.
     """
 
-    within_deg: Annotated[float, Bounds(gt=0)] = 3.0
-    """Largest error (degrees) of rotation and of direction at which a problem counts as solved."""
-
     def step(
         self, ctx: Context, truth: Sequence[RelativeView], found: Sequence[RelativeView | None]
     ) -> MetricStage.Out:
@@ -35,7 +33,7 @@ class TwoViewErrors(MetricStage):
         solved = [(true, view) for true, view in zip(truth, found, strict=True) if view is not None]
         turns = np.array([_turn_between(true.rotation, view.rotation) for true, view in solved])
         ways = np.array([_angle_between(true.translation, view.translation) for true, view in solved])
-        good = np.count_nonzero((turns <= self.within_deg) & (ways <= self.within_deg))
+        good = np.count_nonzero((turns <= WITHIN_DEG) & (ways <= WITHIN_DEG))
         values = {
             "success_rate": good / len(truth) if len(truth) else None,
             "rotation_error_deg": _spread(turns),

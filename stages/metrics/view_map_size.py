@@ -1,12 +1,11 @@
 """Size of a map of views, and how densely it covers what was visited."""
 
 import dataclasses
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -21,6 +20,8 @@ QUANTITIES = {
     "map.visited_area_m2": Quantity(title="Visited area", unit="m²"),
     "map.references_per_m2": Quantity(title="References per m²"),
 }
+NEAR_M = 1.0
+"""Distance from the true path (from the estimates where there is no truth) up to which the area is visited, metres."""
 
 
 class ViewMapSize(MetricStage):
@@ -32,9 +33,6 @@ class ViewMapSize(MetricStage):
     says too much.
     """
 
-    near_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Distance (m) from the true path (from the estimates where there is no truth) up to which the area is visited."""
-
     def step(
         self,
         ctx: Context,
@@ -45,7 +43,7 @@ class ViewMapSize(MetricStage):
         ctx.fact("map_poses", map.pose_source)
         poses = drive.truth if drive.has_truth else drive.estimate
         path = poses[known(poses)][:, :2]
-        size, area = stored_bytes(map), visited_area(path, self.near_m)
+        size, area = stored_bytes(map), visited_area(path, NEAR_M)
         figures = {
             "size_bytes": size,
             "references": len(map),

@@ -1,12 +1,12 @@
 """Spacing of the views of a map, among views and on the floor."""
 
 import dataclasses
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
@@ -31,6 +31,8 @@ QUANTITIES = {
         )
     },
 }
+MAX_VIEWS = 500
+"""Views that are measured of a larger map, evenly picked by age."""
 
 
 class ViewSpacing(MetricStage):
@@ -43,14 +45,11 @@ class ViewSpacing(MetricStage):
     a map of fewer than three views.
     """
 
-    max_views: Annotated[int, Bounds(ge=3)] = 500
-    """Views that are measured of a larger map, evenly picked by age."""
-
     def step(self, ctx: Context, drive: Drive, map: ViewMixtures, view: WholeView) -> MetricStage.Out:
         """The map at the end of the run, which `drive` waits for; `view`: the last one seen, for how to compare."""
         if len(map) < 3:
             return self.Out(metrics=Metrics({}))
-        rows = np.unique(np.linspace(0, len(map) - 1, min(self.max_views, len(map))).round().astype(np.int64))
+        rows = np.unique(np.linspace(0, len(map) - 1, min(MAX_VIEWS, len(map))).round().astype(np.int64))
         among, apart = nearest_views(map, view, rows), nearest_places(map)[rows]
         found = {"between_views": spaced(among), "between_places_m": spaced(apart)}
         return self.Out(metrics=Metrics({"spacing": found}, QUANTITIES))

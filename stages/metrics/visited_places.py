@@ -1,21 +1,25 @@
 """Error at a place by the odometry of its first visit, and by the number of visits."""
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage
+from omninav.pipeline import Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
 Ints = npt.NDArray[np.int64]
+PLACE_M = 1.0
+"""Side of a place's cell, metres."""
+AWAY_M = 5.0
+"""True path length since the robot was last in the cell, beyond which it comes for another visit, metres."""
 
 
 class VisitedPlaces(MetricStage):
     """Compares errors at a place's later visits with its first one, over all logs that have ground truth.
 
-    A place is a square cell of the floor, by true positions; a visit ends where the robot has driven `away_m` since it
+    A place is a square cell of the floor, by true positions; a visit ends where the robot has driven `AWAY_M` since it
     was last in the cell, or where a log ends. Porta & Kröse 2004, section 5, and Gross, Koenig & Müller 2005, section
     3, say of a map that is learned while it is used that its error at a place is that of the odometry of the first
     visit.
@@ -29,11 +33,6 @@ class VisitedPlaces(MetricStage):
     is not aligned.
     """
 
-    place_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Side (m) of a place's cell."""
-    away_m: Annotated[float, Bounds(gt=0)] = 5.0
-    """True path length (m) since the robot was last in the cell, beyond which it comes for another visit."""
-
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
@@ -44,8 +43,8 @@ class VisitedPlaces(MetricStage):
         truth = np.concatenate([log.truth for log in scored])
         errors = np.concatenate([position_errors(log.estimate, log.truth) for log in scored])
         odometry = np.concatenate([odometry_errors(log)[each] for log, each in zip(logs, rows, strict=True)])
-        cells = np.unique(np.floor(truth[:, :2] / self.place_m).astype(np.int64), axis=0, return_inverse=True)[1]
-        numbers = visit_numbers(cells.ravel(), driven_between(scored), self.away_m)
+        cells = np.unique(np.floor(truth[:, :2] / PLACE_M).astype(np.int64), axis=0, return_inverse=True)[1]
+        numbers = visit_numbers(cells.ravel(), driven_between(scored), AWAY_M)
         values: dict[str, Any] = {"visits": over_visits(cells.ravel(), numbers, errors)}
         found = first_against_later(cells.ravel(), numbers, errors, odometry)
         return self.Out(metrics=Metrics(values | ({"first_visits": found} if found else {})))

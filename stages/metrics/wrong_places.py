@@ -1,12 +1,12 @@
 """Fate of references that were learned at a wrong place."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
@@ -18,6 +18,10 @@ QUANTITIES = {
     "wrong_places.references": Quantity(title="References learned at a wrong place", better="lower"),
     "wrong_places.kept": Quantity(title="Wrong places kept to the end", better="lower"),
 }
+WRONG_M = 2.0
+"""Distance from the true position beyond which a place is wrong, metres."""
+POINTS = 60
+"""Length of the lists over the frames."""
 
 
 class WrongPlaces(MetricStage):
@@ -33,11 +37,6 @@ class WrongPlaces(MetricStage):
     first of them. Only `references` where there are none.
     """
 
-    wrong_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Distance (m) from the true position beyond which a place is wrong."""
-    points: Annotated[int, Bounds(ge=1)] = 60
-    """Length of the lists over the frames."""
-
     def step(
         self,
         ctx: Context,
@@ -47,13 +46,13 @@ class WrongPlaces(MetricStage):
     ) -> MetricStage.Out:
         """The whole run at once."""
         path = drive.truth[:, :2]
-        seen, came, shares = wrong_shares(events, mixtures, path, self.wrong_m)
+        seen, came, shares = wrong_shares(events, mixtures, path, WRONG_M)
         values: dict[str, Any] = {"references": len(seen)}
         if len(seen):
             ways = np.hypot(*np.diff(path, axis=0).T)
             ways = np.concatenate([[0.0], np.cumsum(np.nan_to_num(ways))])
             gone = np.array([np.flatnonzero(share > 0.0)[-1] + 1 for share in shares])
-            steps = np.unique(np.linspace(0, len(path) - 1, min(self.points, len(path))).round().astype(np.int64))
+            steps = np.unique(np.linspace(0, len(path) - 1, min(POINTS, len(path))).round().astype(np.int64))
             values |= {
                 "kept": int((gone == len(path)).sum()),
                 "along_m": (ways[seen] - ways[seen[0]]).tolist(),

@@ -29,7 +29,17 @@ MAX_IMAGES = 500
 ELSEWHERE, TURNED = 2.0, math.radians(30.0)
 """A match is of another place than the best one beyond so many radii of agreement, or turned by more (rad)."""
 STEEPNESS = 4
-"""Power of the lead by which an image counts: as good as nothing at half of `distinct_lead`, fully at twice."""
+"""Power of the lead by which an image counts: as good as nothing at half of `DISTINCT_LEAD`, fully at twice."""
+MEMORY = 20.0
+"""Independent images after which one counts a third (1 / e)."""
+DISTINCT_LEAD = 0.7
+"""Lead of the best match over those elsewhere, in standard deviations of the similarity over the map's references,
+at which an image counts half."""
+STRENGTH = 20.0
+"""Images from which on the share of agreements by chance is taken to be known."""
+KIDNAPPING_PROBABILITY = 0.02
+"""Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
+or found itself again."""
 
 
 class ConfidenceMonitorState(State):
@@ -88,16 +98,6 @@ class ConfidenceMonitor(Stage):
     """Tolerance in position (m)."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 10.0
     """Tolerance in heading."""
-    memory: Annotated[float, Bounds(ge=1)] = 20.0
-    """Independent images after which one counts a third (1 / e)."""
-    distinct_lead: Annotated[float, Bounds(gt=0)] = 0.7
-    """Lead of the best match over those elsewhere, in standard deviations of the similarity over the map's references,
-    at which an image counts half."""
-    strength: Annotated[float, Bounds(gt=0)] = 20.0
-    """From how many images the share of agreements by chance is taken to be known."""
-    kidnapping_probability: Annotated[float, Bounds(ge=0, lt=1)] = 0.02
-    """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
-    or found itself again."""
 
     right_in_conflict: Annotated[float, Bounds(ge=0, le=1)] = 0.2
     """Factor of the confidence while inputs mislead that do not fit each other: images then agree on what is wrong."""
@@ -136,16 +136,16 @@ class ConfidenceMonitor(Stage):
             repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
             first = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
-            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against, self.memory)
+            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against, MEMORY)
         elif motion is not None and (blind := math.hypot(motion.x, motion.y) / length_scale.metres) > 0.0:
-            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0, self.memory)
+            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0, MEMORY)
         agreeing = consistency(recent.places, pose, gate, radians)
         disagreeing = np.maximum(
             recent.weights * (1.0 - agreeing), recent.doubts * consistency(recent.estimates, pose, gate, radians)
         )
         odds = log_odds_of_right(
             recent.weights * agreeing, disagreeing, recent.novelties,
-            when_wrong.share, self.strength, self.kidnapping_probability,
+            when_wrong.share, STRENGTH, KIDNAPPING_PROBABILITY,
         )  # fmt: skip
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
@@ -154,7 +154,7 @@ class ConfidenceMonitor(Stage):
 
     def _counted(self, lead: float) -> float:
         """How much an image counts whose best match leads others by so many standard deviations, 0 to 1."""
-        return 1.0 / (1.0 + (self.distinct_lead / max(lead, 1e-9)) ** STEEPNESS)
+        return 1.0 / (1.0 + (DISTINCT_LEAD / max(lead, 1e-9)) ** STEEPNESS)
 
 
 def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:

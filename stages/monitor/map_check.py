@@ -1,13 +1,12 @@
 """Checks once whether the poses of a map fit its own images."""
 
 import math
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.segments import MAX_DISTANCES, similarities
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.appearance.segments import HEADINGS, MAX_DISTANCES, similarities
 from omninav.stages.geometry.appearance.turn_fit import explained
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import wrap
@@ -31,6 +30,8 @@ MIN_LIKENESS = 0.7
 MIN_TURN = math.radians(10.0)
 """Turns between neighbours that say in which sense headings are counted (rad), and how many of them are needed."""
 MIN_TURNS, REVERSED_GAIN = 10, 0.5
+SAMPLES = 50
+"""Images of the map, evenly spaced, that are compared with the others."""
 
 
 class CheckMap(Stage):
@@ -40,11 +41,6 @@ class CheckMap(Stage):
     shuffled, or headings are counted clockwise. Views are compared by their best segments, whatever the variant
     compares by. Limits: docs/conflicts.md.
     """
-
-    samples: Annotated[int, Bounds(ge=1)] = 50
-    """Images of the map, evenly spaced, that are compared with the others."""
-    headings: Annotated[int, Bounds(ge=1)] = 36
-    """Headings at which images are compared."""
 
     class Out(Outputs):
         """What was found."""
@@ -67,14 +63,14 @@ class CheckMap(Stage):
         number = len(map)
         evenly = np.unique(np.linspace(0, number - 1, min(MAX_COMPARED, number)).astype(np.int64))
         likeness, turned, headings = [], [], []
-        for sample in np.unique(np.linspace(0, number - 1, min(self.samples, number)).astype(np.int64)).tolist():
+        for sample in np.unique(np.linspace(0, number - 1, min(SAMPLES, number)).astype(np.int64)).tolist():
             away = np.hypot(*(map.poses - map.poses[sample])[:, :2].T)
             away[sample] = math.inf
             near = np.argsort(away, kind="stable")[:NEIGHBOURS]
             others = np.setdiff1d(evenly, [*near, sample])
             chosen = np.concatenate([near, others])
             values = similarities(
-                map.features, np.asarray(map.features[sample]), self.headings, map.kind == "histograms", True,
+                map.features, np.asarray(map.features[sample]), HEADINGS, map.kind == "histograms", True,
                 chosen=chosen, max_distance=MAX_DISTANCES[map.kind],
             )  # fmt: skip
             best = values.max(axis=1)

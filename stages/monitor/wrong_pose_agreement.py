@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.segments import MAX_DISTANCES, similarities
+from omninav.stages.geometry.appearance.segments import HEADINGS, MAX_DISTANCES, similarities
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.consistency import consistency
@@ -16,6 +16,10 @@ from omninav.stages.values.maps import ReferenceGraph
 
 MAX_COMPARED = 10_000
 """References of a larger map that an image is compared with, evenly spaced."""
+SAMPLES = 100
+"""Images of the map, evenly spaced, that are taken out of it."""
+MIN_SHARE = 0.005
+"""Smallest share that so few images can tell."""
 
 
 class LearnWrongPoseAgreement(Stage):
@@ -27,16 +31,10 @@ class LearnWrongPoseAgreement(Stage):
     `wrong_pose_agreement`.
     """
 
-    samples: Annotated[int, Bounds(ge=1)] = 100
-    """Images of the map, evenly spaced, that are taken out of it."""
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
     """Tolerance in position (m), as the monitor's."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 10.0
     """Tolerance in heading, as the monitor's."""
-    headings: Annotated[int, Bounds(ge=1)] = 36
-    """Headings at which images are compared."""
-    min_share: Annotated[float, Bounds(gt=0, lt=1)] = 0.005
-    """Smallest share that so few images can tell."""
 
     class Out(Outputs):
         """How often a wrong estimate looks right."""
@@ -46,7 +44,7 @@ class LearnWrongPoseAgreement(Stage):
     def step(self, ctx: Context, map: ReferenceGraph, length_scale: LengthScale) -> Out:
         """Learn it from one map."""
         number, radians = len(map), math.radians(self.within_deg)
-        samples = np.unique(np.linspace(0, number - 1, min(self.samples, number)).astype(np.int64))
+        samples = np.unique(np.linspace(0, number - 1, min(SAMPLES, number)).astype(np.int64))
         others = np.unique(np.linspace(0, number - 1, min(MAX_COMPARED, number)).astype(np.int64))
         poses, views = map.poses[others], map.features[others]
         gate = max(self.within_m, length_scale.metres)
@@ -58,11 +56,11 @@ class LearnWrongPoseAgreement(Stage):
             if not (far.any() and wrong.any()):
                 continue
             values = similarities(
-                views[far], view, self.headings, map.kind == "histograms", True, max_distance=MAX_DISTANCES[map.kind]
+                views[far], view, HEADINGS, map.kind == "histograms", True, max_distance=MAX_DISTANCES[map.kind]
             )
             best = int(values.max(axis=1).argmax())
             match = poses[far][best] + (0.0, 0.0, angle_of_peak(values[best]))
             shares.append(float(consistency(poses[wrong], match, gate, radians).mean()))
-        share = max(self.min_share, float(np.mean(shares)) if shares else 0.0)
+        share = max(MIN_SHARE, float(np.mean(shares)) if shares else 0.0)
         ctx.fact("wrong_pose_agreement", round(share, 4))
         return self.Out(when_wrong=WrongPoseAgreement(min(share, 0.5)))

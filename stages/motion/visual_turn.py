@@ -20,6 +20,11 @@ FLOOR_DEG = 0.02
 """Smallest standard deviation of a turn seen in the images, degrees."""
 EXPLAINED_SIGMAS = 2.0
 """Gap between the two turns that odometry explains, in its standard deviations."""
+SIGMA_FACTOR = 3.0
+"""Factor on the standard deviation of a visual turn that the scatter of the flow alone would tell."""
+MAX_SMOOTHNESS = 2.7
+"""Mean squared difference of pixels two columns apart over that of neighbours, above which odometry alone counts:
+some 2 where each column has detail of its own, towards 4 where columns are interpolated."""
 
 
 class VisualTurnState(State):
@@ -39,14 +44,8 @@ class VisualTurn(OdometryNoiseModel, Stage):
     are not asked.
     """
 
-    scale: Annotated[float, Bounds(ge=1)] = 3.0
-    """Factor on the standard deviation of a visual turn that the scatter of the flow alone would tell."""
     max_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
     """Its largest one, beyond which odometry alone counts; 0: always."""
-
-    max_smoothness: Annotated[float, Bounds(gt=0, le=4)] = 2.7
-    """Mean squared difference of pixels two columns apart over that of neighbours, above which odometry alone counts:
-    some 2 where each column has detail of its own, towards 4 where columns are interpolated."""
 
     class Out(Outputs):
         """The corrected motion."""
@@ -61,13 +60,13 @@ class VisualTurn(OdometryNoiseModel, Stage):
         last, before.grey = before.grey, grey
         if motion is None or last.shape != grey.shape:
             return self.Out(motion=motion)
-        if smoothness(grey) > self.max_smoothness:
+        if smoothness(grey) > MAX_SMOOTHNESS:
             ctx.count("turn_not_seen")
             return self.Out(motion=motion)
         model = self.model(motion)
         direction = model.steps[0] if abs(model.steps[1]) > 1e-9 else 0.0
         seen = turn_by_flow(last, grey, motion.turn, direction)
-        sigma = math.hypot(self.scale * seen.sigma, math.radians(FLOOR_DEG))
+        sigma = math.hypot(SIGMA_FACTOR * seen.sigma, math.radians(FLOOR_DEG))
         if not sigma <= math.radians(self.max_sigma_deg):
             ctx.count("turn_not_seen")
             return self.Out(motion=motion)

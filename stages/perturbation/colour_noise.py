@@ -13,6 +13,10 @@ Ints = npt.NDArray[np.int64]
 
 WIDTH_DEG = 40.0
 """Mean width of a segment, degrees."""
+MEAN = 128.0
+"""Mean of each pixel's blue, green and red, 0 to 255."""
+SIGMA = 64.0
+"""Their standard deviation."""
 
 
 def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
@@ -71,10 +75,6 @@ class ColourNoise(Stage):
     """Share of the image that is covered."""
     shape: Literal["sectors", "rectangles"] = "sectors"
     """`sectors`: over the full height, like people close to the camera, and as the paper uses the word segment."""
-    mean: float = 128.0
-    """Mean of each pixel's blue, green and red (0..255)."""
-    sigma: Annotated[float, Bounds(ge=0)] = 64.0
-    """Their standard deviation."""
     pattern: Annotated[int, Bounds(ge=0)] | None = 0
     """Number from which, with the frame's, parts and noise follow: all repetitions see the same images. null: they
     follow from the run's seed."""
@@ -94,6 +94,6 @@ class ColourNoise(Stage):
         shape = sectors if self.shape == "sectors" else rectangles
         mask = shape(rng, rows, columns, self.share, WIDTH_DEG / 360.0)
         pixels = panorama.pixels.copy()
-        noise = rng.normal(self.mean, self.sigma, (int(mask.sum()), 3))
+        noise = rng.normal(MEAN, SIGMA, (int(mask.sum()), 3))
         pixels[mask] = np.clip(np.rint(noise), 0, 255).astype(np.uint8)
         return self.Out(panorama=Panorama(pixels, panorama.elevation_top, panorama.elevation_bottom))

@@ -1,11 +1,10 @@
 """Plots a map of views: where each is seen from, how surely, and its weight."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, FigureStage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
@@ -17,6 +16,8 @@ from .plan_chart import draw_surroundings, plan_chart
 
 MAX_ELLIPSES = 3000
 """Largest number of ellipses: of a larger map the heaviest are drawn."""
+SIGMAS = 1.0
+"""Half the width of an ellipse, standard deviations."""
 
 
 class MapEllipses(FigureStage):
@@ -25,9 +26,6 @@ class MapEllipses(FigureStage):
     Without truth the path is that of the estimates, and no plan is drawn: the map has a frame of its own then. Gives
     nothing where the map is empty.
     """
-
-    sigmas: Annotated[float, Bounds(gt=0)] = 1.0
-    """Half the width of an ellipse in standard deviations."""
 
     def step(
         self,
@@ -49,10 +47,10 @@ class MapEllipses(FigureStage):
             figure=Figure(
                 name="map_ellipses",
                 title="The map",
-                caption=f"{size} Each place is an ellipse of {self.sigmas:g} sigma, fainter where it "
+                caption=f"{size} Each place is an ellipse of {SIGMAS:g} sigma, fainter where it "
                 f"weighs less. The line is the {'true path' if true else 'estimate'}. "
                 f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
-                content=_draw(map, paths, plan if true else None, self.sigmas, true),
+                content=_draw(map, paths, plan if true else None, SIGMAS, true),
                 media_type="image/svg+xml",
                 order=12,
             )

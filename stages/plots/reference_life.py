@@ -19,6 +19,8 @@ from .plan_chart import draw_surroundings, plan_chart
 
 Array = npt.NDArray[np.float64]
 COLOURS: tuple[Colour, ...] = ("blue", "orange", "green", "pink")
+SAME_M = 1.0
+"""Largest distance between components of two frames that are the same place, metres."""
 
 
 class ReferenceLife(FigureStage):
@@ -34,8 +36,6 @@ class ReferenceLife(FigureStage):
     name: Annotated[int, Bounds(ge=0)] | None = None
     """Number of the reference. None: the one whose heaviest component moved furthest in sum, which is where wrong
     associations show."""
-    same_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Largest distance (m) between components of two frames that are the same place."""
 
     def step(
         self,
@@ -59,7 +59,7 @@ class ReferenceLife(FigureStage):
         if not snapshots:
             return self.Out()
         gone = next((row for row, event in enumerate(events) if event is not None and name in event.removed), None)
-        lives = lives_of(snapshots, self.same_m)
+        lives = lives_of(snapshots, SAME_M)
         ended = f"it was removed in frame {gone}" if gone is not None else "it was in the map to the end"
         return self.Out(
             figure=Figure(

@@ -1,11 +1,10 @@
 """Plots which references look like the present image."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, FigureStage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Array, Drive
@@ -23,14 +22,14 @@ from .drawing import (
 from .similarity_peaks import Peaks
 from .snapshot_times import spread_out
 
+FRAMES = 4
+"""Number of columns."""
+
 
 class SimilarityHeatMap(FigureStage):
     """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
     on_request = True
-
-    frames: Annotated[int, Bounds(ge=1, le=8)] = 4
-    """Number of columns."""
 
     def step(
         self,
@@ -48,7 +47,7 @@ class SimilarityHeatMap(FigureStage):
         ]
         if not kept:
             return self.Out()
-        panels = [kept[i] for i in spread_out(len(kept), self.frames)]
+        panels = [kept[i] for i in spread_out(len(kept), FRAMES)]
         return self.Out(
             figure=Figure(
                 name="similarity_heat_map",

@@ -1,14 +1,14 @@
 """A belief in few particles or Gaussians, small enough to be kept for every frame."""
 
-from typing import Annotated
-
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PoseEstimate
 
 Array = npt.NDArray[np.float64]
+PARTICLES = 300
+"""Largest number of particles or Gaussians."""
 
 
 class ThinBelief(Stage):
@@ -16,9 +16,6 @@ class ThinBelief(Stage):
 
     Of a mixture, as many of its heaviest Gaussians. Any other belief becomes the one pose of its estimate.
     """
-
-    particles: Annotated[int, Bounds(ge=1)] = 300
-    """Largest number of particles or Gaussians."""
 
     class Out(Outputs):
         """`belief`: particles or Gaussians, map frame; absent where another belief has no estimate."""
@@ -28,9 +25,9 @@ class ThinBelief(Stage):
     def step(self, ctx: Context, belief: Belief, estimate: PoseEstimate | None = None) -> Out:
         """One belief, thinned."""
         if isinstance(belief, Particles):
-            return self.Out(belief=thin(belief, self.particles))
+            return self.Out(belief=thin(belief, PARTICLES))
         if isinstance(belief, GaussianMixture):
-            return self.Out(belief=heaviest(belief, self.particles))
+            return self.Out(belief=heaviest(belief, PARTICLES))
         if estimate is None:
             return self.Out()
         pose = estimate.pose

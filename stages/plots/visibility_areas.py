@@ -1,11 +1,11 @@
 """Plots from where the views of a map can be seen."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
@@ -33,6 +33,8 @@ Array = npt.NDArray[np.float64]
 
 HUES = (ESTIMATE, MARK, ODOMETRY, "#CC79A7")
 """Colours of a view's areas, in turns."""
+EXAMPLES = 5
+"""Number of references that have a panel."""
 
 
 class ShowVisibilityAreas(Stage):
@@ -44,9 +46,6 @@ class ShowVisibilityAreas(Stage):
     """
 
     on_request = True
-
-    examples: Annotated[int, Bounds(ge=1, le=11)] = 5
-    """Number of references that have a panel."""
 
     class Out(Outputs):
         """`figure`: a panel for each example, and one for all."""
@@ -63,7 +62,7 @@ class ShowVisibilityAreas(Stage):
     ) -> Out:
         """Draw all panels."""
         seen = np.flatnonzero((areas.target >= 0).any(axis=1))
-        chosen = seen[np.unique(np.linspace(0, len(seen) - 1, self.examples + 2)[1:-1].astype(np.int64))]
+        chosen = seen[np.unique(np.linspace(0, len(seen) - 1, EXAMPLES + 2)[1:-1].astype(np.int64))]
         counts = views_by_cell(areas)
         share = float((counts[grid.cells == FREE] > 0).mean()) if (grid.cells == FREE).any() else 0.0
         sectors = len(areas.axes)

@@ -12,10 +12,10 @@ from typing import Annotated, Any, get_args, get_origin
 import numpy as np
 import yaml
 
+from omninav.pipeline.graph.parameters import Parameter, read_parameters
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, nearest, shown
 from omninav.pipeline.graph.registry import offered
-from omninav.pipeline.graph.signature import Parameter, read_parameters
 from omninav.pipeline.graph.small_files import parse_yaml, read_yaml
 from omninav.stages.camera.model import Camera, Key, camera_models, require_sight
 

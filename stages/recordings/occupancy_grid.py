@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds
 from omninav.pipeline.files import digest_file, digest_text, user_path
+from omninav.pipeline.graph.parameters import read_parameters
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.signature import read_parameters
 from omninav.pipeline.graph.small_files import read_small, read_yaml
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.floor_plan import FloorPlan

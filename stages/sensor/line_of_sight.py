@@ -35,6 +35,9 @@ FACES = np.array(
 """From an occupied cell's centre to the point in front of a face: rows, columns; right, left, upper, lower face."""
 HEADING_BINS = 360
 """Headings distinguished where the covered share of the state space is counted."""
+WITHIN_DEG = 5.0
+"""Deviation of a forward-looking camera's heading from lambda in the reported coverage of the state space, degrees;
+the coverage is counted over `free` where wired, else over all free cells."""
 
 
 class Sight(NamedTuple):
@@ -221,9 +224,6 @@ class LineOfSight(Stage):
 
     sectors: Annotated[int, Bounds(ge=1)] | None = None
     """Sectors of a panorama, each with an area; null: as many as the map's views have segments."""
-    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
-    """Deviation of a forward-looking camera's heading from lambda in the reported coverage of the state space, which
-    is counted over `free` where wired, else over all free cells."""
 
     class Out(Outputs):
         """`areas`, and what share of the free space they cover."""
@@ -248,7 +248,7 @@ class LineOfSight(Stage):
         if none:
             ctx.count("view_without_area", none, "areas: the view hits no occupied cell of the grid")
         places = grid.centres(*np.nonzero(grid.cells == FREE)) if free is None else free.centres
-        place, state = covered(areas, places, math.radians(self.within_deg) if len(axes) == 1 else math.pi)
+        place, state = covered(areas, places, math.radians(WITHIN_DEG) if len(axes) == 1 else math.pi)
         figures = {
             "references": len(map),
             "areas": areas.target.size - none,

@@ -13,12 +13,12 @@ from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 
-from .calibrated_similarity import Outliers, likelihood_ratios
+from .calibrated_similarity import likelihood_ratios
 from .compared_rows import ComparedRows
 
 Array = npt.NDArray[np.float64]
@@ -29,6 +29,10 @@ Shorts = npt.NDArray[np.int32]
 CELLS_PER_LENGTH_SCALE = 4
 CUTOFF_SIGMAS = 3.0
 """Fading distances beyond which a reference keeps less than 1.2 % of its influence."""
+BACKGROUND_DISTANCE = 3.0
+"""Distance from the best reference beyond which references are background, length scales."""
+NEIGHBOURS = 4
+"""References between which a particle's similarity is interpolated."""
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -180,21 +184,11 @@ class NearReferences(Stage):
     """Nats of log likelihood per standard deviation of log S over the references at their best headings."""
     background_quantile: Annotated[float, Bounds(ge=0, le=1)] = 0.8
     """Quantile of the background references' similarities that an unknown place reaches."""
-    background_distance: Annotated[float, Bounds(ge=0)] = 3.0
-    """Distance from the best reference, in length scales, beyond which references are background."""
-    neighbours: Annotated[int, Bounds(ge=1)] = 4
-    """References between which a particle's similarity is interpolated."""
     fade_distance: Annotated[float, Bounds(gt=0)] = 1.5
     """Distance, in length scales, over which a reference loses its influence (sigma of a Gaussian)."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.75
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always. Needs `motion`. With a
     `calibration`, in the distances over which its evidence was measured to lose its correlation."""
-    min_novelty: Annotated[float, Bounds(ge=0, le=1)] = 0.05
-    """Novelty of an image where the robot stands."""
-    outliers: Outliers = 0.1
-    """Share of images that their place does not explain, with a `calibration`: blocked, changed, or beside the map."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Appearance length scale where the port `length_scale` is not wired."""
 
     class Out(Outputs):
         """Likelihood of each particle, and the weights over the whole map; `field` absent with an empty map."""
@@ -218,26 +212,26 @@ class NearReferences(Stage):
         calibration: SimilarityCalibration | None = None,
     ) -> Out:
         """Weight all particles."""
-        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        unit = metres_of(length_scale)
         values = similarities.values
         if not values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
         if map is not self._map or len(map) != self._length:
             radius = CUTOFF_SIGMAS * self.fade_distance * unit
-            self._cells = NearestCells(map.poses, self.neighbours, unit / CELLS_PER_LENGTH_SCALE, radius)
+            self._cells = NearestCells(map.poses, NEIGHBOURS, unit / CELLS_PER_LENGTH_SCALE, radius)
             self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
         candidates, rows = self._rows.of(similarities.candidates)
         driven = None if motion is None else math.hypot(motion.x, motion.y)
         if calibration is not None:
             far = self.independence_distance * calibration.correlation_m
-            novelty = evidence_novelty(driven, far, self.min_novelty)
+            novelty = evidence_novelty(driven, far)
             return self._calibrated(similarities, particles, map, rows, unit, calibration, novelty)
         best, each = similarities.best, similarities.sampling_weight
-        places, distance = map.poses[candidates], self.background_distance * unit
+        places, distance = map.poses[candidates], BACKGROUND_DISTANCE * unit
         floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
-        novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)
+        novelty = evidence_novelty(driven, self.independence_distance * unit)
         top = max(float(np.maximum.reduce(best)), 1e-12)
         field = similarity_field(similarities, floor, top, power)
         expected = self._expected(particles.poses, map, rows, values, unit, floor)
@@ -254,7 +248,7 @@ class NearReferences(Stage):
         calibration: SimilarityCalibration,
         novelty: float,
     ) -> Out:
-        ratios = likelihood_ratios(similarities, calibration, self.outliers)
+        ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
         near = self._cells.of(particles.poses)
         expected = expected_similarity(

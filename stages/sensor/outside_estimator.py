@@ -10,6 +10,13 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Pose
 
+SIGMA_DEG = 10.0
+"""Standard deviation of the heading, degrees."""
+WRONG_M = 8.0
+"""Distance of a wrong estimate from the truth, metres."""
+WEIGHT = 1.0
+"""Weight against the other sources, whose weights sum to about 1."""
+
 
 class OutsideEstimatorState(State):
     """Metres driven since the last statement, and the last position (x, y)."""
@@ -22,7 +29,7 @@ class OutsideEstimator(Stage):
     """Simulates an external estimator: a noisy pose every few metres, sometimes a wrong one.
 
     Gross, Koenig & Müller 2005, sections 1 and 2.1: "state hypotheses from other sources of information" are fused as
-    motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement lies `wrong_m` away
+    motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement lies `WRONG_M` away
     from it in any direction, and says that it is as exact as the others. Absent between statements and without truth.
     """
 
@@ -30,14 +37,8 @@ class OutsideEstimator(Stage):
     """Distance driven between two statements; a log's first image has one."""
     sigma_m: Annotated[float, Bounds(gt=0)] = 0.3
     """Standard deviation of the position, in x and y."""
-    sigma_deg: Annotated[float, Bounds(gt=0)] = 10.0
-    """Standard deviation of the heading."""
     wrong: Annotated[float, Bounds(ge=0, le=1)] = 0.0
     """Share of the statements that are wrong."""
-    wrong_m: Annotated[float, Bounds(gt=0)] = 8.0
-    """Distance (m) of a wrong one from the truth."""
-    weight: Annotated[float, Bounds(gt=0)] = 1.0
-    """Weight against the other sources, whose weights sum to about 1."""
 
     class Out(Outputs):
         """`hypothesis`: one Gaussian; `wrong`: the same where it is wrong."""
@@ -57,11 +58,11 @@ class OutsideEstimator(Stage):
         if state.since_m < self.every_m:
             return self.Out()
         state.since_m = 0.0
-        sigmas = np.array([self.sigma_m, self.sigma_m, math.radians(self.sigma_deg)])
+        sigmas = np.array([self.sigma_m, self.sigma_m, math.radians(SIGMA_DEG)])
         mean = np.array([truth.x, truth.y, truth.heading]) + sigmas * ctx.rng.standard_normal(3)
         is_wrong, direction = ctx.rng.random() < self.wrong, 2.0 * math.pi * ctx.rng.random()
         if is_wrong:
-            mean[:2] += self.wrong_m * np.array([math.cos(direction), math.sin(direction)])
+            mean[:2] += WRONG_M * np.array([math.cos(direction), math.sin(direction)])
         mean[2] = wrap(mean[2])
-        stated = GaussianMixture(mean[None], np.diag(sigmas**2)[None], np.array([self.weight]))
+        stated = GaussianMixture(mean[None], np.diag(sigmas**2)[None], np.array([WEIGHT]))
         return self.Out(hypothesis=stated, wrong=stated if is_wrong else None)

@@ -8,12 +8,14 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import SimilarityField
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+SPREAD = 0.4
+"""Standard deviation of the positions around a reference, in appearance length scales."""
 
 
 class SimilarityProposals(Stage):
@@ -24,10 +26,6 @@ class SimilarityProposals(Stage):
 
     number: Annotated[int, Bounds(ge=1)] = 100
     """Poses proposed at each image."""
-    spread: Annotated[float, Bounds(gt=0)] = 0.4
-    """Standard deviation of the positions around a reference, in appearance length scales."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Appearance length scale where the port `length_scale` is not wired."""
 
     class Out(Outputs):
         """Poses worth a try; absent without a field."""
@@ -40,13 +38,13 @@ class SimilarityProposals(Stage):
         """Propose poses for one image."""
         if field is None:
             return self.Out()
-        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        unit = metres_of(length_scale)
         headings = field.values.shape[1]
         rows, turns = np.divmod(draw_cells(field, ctx.rng, self.number), headings)
         references = rows if field.candidates is None else field.candidates[rows]
         poses = map.poses[references].copy()
         poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(self.number) - 0.5) / headings
-        poses[:, :2] += self.spread * unit * ctx.rng.standard_normal((self.number, 2))
+        poses[:, :2] += SPREAD * unit * ctx.rng.standard_normal((self.number, 2))
         poses[:, 2] = wrap(poses[:, 2])
         return self.Out(proposals=Particles(poses, np.full(self.number, 1.0 / self.number)))
 

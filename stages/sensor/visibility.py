@@ -11,13 +11,13 @@ from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 from omninav.stages.values.visibility import VisibilityAreas
 
-from .calibrated_similarity import Outliers, likelihood_ratios
+from .calibrated_similarity import likelihood_ratios
 from .compared_rows import ComparedRows
 from .near_references import similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
@@ -62,12 +62,6 @@ class Visibility(Stage):
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.0
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always, as in the paper. With a
     `calibration`, in the distances over which its evidence was measured to lose its correlation."""
-    min_novelty: Annotated[float, Bounds(ge=0, le=1)] = 0.05
-    """Novelty of an image where the robot stands, with `independence_distance` and `motion`."""
-    outliers: Outliers = 0.1
-    """Share of images that their place does not explain, with a `calibration`: blocked, changed, or beside the map."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Appearance length scale where the port `length_scale` is not wired."""
     retrieval: bool = True
     """False: the ablation of section VI-E, in which all particles in any visibility area weigh 1 and all others 0."""
 
@@ -121,10 +115,10 @@ class Visibility(Stage):
         window = None if panoramic else math.radians(self.window_deg), self.window_shape, sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
-        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        unit = metres_of(length_scale)
         unit = unit if calibration is None else calibration.correlation_m
         driven = None if motion is None else math.hypot(motion.x, motion.y)
-        novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)
+        novelty = evidence_novelty(driven, self.independence_distance * unit)
         likelihood = Likelihood(mean**novelty, background_level, novelty)
         if not ctx.is_read("field"):
             return self.Out(likelihood=likelihood)
@@ -134,7 +128,7 @@ class Visibility(Stage):
     def _raised(self, similarities: Similarities, calibration: SimilarityCalibration | None) -> tuple[Array, float]:
         # What is averaged, 1 at most, and up to where it says nothing.
         if calibration is not None:
-            ratios = likelihood_ratios(similarities, calibration, self.outliers).astype(np.float64)
+            ratios = likelihood_ratios(similarities, calibration).astype(np.float64)
             top = max(float(ratios.max()), 1.0)
             return ratios / top, 1.0 / top
         values, each = similarities.values, similarities.sampling_weight

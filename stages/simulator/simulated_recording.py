@@ -104,6 +104,8 @@ class SimulatedRecording:
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
         self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
         self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
+        self.carried: I64 = put + np.arange(len(put))
+        """Steps from a true pose to the next one in which the robot was carried, not driven."""
 
     def _without_contact(self, planned: F64) -> SimulatedDrive:
         """The drive along a planned path (W, 2), off it by the day's jitter, by less where it touches anything."""

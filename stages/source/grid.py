@@ -17,13 +17,15 @@ from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.occupancy import occupancy
 from omninav.stages.simulator.world import World
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 FROM_TOUR = "from_tour"
+PATH_HALF_WIDTH = 2.0
+"""Distance from the path up to which a stand-in is free, in length scales of the appearance."""
 
 
 class PlaceGrid(Stage):
@@ -38,18 +40,15 @@ class PlaceGrid(Stage):
     simulated world's own on its first day, where no log is named."""
     resolution_m: Annotated[float, Bounds(gt=0)] = 0.1
     """Side of a cell, about: a file's cells are merged, not split."""
-    clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
-    """Least distance of free space from anything occupied."""
-    path_half_width: Annotated[float, Bounds(gt=0)] = 2.0
-    """How far from the path a stand-in is free, in length scales of the appearance."""
-    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """That length scale where none is wired."""
     log: str | tuple[str, ...] | None = None
     """The log that is driven: its grid is not known, unless `grid` names it."""
     tour: str | tuple[str, ...] | None = None
     """The log that the map was made from; grids beside it are suggested."""
     world: WorldConfig = WorldConfig()
     """The simulated world."""
+
+    clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
+    """Least distance of free space from anything occupied."""
 
     class Out(Outputs):
         """`grid`, and `free`: where the robot may be."""
@@ -71,8 +70,8 @@ class PlaceGrid(Stage):
         if self.grid == FROM_TOUR:
             if map is None or not len(map):
                 raise BadInput("grid: from_tour needs a map with references; give tour=FILE, or grid=FOLDER/map.yaml")
-            unit = self.length_scale_m if length_scale is None else length_scale.metres
-            grid = along_path(map.poses, map.edges, self.path_half_width * unit, self.resolution_m)
+            unit = metres_of(length_scale)
+            grid = along_path(map.poses, map.edges, PATH_HALF_WIDTH * unit, self.resolution_m)
             ctx.fact(
                 "grid",
                 "a stand-in made from the tour's path: free along it, walls around it, wherever the real ones are",

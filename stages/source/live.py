@@ -39,6 +39,8 @@ RECORD = "live.mcap"
 """The record in the run's folder."""
 WATCH_S = 1.0
 """How often diagnostics and the terminal say how it goes."""
+PATIENCE_S = 1.0
+"""Time for which an image waits for the odometry after it, and for which a topic may be silent, seconds."""
 
 
 class LiveSource(Source):
@@ -81,8 +83,6 @@ class LiveSource(Source):
     """A camera.yaml, or a projection (`equirectangular`, …); null: the robot's CameraInfo, which is waited for."""
     limits: MotionLimits = MotionLimits()
     """What the robot can do: odometry and truth beyond it are doubted until they have gone on so for a second."""
-    patience_s: Annotated[float, Bounds(gt=0)] = 1.0
-    """How long an image waits for the odometry after it, and how long a topic may be silent."""
     diagnostics: str | None = "/diagnostics"
     """Where the state of the run is published every second (DiagnosticArray)."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
@@ -173,7 +173,7 @@ class LiveSource(Source):
             drive=DriveSoFar(self._header) if before is None else before.drive,
             camera=self._camera if before is None else before.camera,
             camera_info=self.topics.camera_info,
-            patience_s=self.patience_s,
+            patience_s=PATIENCE_S,
             last_stamp=position.stamp if position.ticks else None,
         )
         intake.subscribe()

@@ -36,6 +36,12 @@ from .synthetic_odometry import add_odometry_noise
 Array = npt.NDArray[np.float64]
 DRIVE = "drive.mcap"
 """A simulated drive in the folder of its recording."""
+SYNTHETIC_DISTANCE_NOISE = 0.1
+"""Standard deviation of synthetic odometry's distance after one metre, metres; it grows with the root of the path."""
+SYNTHETIC_TURN_NOISE_DEG_PER_M = 3.0
+"""Standard deviation of synthetic odometry's heading after one metre, degrees."""
+SYNTHETIC_TURN_NOISE_DEG_PER_RAD = 3.0
+"""Standard deviation that a turn of one radian adds to it, degrees."""
 
 
 class LogSourceState(State):
@@ -110,12 +116,6 @@ class LogSource(Source):
     the compass's turns are known. Null: noisy positions where the log has some, else a nominal one, for drawing."""
     new_log_after_s: Annotated[float, Bounds(gt=0)] = 3600.0
     """A longer pause begins another log: several days may lie in one file."""
-    synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
-    """Standard deviation of synthetic odometry's distance (m) after one metre; it grows with the root of the path."""
-    synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
-    """Standard deviation of synthetic odometry's heading after one metre."""
-    synthetic_turn_noise_deg_per_rad: Annotated[float, Bounds(ge=0.0)] = 3.0
-    """Standard deviation that a turn of one radian adds to it."""
 
     class Out(DriveOutputs):
         """What is known at an image."""
@@ -274,9 +274,9 @@ class LogSource(Source):
         return add_odometry_noise(
             increment,
             ctx.rng.standard_normal(2),
-            self.synthetic_distance_noise,
-            math.radians(self.synthetic_turn_noise_deg_per_m),
-            math.radians(self.synthetic_turn_noise_deg_per_rad),
+            SYNTHETIC_DISTANCE_NOISE,
+            math.radians(SYNTHETIC_TURN_NOISE_DEG_PER_M),
+            math.radians(SYNTHETIC_TURN_NOISE_DEG_PER_RAD),
         )
 
     def _open(self) -> None:

@@ -9,6 +9,9 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
+PAIRS = 100
+"""Pairs of bearings per problem."""
+
 
 class TwoViewsState(State):
     """Number of problems so far."""
@@ -24,10 +27,6 @@ class TwoViews(Source):
 
     problems: Annotated[int, Bounds(ge=1)] = 100
     """Number of problems."""
-    pairs: Annotated[int, Bounds(ge=1)] = 100
-    """Pairs of bearings per problem."""
-    outlier_ratio: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
-    """Share of the bearings of view 2 that look anywhere on that part of the sphere instead."""
     noise_deg: Annotated[float, Bounds(ge=0)] = 0.1
     """Standard deviation of each bearing's error, along each of two directions across it."""
     max_elevation_deg: Annotated[float, Bounds(gt=0, le=90)] = 90.0
@@ -38,6 +37,8 @@ class TwoViews(Source):
     """Largest distance of a point from view 1, in baselines."""
     planar: bool = True
     """View 2 is a robot's that drove on a floor; else it was taken anywhere, turned anyhow."""
+    outlier_ratio: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
+    """Share of the bearings of view 2 that look anywhere on that part of the sphere instead."""
 
     class Out(Outputs):
         """`pairs`: the problem. `truth`: its answer; inliers are the pairs that are not wrong."""
@@ -62,11 +63,11 @@ class TwoViews(Source):
             translation = np.array([math.cos(along), math.sin(along), 0.0])
         else:
             rotation, translation = _any_rotation(rng), self._directions(rng, 1, 90.0)[0]
-        distance = rng.uniform(self.min_distance, self.max_distance, (self.pairs, 1))
-        points = distance * self._directions(rng, self.pairs, self.max_elevation_deg)
+        distance = rng.uniform(self.min_distance, self.max_distance, (PAIRS, 1))
+        points = distance * self._directions(rng, PAIRS, self.max_elevation_deg)
         first, second = self._seen(rng, points), self._seen(rng, (points - translation) @ rotation)
-        right = np.arange(self.pairs) >= round(self.outlier_ratio * self.pairs)
-        second[~right] = self._directions(rng, self.pairs - int(right.sum()), self.max_elevation_deg)
+        right = np.arange(PAIRS) >= round(self.outlier_ratio * PAIRS)
+        second[~right] = self._directions(rng, PAIRS - int(right.sum()), self.max_elevation_deg)
         return self.Out(
             tick=Tick(index=index, stamp=index * 10**9, frame=index, first_of_log=index == 0),
             pairs=BearingPairs(first, second),

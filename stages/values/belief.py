@@ -1,5 +1,6 @@
 """Beliefs about the robot's pose. Every belief answers `estimate()`."""
 
+import math
 from abc import abstractmethod
 from typing import Annotated
 
@@ -13,6 +14,8 @@ from omninav.stages.geometry.probability.particles import mode_and_mean, weighte
 from .pose import Pose
 
 Array = npt.NDArray[np.float64]
+MODE_RADIUS = (1.0, math.radians(30.0))
+"""Radius of a mode of particles, m and rad: those within it of the mode's mean belong to it."""
 
 
 class PoseEstimate(Value):
@@ -34,8 +37,8 @@ class Belief(Value):
     """A belief about the robot's pose."""
 
     @abstractmethod
-    def estimate(self) -> PoseEstimate:
-        """The heaviest mode as one pose."""
+    def estimate(self, radius: tuple[float, float] = MODE_RADIUS) -> PoseEstimate:
+        """The heaviest mode as one pose; of particles with this radius (m, rad)."""
 
 
 class Particles(Belief):
@@ -49,8 +52,8 @@ class Particles(Belief):
     weights: Annotated[Array, Shape("N"), Shares()]
     recovery_particles: Annotated[int, Bounds(ge=0)] = 0
 
-    def estimate(self) -> PoseEstimate:
-        mode, covariance, share, mean = mode_and_mean(self.poses, self.weights)
+    def estimate(self, radius: tuple[float, float] = MODE_RADIUS) -> PoseEstimate:
+        mode, covariance, share, mean = mode_and_mean(self.poses, self.weights, *radius)
         return PoseEstimate(Pose(*mode.tolist()), covariance, share, Pose(*mean.tolist()))
 
 
@@ -66,7 +69,7 @@ class GaussianMixture(Belief):
     def __len__(self) -> int:
         return len(self.weights)
 
-    def estimate(self) -> PoseEstimate:
+    def estimate(self, radius: tuple[float, float] = MODE_RADIUS) -> PoseEstimate:
         """The heaviest component. Raises ValueError where there is none."""
         heaviest = int(np.argmax(self.weights))
         mean = weighted_mean(self.means, self.weights)
@@ -80,7 +83,7 @@ class SinglePose(Belief):
 
     pose: Pose
 
-    def estimate(self) -> PoseEstimate:
+    def estimate(self, radius: tuple[float, float] = MODE_RADIUS) -> PoseEstimate:
         return PoseEstimate(self.pose, np.zeros((3, 3)), 1.0, self.pose)
 
 
@@ -94,7 +97,7 @@ class PlaceBelief(Belief):
     probabilities: Annotated[Array, Shape("P"), Shares()]
     poses: Annotated[Array, Shape("P", 3)]
 
-    def estimate(self) -> PoseEstimate:
+    def estimate(self, radius: tuple[float, float] = MODE_RADIUS) -> PoseEstimate:
         place = int(np.argmax(self.probabilities))
         mean = weighted_mean(self.poses, self.probabilities)
         pose = Pose(*map(float, self.poses[place]))

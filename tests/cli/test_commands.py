@@ -9,8 +9,9 @@ import pytest
 
 from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.main import COMMANDS, main
-from omninav.pipeline.cli.tools import tool_class, tool_from, tools
-from omninav.pipeline.graph.signature import read_parameters
+from omninav.pipeline.cli.tool_words import tool_from
+from omninav.pipeline.cli.tools import tool_class, tools
+from omninav.pipeline.graph.parameters import read_parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 HELP = (ROOT / "conf" / "help.txt").read_text(encoding="utf-8")

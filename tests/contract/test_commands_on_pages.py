@@ -15,7 +15,8 @@ from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
-from omninav.pipeline.cli.tools import tool_class, tool_from, tools
+from omninav.pipeline.cli.tool_words import tool_from
+from omninav.pipeline.cli.tools import tool_class, tools
 from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]

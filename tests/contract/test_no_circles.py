@@ -1,4 +1,4 @@
-"""No file imports itself by way of others, also where an import is made only for types or at need."""
+"""No file imports itself by way of others, also where an import is made only for types, or inside a function."""
 
 import ast
 from collections.abc import Iterator
@@ -22,11 +22,9 @@ def modules() -> dict[str, Path]:
 
 
 def imported(name: str, path: Path) -> Iterator[str]:
-    """The names that a module imports at its top or for types; what a function imports at need is not an edge."""
+    """The names that a module imports anywhere."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-    tree = ast.parse(path.read_text())
-    nodes = [*tree.body, *(inner for node in tree.body if isinstance(node, ast.If) for inner in node.body)]
-    for node in nodes:
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -51,7 +49,13 @@ def test_no_file_imports_itself_by_way_of_others():
 
 
 @pytest.mark.parametrize(
-    "second", ["from .first import x", "import omninav.first", "if True:\n    from .first import x"]
+    "second",
+    [
+        "from .first import x",
+        "import omninav.first",
+        "if True:\n    from .first import x",
+        "def at_need():\n    from .first import x",
+    ],
 )
 def test_a_circle_is_found(tmp_path: Path, second: str):
     (tmp_path / "first.py").write_text("from .second import y")

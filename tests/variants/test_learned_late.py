@@ -78,7 +78,7 @@ def test_no_reference_is_new_after_the_first_lap_where_all_laps_are_alike(told):
 def test_no_place_is_wrong_where_every_state_was_right_however_many_are_learned_in_one_tick(told):
     ticks, truth, _, events, mixtures = told
     assert max(len(event.inserted) for event in events if event is not None) > 3
-    found = WrongPlaces(wrong_m=2.0).step(Context("wrong"), collected(ticks, truth), events, mixtures).metrics.values
+    found = WrongPlaces().step(Context("wrong"), collected(ticks, truth), events, mixtures).metrics.values
     assert found["wrong_places"] == {"references": 0}
 
 

@@ -6,10 +6,11 @@ import sys
 from collections.abc import Iterator
 
 from omninav.pipeline.cli.config_groups import options_with
+from omninav.pipeline.graph.parameters import Parameter
 from omninav.pipeline.graph.ports import type_name
 from omninav.pipeline.graph.problems import suggest
 from omninav.pipeline.graph.registry import Entry, UnknownStage, entries, resolve
-from omninav.pipeline.graph.signature import Parameter, signature
+from omninav.pipeline.graph.signature import signature
 
 
 def command(arguments: list[str]) -> int:

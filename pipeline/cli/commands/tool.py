@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from omninav.pipeline.cli.tools import tool_class, tool_from, tools
+from omninav.pipeline.cli.tool_words import tool_from
+from omninav.pipeline.cli.tools import tool_class, tools
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.graph.problems import BadInput, as_bad_input

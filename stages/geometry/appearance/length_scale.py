@@ -8,12 +8,18 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.plane.se2 import wrap
 
-from .segments import MAX_DISTANCES, FeatureKind, Rows, similarities
+from .segments import HEADINGS, MAX_DISTANCES, FeatureKind, Rows, similarities
 
 Array = npt.NDArray[np.float64]
 
 MAX_COMPARED, NEAREST_COMPARED = 10_000, 1000
 """References with which a sample is compared, and how many of them, in a larger map, are those nearest to it."""
+SAMPLES, MIN_REFERENCES = 40, 10
+"""References, spread evenly over a map, that are compared with others, and the smallest map that is measured."""
+EXCESS_LEFT = 0.5
+"""Share of the excess similarity that is left at the length scale."""
+MAX_HEADING_DIFFERENCE = math.radians(30.0)
+"""Difference of heading (rad) up to which views of one segment are compared: about half of their field of view."""
 
 
 def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> tuple[Array, Array]:
@@ -56,24 +62,14 @@ def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[n
     return np.concatenate([near, np.broadcast_to(even, (len(samples), len(even)))], axis=1)
 
 
-def length_scale(
-    poses: Array,
-    features: Rows,
-    kind: FeatureKind,
-    samples: int = 40,
-    share: float = 0.5,
-    headings: int = 36,
-    max_heading_difference: float = math.radians(30.0),
-    min_references: int = 10,
-) -> float | None:
-    """The distance (m) at which views keep `share` of their excess similarity; None where none can be measured.
+def length_scale(poses: Array, features: Rows, kind: FeatureKind) -> float | None:
+    """The distance (m) at which views keep half of their excess similarity; None where none can be measured.
 
-    `poses` (R, 3) and `features` (R, segments, bins) of a `kind`. The other parameters are those of
-    `AppearanceLengthScale`; `max_heading_difference` in radians.
+    `poses` (R, 3) and `features` (R, segments, bins) of a `kind`.
     """
-    if len(poses) < min_references:
+    if len(poses) < MIN_REFERENCES:
         return None
-    chosen = np.unique(np.linspace(0, len(poses) - 1, min(samples, len(poses))).astype(np.int64))
+    chosen = np.unique(np.linspace(0, len(poses) - 1, min(SAMPLES, len(poses))).astype(np.int64))
     histograms, scale = kind == "histograms", MAX_DISTANCES[kind]
     others = compared_with(poses, chosen)
     views = features[:] if others is None else None
@@ -82,7 +78,7 @@ def length_scale(
             similarities(
                 features[rows] if views is None else views,
                 features[n],
-                headings,
+                HEADINGS,
                 histograms,
                 False,
                 0.0,
@@ -93,9 +89,9 @@ def length_scale(
     ).astype(np.float64)
     gap = poses[chosen, None] - (poses if others is None else poses[others])
     if features.shape[1] == 1:
-        similarity[np.abs(wrap(gap[..., 2])) > max_heading_difference] = np.nan
+        similarity[np.abs(wrap(gap[..., 2])) > MAX_HEADING_DIFFERENCE] = np.nan
     centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), similarity)
-    below = np.flatnonzero(excess < share)
+    below = np.flatnonzero(excess < EXCESS_LEFT)
     if not len(centres):
         return None
     return float(centres[below[0]] if len(below) else centres[-1])

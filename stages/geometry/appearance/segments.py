@@ -22,6 +22,9 @@ BLOCK = 96
 """References that are compared at once: few enough for what belongs to a segment to stay in the fastest cache, and no
 power of two, whose rows would share the cache's lines."""
 
+HEADINGS = 36
+"""Headings at which the views of a map are compared with each other: 10 degrees apart."""
+
 EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
 """Penalties on the number k of segments by name: the exponent of 1 / k (the rest of 1 goes to 1 / n)."""
 

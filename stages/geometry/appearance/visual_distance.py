@@ -12,6 +12,8 @@ from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_neare
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
+MAX_GLOBAL_DISTANCE = 0.5
+"""Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
 
 
 class ComparisonOptions(NamedTuple):

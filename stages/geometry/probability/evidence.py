@@ -10,6 +10,8 @@ from omninav.pipeline.engine.compiled import compiled
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+MIN_NOVELTY = 0.05
+"""Smallest novelty of an image: that of one taken where the robot stands."""
 MIN_SPREAD = 1e-6
 """Standard deviation of log S up to which similarities are alike: the rounding of 32-bit numbers."""
 
@@ -63,12 +65,12 @@ def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None 
     return contrast / spread if spread > MIN_SPREAD else 1.0
 
 
-def evidence_novelty(driven_m: float | None, independence_m: float, min_novelty: float) -> float:
-    """The share of an image's evidence that is new, in [min_novelty, 1]: images taken at one place are not independent.
+def evidence_novelty(driven_m: float | None, independence_m: float) -> float:
+    """The share of an image's evidence that is new, in [MIN_NOVELTY, 1]: images taken at one place are not independent.
 
     `driven_m`: distance since the previous image, None where it is unknown. From `independence_m` on all evidence is
     new; with 0 always.
     """
     if driven_m is None or independence_m <= 0.0:
         return 1.0
-    return min(1.0, max(min_novelty, driven_m / independence_m))
+    return min(1.0, max(MIN_NOVELTY, driven_m / independence_m))

@@ -65,29 +65,33 @@ def _covariance(poses: Array, weights: Array, mean: Array, members: Members) -> 
     return covariance / total
 
 
-def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float]:
-    """The heaviest mode of weighted poses: its mean (3,), covariance (3, 3) and share of the weight.
+def mode_and_mean(poses: Array, weights: Array, radius: float, angle: float) -> tuple[Array, Array, float, Array]:
+    """The heaviest mode of weighted poses: its mean (3,), covariance (3, 3), share of the weight; and the mean of all.
 
-    The plane is cut into cells of `radius` / 2 (m) and 12 headings; the heaviest cell, summed with its neighbours,
-    starts a mean shift with a flat kernel of `radius` metres and 30 degrees that stops when its members stay the same.
+    The plane is cut into cells of `radius` / 2 (m) and headings of about `angle` (rad); the heaviest cell, summed with
+    its neighbours, starts a mean shift with a flat kernel of `radius` and `angle` that stops when its members stay the
+    same.
     """
-    return mode_and_mean(poses, weights, radius)[:3]
-
-
-def mode_and_mean(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float, Array]:
-    """Computes what `heaviest_mode` does, and the mean (3,) of all particles."""
     poses, weights = np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64)
     sines, cosines = np.sin(poses[:, 2]), np.cos(poses[:, 2])  # numpy takes a tenth of the time that numba does
     means, covariance = np.empty((2, 3)), np.empty((3, 3))
-    mass = _mode_and_mean(poses, weights, sines, cosines, radius, means, covariance)
+    mass = _mode_and_mean(poses, weights, sines, cosines, radius, angle, means, covariance)
     return means[0], covariance, mass / float(np.add.reduce(weights)), means[1]
 
 
 @compiled(nogil=True)
 def _mode_and_mean(
-    poses: Array, weights: Array, sines: Array, cosines: Array, radius: float, means: Array, covariance: Array
+    poses: Array,
+    weights: Array,
+    sines: Array,
+    cosines: Array,
+    radius: float,
+    angle: float,
+    means: Array,
+    covariance: Array,
 ) -> float:
-    members = _climb(poses, weights, sines, cosines, _heaviest_cell(poses, weights, radius / 2), radius)
+    start = _heaviest_cell(poses, weights, radius / 2, max(1, round(2 * np.pi / angle)))
+    members = _climb(poses, weights, sines, cosines, start, radius, angle)
     means[0], mass = _mean(poses, weights, sines, cosines, members)
     covariance[:] = _covariance(poses, weights, means[0], members)
     members[:] = True
@@ -110,7 +114,7 @@ def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Memb
 
 
 @compiled(nogil=True)
-def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
+def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> Array:
     # The centre of the cell that is heaviest together with its neighbours. Only cells with a particle are kept, in a
     # table with open addresses that is never more than half full.
     left, low, high = np.inf, np.inf, -np.inf
@@ -123,10 +127,11 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
         size *= 2
     slots = np.full(size, -1, np.int32)
     cells, mass = np.empty(len(poses), np.int64), np.zeros(len(poses))
-    count = 0
+    count, turn = 0, 2 * np.pi / headings
     for n in range(len(poses)):
         column, row = int(np.floor(poses[n, 0] / cell) - left), int(np.floor(poses[n, 1] / cell) - low)
-        number = (column * width + row) * 12 + int(np.floor(poses[n, 2] / (np.pi / 6))) % 12
+        number = (column * width + row) * headings
+        number += int(np.floor(poses[n, 2] / turn)) % headings
         slot = _slot(slots, cells, number)
         if slots[slot] < 0:
             slots[slot], cells[count] = count, number
@@ -137,15 +142,16 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
     for candidate in np.argsort(-mass[:count], kind="mergesort")[:64]:
         number, around = cells[candidate], 0.0
         for k in range(NEIGHBOUR_STEPS.shape[1]):
-            column, row = number // 12 // width + NEIGHBOUR_STEPS[0, k], number // 12 % width + NEIGHBOUR_STEPS[1, k]
+            column, row = number // headings // width, number // headings % width
+            cell_beside = (column + NEIGHBOUR_STEPS[0, k]) * width + row + NEIGHBOUR_STEPS[1, k]
             beside = slots[
-                _slot(slots, cells, (column * width + row) * 12 + (number % 12 + NEIGHBOUR_STEPS[2, k]) % 12)
+                _slot(slots, cells, cell_beside * headings + (number % headings + NEIGHBOUR_STEPS[2, k]) % headings)
             ]
             around += mass[beside] if beside >= 0 else 0.0
         if around > most:
             best, most = number, around
-    heading = (best % 12 + 0.5) * np.pi / 6
-    x, y = best // 12 // width + left + 0.5, best // 12 % width + low + 0.5
+    heading = (best % headings + 0.5) * turn
+    x, y = best // headings // width + left + 0.5, best // headings % width + low + 0.5
     return np.array([x * cell, y * cell, heading - 2 * np.pi * (heading > np.pi)])
 
 
@@ -159,10 +165,12 @@ def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: in
 
 
 @compiled(nogil=True)
-def _climb(poses: Array, weights: Array, sines: Array, cosines: Array, centre: Array, radius: float) -> Members:
+def _climb(
+    poses: Array, weights: Array, sines: Array, cosines: Array, centre: Array, radius: float, angle: float
+) -> Members:
     # Mean shift with a flat kernel; the particles it ends with, or all of them where it finds none.
     members = np.zeros(len(poses), np.bool_)
-    least = np.cos(np.pi / 6)
+    least = np.cos(angle)
     x, y, sine, cosine = centre[0], centre[1], np.sin(centre[2]), np.cos(centre[2])
     for _ in range(20):
         changed = False

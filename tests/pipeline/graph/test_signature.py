@@ -6,7 +6,8 @@ import pytest
 
 import toys
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.signature import BadStage, signature
+from omninav.pipeline.graph.parameters import BadStage
+from omninav.pipeline.graph.signature import signature
 
 
 class Widened(toys.Scale):

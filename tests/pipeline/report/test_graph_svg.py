@@ -4,7 +4,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from omninav.pipeline.graph.graph import Graph, Node, Wire
-from omninav.pipeline.graph.signature import Parameter, Port, Signature
+from omninav.pipeline.graph.parameters import Parameter
+from omninav.pipeline.graph.signature import Port, Signature
 from omninav.pipeline.graph.stage import Stage
 from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.report.mermaid import mermaid

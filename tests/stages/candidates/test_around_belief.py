@@ -29,9 +29,9 @@ def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
 def near(
     map: ReferenceGraph, belief: Particles | None, radius: float, recovery: float = 0.0, background: int = 20
 ) -> Candidates:
-    some = AroundBelief(radius=radius, recovery_radius=recovery, background_references=background, length_scale_m=1.0)
+    some = AroundBelief(radius=radius, recovery_radius=recovery, background_references=background)
     some.setup(Context("candidates"))
-    return some.with_others(some.around(map, belief, None), map)
+    return some.with_others(some.around(map, belief, LengthScale(1.0)), map)
 
 
 def chosen(candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +106,7 @@ def test_the_radius_is_in_length_scales_of_the_map() -> None:
 
 def test_references_added_to_a_map_are_found() -> None:
     map, belief = a_map(), particles_at(8.0)
-    some = AroundBelief(radius=1.0, length_scale_m=1.0)
+    some = AroundBelief(radius=2.0)
     some.setup(Context("candidates"))
     before = some.around(map, belief, None)
     map.append("poses", np.array([8.0, 0.5, 0.0]))

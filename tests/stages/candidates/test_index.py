@@ -56,6 +56,11 @@ def index_of(map: ReferenceGraph, state: BuildReferenceIndexState | None = None,
     return index
 
 
+@pytest.fixture(autouse=True)
+def as_many_headings_as_segments(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.candidates.index.HEADINGS", SEGMENTS)
+
+
 @pytest.fixture(scope="module", params=[EXACT, INVERTED], ids=["exact", "inverted"])
 def index(request: pytest.FixtureRequest) -> ReferenceIndex:
     return index_of(MAP, **request.param)
@@ -74,7 +79,7 @@ def selected(
     turn: int = 1,
     **kw: Any,
 ) -> Candidates:
-    stage, ctx = IndexedCandidates(headings=SEGMENTS, **{"global_references": 200, **kw}), Context("candidates")
+    stage, ctx = IndexedCandidates(**{"global_references": 200, **kw}), Context("candidates")
     ctx.tick = Tick(index=turn, stamp=0)
     stage.setup(ctx)
     return stage.step(ctx, SegmentHistograms(view), map, index, near).candidates

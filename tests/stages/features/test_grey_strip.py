@@ -8,7 +8,7 @@ from omninav.stages.values.image import Panorama, Windows
 
 def test_a_strip_holds_the_means_of_equal_parts():
     pixels = np.repeat(np.random.default_rng(0).integers(0, 256, (16, 180, 1), np.uint8), 3, axis=2)
-    strip = GreyStrip(columns=90, rows=8).step(Context("strip"), Panorama(pixels)).strip
+    strip = GreyStrip().step(Context("strip"), Panorama(pixels)).strip
     assert strip is not None
     means = pixels[..., 0].reshape(8, 2, 90, 2).mean(axis=(1, 3))
     np.testing.assert_allclose(strip.pixels, means, atol=1e-3)

@@ -25,7 +25,7 @@ STAGES = [
     CosineTransform(),
     CosineTransform(channels="colour", mean=True, contrast="none"),
     SegmentSpectrum(),
-    SegmentSpectrum(bands=4, contrast="none"),
+    SegmentSpectrum(contrast="none"),
 ]
 
 
@@ -166,11 +166,10 @@ def test_the_papers_form_compares_unturned() -> None:
     [
         (CosineTransform(), {"headings": 7}, "do not divide"),
         (CosineTransform(), {"rows": 2, "columns": 36, "coefficients": 72}, "has fewer"),
-        (SegmentSpectrum(), {"frequencies": 20}, "19 at most"),
     ],
 )
 def test_parameters_that_do_not_fit_each_other_are_refused(
-    stage: CosineTransform | SegmentSpectrum, changed: dict[str, Any], says: str
+    stage: CosineTransform, changed: dict[str, Any], says: str
 ) -> None:
     with pytest.raises(ValueError, match=says):
         dataclasses.replace(stage, **changed)

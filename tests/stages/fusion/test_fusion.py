@@ -112,9 +112,10 @@ def test_the_number_follows_the_cells_the_belief_fills() -> None:
 
 
 @pytest.mark.parametrize(("width", "number"), [(1.0, kld_number(4, 0.05, 0.99)), (90.0, kld_number(2, 0.05, 0.99))])
-def test_cells_are_as_high_in_heading_as_asked(width: float, number: int) -> None:
+def test_cells_are_as_high_in_heading_as_asked(monkeypatch: pytest.MonkeyPatch, width: float, number: int) -> None:
     poses = np.array([[0.1, 0.1, np.radians(turn)] for turn in (1.5, 3.5, 91.5, 93.5)])
-    stage = ImportanceResampling(number=900, min_particles=1, adapt="kld", cell_deg=width)
+    monkeypatch.setattr("omninav.stages.fusion.importance_resampling.CELL_DEG", width)
+    stage = ImportanceResampling(number=900, min_particles=1, adapt="kld")
     assert len(fuse(stage, Particles(poses, np.full(4, 0.25)), np.ones(4)).poses) == number
 
 
@@ -232,7 +233,7 @@ def test_a_belief_is_given_at_the_first_picture_only() -> None:
 
 
 def test_the_uniform_start_covers_the_map() -> None:
-    particles = start(ParticlePrior(number=4000, radius=2.0, length_scale_m=0.5), a_map())
+    particles = start(ParticlePrior(number=4000), a_map())
     assert particles is not None
     assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
 

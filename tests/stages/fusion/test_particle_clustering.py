@@ -53,8 +53,10 @@ def test_particles_all_over_the_place_tell_no_state() -> None:
     assert len(gather(poses)) == 0
 
 
-def test_equal_particles_have_a_spread_all_the_same() -> None:
-    state = gather(np.tile([1.0, 2.0, 3.0], (10, 1)), min_sigma_m=0.05, min_sigma_deg=2.0)
+def test_equal_particles_have_a_spread_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.fusion.particle_clustering.MIN_SIGMA_M", 0.05)
+    monkeypatch.setattr("omninav.stages.fusion.particle_clustering.MIN_SIGMA_DEG", 2.0)
+    state = gather(np.tile([1.0, 2.0, 3.0], (10, 1)))
     assert np.sqrt(np.diagonal(state.covariances[0])) == pytest.approx([0.05, 0.05, np.radians(2.0)])
 
 
@@ -78,8 +80,9 @@ def test_clusters_are_what_touching_cells_make_of_them_one_by_one(seed: int, num
     assert np.array_equal(found[:, None] == found, np.array(group)[:, None] == np.array(group))
 
 
-def test_clusters_at_the_least_weight_stay_and_weights_are_shares_of_all() -> None:
+def test_clusters_at_the_least_weight_stay_and_weights_are_shares_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [18.0, 0.0, 0.0]])
-    state = gather(poses, np.array([4.0, 3.0, 1.0]), min_weight=0.375)
+    monkeypatch.setattr("omninav.stages.fusion.particle_clustering.MIN_WEIGHT", 0.375)
+    state = gather(poses, np.array([4.0, 3.0, 1.0]))
     assert state.means[:, 0].tolist() == [0.0, 9.0]
     assert state.weights == pytest.approx([4 / 7, 3 / 7])

@@ -25,9 +25,10 @@ def begun(stage: ParticlePrior, first: bool = True, **ports: object) -> Particle
 
 @pytest.mark.parametrize(("scale", "reach"), [(None, 1.5), (LengthScale(0.2), 0.6)])
 def test_a_uniform_start_reaches_some_length_scales_from_each_reference(
-    scale: LengthScale | None, reach: float
+    monkeypatch: pytest.MonkeyPatch, scale: LengthScale | None, reach: float
 ) -> None:
-    belief = begun(ParticlePrior(number=2000, radius=3.0), length_scale=scale)
+    monkeypatch.setattr("omninav.stages.fusion.particle_prior.RADIUS", 3.0)
+    belief = begun(ParticlePrior(number=2000), length_scale=scale)
     assert belief is not None
     from_reference = np.hypot(belief.poses[:, 0] - 5.0, belief.poses[:, 1] - 5.0)
     assert from_reference.max() == pytest.approx(reach, rel=0.02)

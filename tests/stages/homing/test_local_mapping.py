@@ -16,7 +16,7 @@ from omninav.stages.camera.donut import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
+from omninav.stages.homing.feature_tracker import MAX_PIXELS, PATCH_RADIUS_PX, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
 from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
@@ -208,16 +208,17 @@ def test_a_tracked_feature_is_known_by_how_it_looked_last() -> None:
     for k, pose in enumerate(poses[:4]):
         homing.at(pose, matches=k == 0)
     last = homing.tracked.points.copy(), homing.tracked.alive.copy()
-    seen = working_image(look("mirror", poses[3][2], *poses[3][:2]), CAMERA, homing.tracker.max_pixels)
+    seen = working_image(look("mirror", poses[3][2], *poses[3][:2]), CAMERA, MAX_PIXELS)
     homing.at(poses[4], matches=False)
     still = last[1] & (homing.tracks.kinds == 1)
     assert still.sum() >= 15
-    looks = histograms(seen, last[0][still], homing.tracker.patch_radius_px)
+    looks = histograms(seen, last[0][still], PATCH_RADIUS_PX)
     np.testing.assert_array_equal(homing.tracked.histograms[still], looks)
 
 
-def test_a_map_is_made_anew_where_more_is_matched() -> None:
-    homing = Homing(min_rebuild_distance=0.02)
+def test_a_map_is_made_anew_where_more_is_matched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.homing.local_mapping.MIN_REBUILD_DISTANCE", 0.02)
+    homing = Homing()
     homing.at((4.0, 4.2, -0.5), share=0.4)
     few, ratio = homing.map.first_inliers, []
     for pose in drive(4)[1:]:

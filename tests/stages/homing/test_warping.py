@@ -62,10 +62,11 @@ def test_a_vector_on_which_enough_features_agree_is_given_on(state: str, inliers
     assert (vector(WarpingVector(), seen((4.4, 4.6, 2.0)), seen(TARGET), given) is given) == stays
 
 
-def test_a_target_in_the_dark_stays_lost_and_says_why():
+def test_a_target_in_the_dark_stays_lost_and_says_why(monkeypatch: pytest.MonkeyPatch):
     rng = np.random.default_rng(1)
     noise = Image(rng.integers(0, 256, (CAMERA.height_px, CAMERA.width, 3)).astype(np.uint8))
-    found = vector(WarpingVector(min_columns=170), noise, seen(TARGET))
+    monkeypatch.setattr("omninav.stages.homing.warping.MIN_COLUMNS", 170)
+    found = vector(WarpingVector(), noise, seen(TARGET))
     assert found.state == "lost"
     assert found.why.startswith("2 matches; ")
     assert found.why.endswith("170 are needed")

@@ -76,7 +76,7 @@ def test_a_command_that_is_no_number_is_counted_and_not_driven(wire):
 
 
 def test_odometry_comes_at_its_own_rate_and_ends_at_the_image(wire):
-    drive = Drive(odometry_hz=20.0)
+    drive = Drive()
     drive.tick()
     drive.tick()
     odometry = wire.on("/odom")

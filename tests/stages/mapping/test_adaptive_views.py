@@ -188,7 +188,7 @@ def test_a_new_component_survives_its_first_tick_at_any_similarity():
     learn(map, view(0.81, 0), state([20, 0, 0]))
     assert 20 not in map.means[:, 0].round(9), "S = 0.19 is not enough"
     with pytest.raises(ValueError, match=r"min_weight: 0\.02 is not below"):
-        AdaptiveViews(min_weight=0.02, min_similarity=0.2, beta=0.1)
+        AdaptiveViews(min_weight=0.02, beta=0.1)
 
 
 def test_a_place_never_seen_again_loses_its_weight_and_a_view_without_places_goes():
@@ -306,13 +306,15 @@ def test_forgetting_goes_by_both_sigmas_of_each_mode_and_its_weight():
     assert map.weights[1:] == pytest.approx([0.05, 0.05])
 
 
-def test_a_component_at_the_limit_still_fits_and_headings_count():
+def test_a_component_at_the_limit_still_fits_and_headings_count(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.mapping.adaptive_views.MERGE_BELOW", 0.0)
     # Squared distances with both covariances: 0.4^2 / 0.02 = 8; and 3.0 against -3.0 rad is 0.283 rad apart: 4.01.
     for where, fits, grows in (([0.4, 0, 3.0], 8.0, True), ([0.4, 0, 3.0], 7.9, False), ([0, 0, -3.0], 4.1, True)):
         map = ViewMixtures.empty()
         row = map.add_view(np.zeros(2, np.float32), "Coefficients")
         map.add_component(row, np.array([0.0, 0.0, 3.0]), np.eye(3) * 0.01, 0.5, 3.0)
-        learn(map, view(0, 0), state(where), fits_below=fits + 1e-9, merge_below=0.0)
+        monkeypatch.setattr("omninav.stages.mapping.adaptive_views.FITS_BELOW", fits + 1e-9)
+        learn(map, view(0, 0), state(where))
         assert map.weights[0] == pytest.approx(0.1 + 0.9 * 0.5 if grows else 0.9 * 0.5)
 
 
@@ -334,7 +336,7 @@ def test_each_mode_confirms_the_component_that_is_nearest_to_it_and_a_far_one_is
     for x in (0.0, 0.5, 5.0):
         map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
     modes = state([9.0, 0, 0], [0.4, 0, 0], [5.1, 0, 0], sigma=0.2, weights=[0.25, 0.5, 0.25])
-    learn(map, view(0, 0), modes, min_sigma_m=0.1, min_sigma_deg=np.degrees(0.1), merge_below=7.81)
+    learn(map, view(0, 0), modes, min_sigma_m=0.1, min_sigma_deg=np.degrees(0.1))
     order = np.argsort(map.means[:, 0])
     # Counts 3 and 0.5 or 0.25: (3 * 0.5 + 0.5 * 0.4) / 3.5 and (3 * 5 + 0.25 * 5.1) / 3.25.
     assert map.means[order, 0] == pytest.approx([0.0, 1.7 / 3.5, 16.275 / 3.25, 9.0])
@@ -346,14 +348,16 @@ def test_each_mode_confirms_the_component_that_is_nearest_to_it_and_a_far_one_is
     assert np.diag(map.covariances[order[3]]) == pytest.approx([0.04, 0.04, 0.04])
 
 
-def test_only_modes_that_are_similar_and_heavy_enough_are_learned():
+def test_only_modes_that_are_similar_and_heavy_enough_are_learned(monkeypatch: pytest.MonkeyPatch):
     # S = 0.5: of modes 0.6 and 0.4 both would be learned from 0.2 on, from 0.3 on only the first.
     map = ViewMixtures.empty()
     learn(map, view(0, 0), state([0, 0, 0]))
     two = state([10, 0, 0], [20, 0, 0], weights=[3.0, 2.0])
-    learn(map, view(0.5, 0), two, min_similarity=0.3)
+    monkeypatch.setattr("omninav.stages.mapping.adaptive_views.MIN_SIMILARITY", 0.3)
+    learn(map, view(0.5, 0), two)
     assert map.means[:, 0].tolist() == [0.0, 10.0]
-    learn(map, view(0.5, 0), two, min_similarity=0.2)
+    monkeypatch.setattr("omninav.stages.mapping.adaptive_views.MIN_SIMILARITY", 0.2)
+    learn(map, view(0.5, 0), two)
     assert sorted(map.means[:, 0].tolist()) == [0.0, 10.0, 20.0]
 
 

@@ -44,13 +44,9 @@ def test_in_a_large_map_what_is_near_and_some_of_the_rest_is_enough(monkeypatch:
     assert AppearanceLengthScale().step(Context("scale"), map).length_scale.metres == pytest.approx(0.55, abs=0.1)
 
 
-def test_pictures_that_look_other_ways_are_strangers_where_they_are_compared():
-    assert (
-        AppearanceLengthScale(max_heading_difference_deg=180.0)
-        .step(Context("reach"), along_a_wall(4, 1))
-        .length_scale.metres
-        < 0.2
-    )
+def test_pictures_that_look_other_ways_are_strangers_where_they_are_compared(monkeypatch):
+    monkeypatch.setattr("omninav.stages.geometry.appearance.length_scale.MAX_HEADING_DIFFERENCE", np.pi)
+    assert AppearanceLengthScale().step(Context("reach"), along_a_wall(4, 1)).length_scale.metres < 0.2
 
 
 def test_pairs_that_are_not_to_be_compared_count_nowhere():

@@ -73,11 +73,12 @@ def test_there_must_be_a_pair_that_far_apart() -> None:
         CalibratedThreshold(views=20, min_separation=20)
 
 
-def test_a_view_counts_after_as_much_driving_as_asked_in_any_direction() -> None:
+def test_a_view_counts_after_as_much_driving_as_asked_in_any_direction(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.mapping.calibrated_threshold.MIN_MOVE_M", 0.05)
     ctx, state, stage = (
         Context("limit"),
         CalibratedThresholdState(),
-        CalibratedThreshold(min_separation=1, min_move_m=0.05),
+        CalibratedThreshold(min_separation=1),
     )
     steps = [None, Motion(0.03, 0.0, 1.0), Motion(0.0, 0.04, 0.0), None, Motion(0.03, -0.04, 0.0)]
     counted = []

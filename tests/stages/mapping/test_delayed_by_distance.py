@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
@@ -38,8 +39,9 @@ def test_waiting_updates_are_given_as_the_next_log_begins() -> None:
     assert [update.index for update in queue.waiting] == [3]
 
 
-def test_a_robot_that_stands_keeps_at_most_max_waiting_views() -> None:
-    stage, queue = DelayedByDistance(distance_m=1.0, max_waiting=10), DelayedByDistanceState()
+def test_a_robot_that_stands_keeps_at_most_max_waiting_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.mapping.delayed_by_distance.MAX_WAITING", 10)
+    stage, queue = DelayedByDistance(distance_m=1.0), DelayedByDistanceState()
     for n in range(50):
         due(stage, queue, n, 0.0)
     assert len(queue.waiting) == 10
@@ -73,8 +75,9 @@ def test_corrections_replace_waiting_updates_and_repeat_earlier_ones() -> None:
     assert [update.reconstructed for update in out.waiting.items] == [False, True, False, False]
 
 
-def test_the_oldest_of_too_many_are_given_in_order() -> None:
-    stage, queue = DelayedByDistance(distance_m=1.0, max_waiting=2), DelayedByDistanceState()
+def test_the_oldest_of_too_many_are_given_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.mapping.delayed_by_distance.MAX_WAITING", 2)
+    stage, queue = DelayedByDistance(distance_m=1.0), DelayedByDistanceState()
     assert [due(stage, queue, n, 0.0) for n in range(4)] == [[], [], [0], [1]]
     assert queue.seen_at_m == [0.0, 0.0]
     assert due(stage, queue, 4, 5.0) == [2, 3]

@@ -122,7 +122,7 @@ def patches(rows: list[int] | range, turned: float = 0.0) -> LocalFeatures:
     )
 
 
-def test_the_patches_that_a_view_keeps_are_those_found_again_around_it() -> None:
+def test_the_patches_that_a_view_keeps_are_those_found_again_around_it(monkeypatch: pytest.MonkeyPatch) -> None:
     # View 2 has 40 patches; its neighbours on both sides show 10 to 29 and 20 to 34: the ten in both come first.
     seen = [range(40), range(10, 30), range(40), range(20, 35), range(40)]
     views = replace(made_views(between_looks([0.0, 9.0, 20.0, 31.0, 43.0])), features=tuple(map(patches, seen)))
@@ -131,7 +131,8 @@ def test_the_patches_that_a_view_keeps_are_those_found_again_around_it() -> None
         views.poses, place, place, place, views.tours, np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)),
         np.empty((0, 3)), np.empty(0, np.bool_), "odometry",
     )  # fmt: skip
-    stage = TopologicalMapping(max_patches=12, window=1, min_path_matches=1)
+    monkeypatch.setattr("omninav.stages.mapping.topological.WINDOW", 1)
+    stage = TopologicalMapping(max_patches=12, min_path_matches=1)
     made = stage.step(Context("mapping"), views, hypotheses).map
     kept = made.views.features(2).descriptors
     assert [next(n for n in range(40) if (LOOKS[n] == row).all()) for row in kept] == [10, 11, *range(20, 30)]
@@ -181,7 +182,9 @@ def test_only_the_heaviest_segments_of_a_view_are_kept() -> None:
 
 
 @pytest.mark.parametrize(("least", "images"), [(1, 1), (0, 0)])
-def test_between_medoids_are_path_images_unless_none_are_asked_for(least: int, images: int) -> None:
+def test_between_medoids_are_path_images_unless_none_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch, least: int, images: int
+) -> None:
     # From medoid to medoid it is three views of the drive, of which at most two may lie between path images.
     looks = [0.0, 0.1, 0.2, 9.0, 9.1, 9.2]
     views = replace(made_views(between_looks(looks)), features=(patches(range(5)),) * 6)
@@ -190,7 +193,8 @@ def test_between_medoids_are_path_images_unless_none_are_asked_for(least: int, i
     hypotheses = LoopHypotheses(
         views.poses, place, place, place, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
     )
-    stage = TopologicalMapping(min_path_matches=least, max_path_step=2)
+    monkeypatch.setattr("omninav.stages.mapping.topological.MAX_PATH_STEP", 2)
+    stage = TopologicalMapping(min_path_matches=least)
     made = stage.step(Context("mapping"), views, hypotheses).map
     assert made.links.tolist() == [[0, 1]]
     assert made.frames[made.places].tolist() == [10, 40]
@@ -217,7 +221,7 @@ def test_a_known_map_keeps_its_links_and_names(
     assert made.links.tolist() == links
 
 
-def test_the_first_view_has_none_before_it() -> None:
+def test_the_first_view_has_none_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
     # Of the first view those patches come first that the second shows, not those that the last does.
     seen = [range(40), range(10, 30), range(25, 40)]
     views = replace(made_views(between_looks([0.0, 9.0, 20.0])), features=tuple(map(patches, seen)))
@@ -225,7 +229,8 @@ def test_the_first_view_has_none_before_it() -> None:
     hypotheses = LoopHypotheses(
         views.poses, own, own, own, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
     )
-    made = TopologicalMapping(max_patches=12, window=1).step(Context("mapping"), views, hypotheses).map
+    monkeypatch.setattr("omninav.stages.mapping.topological.WINDOW", 1)
+    made = TopologicalMapping(max_patches=12).step(Context("mapping"), views, hypotheses).map
     np.testing.assert_array_equal(made.views.features(0).descriptors, LOOKS[10:22])
 
 

@@ -71,9 +71,11 @@ def test_a_known_view_seen_at_the_same_place_is_averaged(average: Average, place
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=12))
 def test_a_place_is_the_mean_of_all_visits_with_their_variance(places: list[float]) -> None:
-    map, stage = ViewMixtures.empty(), FusedMixtures(merge_below=1e9)
-    for place in places:
-        learn(map, view(0.0), state(place), stage)
+    map, stage = ViewMixtures.empty(), FusedMixtures()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("omninav.stages.mapping.fused_mixtures.MERGE_BELOW", 1e9)
+        for place in places:
+            learn(map, view(0.0), state(place), stage)
     assert map.means[:, 0] == pytest.approx([np.mean(places)])
     assert map.covariances[0, 0, 0] == pytest.approx(SIGMA**2 + np.var(places))
 

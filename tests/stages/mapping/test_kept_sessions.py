@@ -56,13 +56,15 @@ def test_a_view_has_the_odometry_since_the_one_before_and_none_where_a_drive_beg
     )
 
 
-def test_small_ways_add_up_in_both_directions() -> None:
+def test_small_ways_add_up_in_both_directions(monkeypatch: pytest.MonkeyPatch) -> None:
     sessions = keep(None, 0, None, first=True)
     for tick in range(1, 8):
-        keep(sessions, tick, Motion(0.003, 0.004, 0.0), stage=KeepSessions(min_move_m=0.0149))
+        monkeypatch.setattr("omninav.stages.mapping.kept_sessions.MIN_MOVE_M", 0.0149)
+        keep(sessions, tick, Motion(0.003, 0.004, 0.0), stage=KeepSessions())
     assert sessions.ticks.tolist() == [0, 3, 6]
     assert sessions.since == pytest.approx([0.003, 0.004, 0.0])
-    keep(sessions, 8, Motion(0.0, 0.0, 0.0), stage=KeepSessions(min_move_m=0.0))
+    monkeypatch.setattr("omninav.stages.mapping.kept_sessions.MIN_MOVE_M", 0.0)
+    keep(sessions, 8, Motion(0.0, 0.0, 0.0), stage=KeepSessions())
     assert sessions.ticks.tolist() == [0, 3, 6, 8]
 
 

@@ -136,12 +136,15 @@ SIDE_BY_SIDE = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
 FAR_ALONG = [*range(6), *range(20, 26)]
 
 
-def test_near_an_accepted_hypothesis_views_that_match_join_the_places_of_two_passes() -> None:
+def test_near_an_accepted_hypothesis_views_that_match_join_the_places_of_two_passes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     one = [0, 0, 1, 1, 2, 2] * 2
     assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG) == one
     assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [], FAR_ALONG) == SIDE_BY_SIDE
     # Views 2 and 8 are two along on both passes, 4 together; the pairs further on are not within 5.
-    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG, neighbour_distance=5.0) == [
+    monkeypatch.setattr("omninav.stages.mapping.merged_places.NEIGHBOUR_VIEWS", 5.0)
+    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG) == [
         0,
         0,
         1,
@@ -176,11 +179,12 @@ def test_a_known_place_holds_together_and_takes_new_views_in_by_any_of_its_own()
     assert merged_by_hand(looks, place, [(0, 4), (2, 4)], **known, min_spacing=99.0)[:4] == [0, 0, 1, 1]
 
 
-def test_views_of_a_known_map_were_not_driven_in_their_order_those_of_a_tour_were() -> None:
+def test_views_of_a_known_map_were_not_driven_in_their_order_those_of_a_tour_were(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     # Known: 0 and its path image 5, then place 5.1. New: 5.05, where the path image is, and 5.2 after it. Along the
     # drive they are 1.05 and 1.2 from 0 (a step is 1 at most), and no way leads to 5.1.
     known = {"tours": [0, 0, 0, 1, 1], "owners": [0, 0, 1, -1, -1]}
-    found = merged_by_hand(
-        [0.0, 5.0, 5.1, 5.05, 5.2], [0, 0, 1, 2, 3], [(1, 3)], **known, min_spacing=2.0, min_share=1.5
-    )
+    monkeypatch.setattr("omninav.stages.mapping.merged_places.MIN_SHARE", 1.5)
+    found = merged_by_hand([0.0, 5.0, 5.1, 5.05, 5.2], [0, 0, 1, 2, 3], [(1, 3)], **known, min_spacing=2.0)
     assert found == [0, 0, 1, 0, 0]

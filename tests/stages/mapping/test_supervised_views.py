@@ -16,9 +16,11 @@ VIEWS = [Coefficients(row, row[None]) for row in np.random.default_rng(0).normal
 POSES = [Pose(1.0, 2.0, 3.0), None, Pose(4.0, 5.0, -3.0), Pose(6.0, 7.0, 0.0)]
 
 
-def test_a_supervised_map_has_each_view_at_its_true_pose() -> None:
+def test_a_supervised_map_has_each_view_at_its_true_pose(monkeypatch: pytest.MonkeyPatch) -> None:
     projection = Projection(np.eye(5, 12, dtype=np.float32), np.ones(5))
-    stage, context = SupervisedViews(sigma_m=0.5, sigma_deg=90.0), Context("mapping")
+    monkeypatch.setattr("omninav.stages.mapping.supervised_views.SIGMA_M", 0.5)
+    monkeypatch.setattr("omninav.stages.mapping.supervised_views.SIGMA_DEG", 90.0)
+    stage, context = SupervisedViews(), Context("mapping")
     made = stage.step(context, [*VIEWS[:3], None], POSES, projection).map
     assert made.means.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, -3.0]]
     assert made.owner.tolist() == [0, 1]

@@ -13,7 +13,6 @@ from omninav.stages.mapping.thumbnails import (
     ReferenceSnapshot,
     ReferenceThumbnails,
     ThumbnailsState,
-    TourSnapshot,
     ViewThumbnails,
     joined,
 )
@@ -56,12 +55,6 @@ def test_each_window_that_became_a_reference_is_one() -> None:
     third = ReferenceSnapshot().step(CTX, seen, map, state).snapshots
     assert third is not None
     assert levels(third.jpegs) == [10]
-
-
-def test_better_quality_takes_more_bytes() -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (40, 40, 3), dtype=np.uint8)
-    sizes = [len(TourSnapshot(quality=q).step(CTX, Panorama(noise)).snapshots.jpegs[0]) for q in (20, 90)]
-    assert sizes[1] > 2 * sizes[0]
 
 
 def test_thumbnails_of_a_tour_are_in_the_order_of_its_references() -> None:

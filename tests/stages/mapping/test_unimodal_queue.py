@@ -66,8 +66,9 @@ def test_views_between_two_unimodal_states_get_reconstructed_states_in_order():
     assert drive.ctx.counts == {"view_reconstructed": 4}
 
 
-@pytest.mark.parametrize("options", [{"reconstruct": False}, {"max_waiting": 2}, {"shift": 1.5}])
-def test_views_in_between_are_dropped_where_the_path_is_unknown(options):
+@pytest.mark.parametrize("options", [{"reconstruct": False}, {"waiting": 2}, {"shift": 1.5}])
+def test_views_in_between_are_dropped_where_the_path_is_unknown(monkeypatch: pytest.MonkeyPatch, options):
+    monkeypatch.setattr("omninav.stages.mapping.unimodal_queue.MAX_WAITING", options.pop("waiting", 500))
     shift = options.pop("shift", 0.0)  # where the robot finds itself again is not where odometry led
     drive = Drive(split=range(5, 9), length=0, shift=shift, **options).to(12)
     assert [index for index, _ in drive.order()] == [*range(5), 9, 10, 11]
@@ -144,9 +145,11 @@ def test_what_waits_is_said_and_each_waits_the_same():
     assert waiting == [[0], [0, 1], [1], [], [3, 4], [4, 5]]
 
 
-def test_as_many_views_as_may_wait_are_reconstructed():
-    assert Drive(split=range(5, 9), length=0, max_waiting=4).to(12).ctx.counts == {"view_reconstructed": 4}
-    assert Drive(split=range(5, 9), length=0, max_waiting=3).to(12).ctx.counts == {"view_not_learned": 4}
+def test_as_many_views_as_may_wait_are_reconstructed(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.mapping.unimodal_queue.MAX_WAITING", 4)
+    assert Drive(split=range(5, 9), length=0).to(12).ctx.counts == {"view_reconstructed": 4}
+    monkeypatch.setattr("omninav.stages.mapping.unimodal_queue.MAX_WAITING", 3)
+    assert Drive(split=range(5, 9), length=0).to(12).ctx.counts == {"view_not_learned": 4}
 
 
 def test_a_path_is_reconstructed_from_the_last_certain_state_only():

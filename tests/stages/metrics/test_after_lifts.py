@@ -33,11 +33,12 @@ def test_an_estimate_that_is_never_right_again_counts_to_the_end():
     assert (lifts["never"], lifts["seconds"]) == (1, [54.0])
 
 
-def test_a_drive_without_lifts_has_none():
+def test_a_drive_without_lifts_has_none(monkeypatch: pytest.MonkeyPatch):
     drive = lifted_drive(0)
     quiet = drive.at(slice(None, 12))
     assert AfterLifts().step(CTX, quiet).metrics is None
-    assert AfterLifts(jump_deg=40.0).step(CTX, drive).metrics is None
+    monkeypatch.setattr("omninav.stages.metrics.after_lifts.JUMP_DEG", 40.0)
+    assert AfterLifts().step(CTX, drive).metrics is None
 
 
 def test_a_robot_that_is_carried_away_was_lifted():
@@ -60,13 +61,15 @@ def test_fifteen_degrees_to_either_side_are_a_lift(degrees, steps):
     assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == steps
 
 
-def test_what_is_at_a_limit_is_no_lift():
+def test_what_is_at_a_limit_is_no_lift(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.after_lifts.JUMP_DEG", 90.0)
+
     def lifts(motion: Motion):
         pose = Pose(0.0, 0.0, 0.0)
         drive = collected(
             [Tick(0, 0), Tick(1, 1)], [pose] * 2, [None, motion], [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 2
         )
-        return AfterLifts(jump_deg=90.0).step(CTX, drive).metrics
+        return AfterLifts().step(CTX, drive).metrics
 
     assert lifts(Motion(0.0, 0.5, 0.0)) is lifts(Motion(0.0, 0.0, np.pi / 2)) is None
     assert lifts(Motion(0.0, 0.51, 0.0)).values["lifts"]["number"] == 1

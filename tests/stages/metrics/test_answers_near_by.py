@@ -60,7 +60,7 @@ def test_an_answer_is_near_within_five_metres_and_thirty_degrees(
     assert (found["nearby_rate"], found["first_nearby_rate"]) == (right, right)
 
 
-def test_an_answer_at_the_limits_is_near() -> None:
+def test_an_answer_at_the_limits_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     at = ReferenceGraph(
         np.array([(3.0, 3.0, np.pi / 2)]),
         np.ones((1, 1, 2), np.float32),
@@ -68,7 +68,8 @@ def test_an_answer_at_the_limits_is_near() -> None:
         np.zeros((0, 2), np.int64),
         "truth",
     )
-    found = told(at, [(0, 0.5, 0.0)], truth=Pose(3.0, -2.0, 0.0), within_deg=90.0)
+    monkeypatch.setattr("omninav.stages.metrics.answers_near_by.WITHIN_DEG", 90.0)
+    found = told(at, [(0, 0.5, 0.0)], truth=Pose(3.0, -2.0, 0.0))
     assert (found["nearby_rate"], found["background_rate"]) == (1.0, 1.0)
 
 

@@ -14,20 +14,21 @@ from omninav.stages.values.rooms import Rooms
 LINE = [(5.0, 5.0), (15.0, 5.0)]
 
 
-def test_shares_of_pairs_that_pass_the_colours_by_room() -> None:
+def test_shares_of_pairs_that_pass_the_colours_by_room(monkeypatch: pytest.MonkeyPatch) -> None:
     views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views
     assert len(views) == 5  # at x = 5, 7, 9, 11, 13
     colours = [0.0, 0.0, 0.5, 0.9, 0.4]
     descriptors = tuple(GlobalDescriptor(np.array([value, 0.0, 0.0], np.float32)) for value in colours)
     views = dataclasses.replace(views, descriptors=descriptors)
     rooms = Rooms(("west", "east"), np.array([[0.0, 0.0, 10.0, 10.0], [10.0, 0.0, 20.0, 10.0]]))
-    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), views, rooms).metrics.values["comparison"]
+    monkeypatch.setattr("omninav.stages.metrics.compared_pairs.MAX_GLOBAL_DISTANCE", 0.45)
+    found = ComparedPairs().step(Context("pairs"), views, rooms).metrics.values["comparison"]
     assert found["passed_rate"] == pytest.approx(5 / 10)  # 0 with 0.4, 0 with 0, 0.5 with 0.4 and 0.9
     assert found["own_room_left_out"] == pytest.approx(3 / 4)  # three pairs in the west, one in the east
     assert found["other_rooms_left_out"] == pytest.approx(2 / 6)
 
 
-def test_colours_of_a_place_in_two_lights_against_those_of_two_rooms() -> None:
+def test_colours_of_a_place_in_two_lights_against_those_of_two_rooms(monkeypatch: pytest.MonkeyPatch) -> None:
     views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views  # at x = 5, 7, 9, 11, 13
     here, there = [0.0, 0.0, 0.0, 0.4, 0.4], [0.1, 0.0, 0.2, None, 0.9]
 
@@ -38,12 +39,14 @@ def test_colours_of_a_place_in_two_lights_against_those_of_two_rooms() -> None:
     views = dataclasses.replace(views, descriptors=tuple(shown), frames=np.array([1, 2, 3, 4, 5]))
     rooms = Rooms(("west", "east"), np.array([[0.0, 0.0, 10.0, 10.0], [10.0, 0.0, 20.0, 10.0]]))
     lit = colours([None, *there])  # the first image became no view
-    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), views, rooms, lit)
+    monkeypatch.setattr("omninav.stages.metrics.compared_pairs.MAX_GLOBAL_DISTANCE", 0.45)
+    found = ComparedPairs().step(Context("pairs"), views, rooms, lit)
     two = found.metrics.values["comparison"]["two_lights"]
     assert two["passed_rate"] == pytest.approx(3 / 4)
     assert two["change"] == pytest.approx(0.15 / 0.4)  # the median of 0.1, 0, 0.2 and 0.5 over 0.4
     known = dataclasses.replace(views, frames=np.array([7, 9, 10, 11, 12]), owners=np.array([0, -1, -1, -1, -1]))
-    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), known, None, colours([None, *there[1:]]))
+    monkeypatch.setattr("omninav.stages.metrics.compared_pairs.MAX_GLOBAL_DISTANCE", 0.45)
+    found = ComparedPairs().step(Context("pairs"), known, None, colours([None, *there[1:]]))
     assert found.metrics.values["comparison"]["two_lights"] == {"passed_rate": pytest.approx(2 / 3), "change": None}
 
 
@@ -54,7 +57,9 @@ def test_visual_distances_by_rings_of_metres() -> None:
     assert against_metres(np.ones(3), np.ones(3), 8.0)["rank_correlation"] is None
 
 
-def test_only_pairs_within_eight_metres_that_have_something_in_common_are_ranked() -> None:
+def test_only_pairs_within_eight_metres_that_have_something_in_common_are_ranked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views  # at x = 5, 7, 9, 11, 13
     distances = np.full((5, 5), np.inf)
     for (one, other), distance in {(0, 1): 1.0, (1, 2): 3.0, (0, 2): 4.0, (0, 3): 5.0, (0, 4): 9.0}.items():
@@ -63,7 +68,8 @@ def test_only_pairs_within_eight_metres_that_have_something_in_common_are_ranked
     found = ComparedPairs().step(Context("pairs"), views).metrics.values["comparison"]
     assert found["by_metres"] == {"to_m": [1.0, 2.0, 4.0, 8.0], "median": [None, 2.0, 4.0, 7.0]}
     assert found["rank_correlation"] > 0.9
-    near = ComparedPairs(within_m=6.5).step(Context("pairs"), views).metrics.values["comparison"]["by_metres"]
+    monkeypatch.setattr("omninav.stages.metrics.compared_pairs.WITHIN_M", 6.5)
+    near = ComparedPairs().step(Context("pairs"), views).metrics.values["comparison"]["by_metres"]
     assert near["median"] == [None, None, 2.0, 4.5]
     assert (found["own_room_left_out"], found["other_rooms_left_out"]) == (None, None)
 

@@ -18,32 +18,36 @@ def test_a_component_is_followed_from_update_to_update():
     assert moves(ticks, 1.0) == [[0.5, 0.25], [], []]
 
 
-def test_a_running_mean_moves_less_with_every_update():
+def test_a_running_mean_moves_less_with_every_update(monkeypatch: pytest.MonkeyPatch):
     places, rng = np.zeros(40), np.random.default_rng(0)
     ticks = []
     for update in range(12):
         seen = rng.normal(0.0, 0.2, 40)
         places = places + (seen - places) / (update + 1)
         ticks += [now((view, x)) for view, x in enumerate(places.tolist())]
-    found = ComponentMoves(moves=11).step(Context("metric"), ticks).metrics.values["component_moves"]
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_MOVES", 11)
+    found = ComponentMoves().step(Context("metric"), ticks).metrics.values["component_moves"]
     assert found["updates"] == list(range(11))
     assert found["components"] == 40
     assert found["moved_m"][-1] < 0.2 * found["moved_m"][0]
     assert found["moved_m"][0] == pytest.approx(0.2 * np.sqrt(1 / np.pi), rel=0.3)  # half the gap between two draws
 
 
-def test_every_entry_is_of_the_same_components():
+def test_every_entry_is_of_the_same_components(monkeypatch: pytest.MonkeyPatch):
     # Ten that move twice by 0.25 and 0.5, and ten that move once, by 1.0, and are in neither entry.
     first = [(view, 0.0) for view in range(20)]
     then = [(view, 0.25) for view in range(10)] + [(view, 1.0) for view in range(10, 20)]
     last = [(view, 0.75) for view in range(10)]
-    found = ComponentMoves(moves=2).step(Context("m"), [now(*first), now(*then), now(*last)])
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_MOVES", 2)
+    found = ComponentMoves().step(Context("m"), [now(*first), now(*then), now(*last)])
     assert found.metrics.values["component_moves"] == {"updates": [0, 1], "moved_m": [0.25, 0.5], "components": 10}
 
 
-def test_only_the_first_moves_of_a_component_count():
+def test_only_the_first_moves_of_a_component_count(monkeypatch: pytest.MonkeyPatch):
     ticks = [now((1, x)) for x in (0.0, 0.5, 0.75, 0.875)]
-    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), ticks).metrics.values["component_moves"]
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_MOVES", 2)
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_COMPONENTS", 1)
+    found = ComponentMoves().step(Context("m"), ticks).metrics.values["component_moves"]
     assert found == {"updates": [0, 1], "moved_m": [0.5, 0.25], "components": 1}
 
 
@@ -58,13 +62,17 @@ def test_a_curve_of_few_components_is_left_out():
     assert fewer["components"] == 0
 
 
-def test_a_component_is_the_nearest_of_its_view_and_beyond_a_metre_another():
+def test_a_component_is_the_nearest_of_its_view_and_beyond_a_metre_another(monkeypatch: pytest.MonkeyPatch):
     ticks = [now((1, 0.0), (1, 0.75)), now((1, 0.125), (1, 1.75))]
     assert moves(ticks, 1.0) == [[0.125], [1.0]]
     assert moves(ticks, 0.99) == [[0.125], [], []]
-    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.5)])
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_MOVES", 2)
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_COMPONENTS", 1)
+    found = ComponentMoves().step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.5)])
     assert found.metrics.values["component_moves"]["components"] == 0
-    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.0)])
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_MOVES", 2)
+    monkeypatch.setattr("omninav.stages.metrics.component_moves.MIN_COMPONENTS", 1)
+    found = ComponentMoves().step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.0)])
     assert found.metrics.values["component_moves"]["components"] == 1
 
 

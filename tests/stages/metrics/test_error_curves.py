@@ -17,7 +17,7 @@ def circle(laps: float, per_lap: int = 40, radius: float = 5.0) -> np.ndarray:
     return np.stack([radius * np.sin(turn), radius * (1 - np.cos(turn)), turn], axis=1)
 
 
-def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: list[int] | None = None, **parameters):
+def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: list[int] | None = None):
     """Of a drive whose estimates lie so many metres beside the truth, and whose odometry stretches each step."""
     steps = [None, *[Motion(*map(float, step)) for step in between(truth[:-1], truth[1:]) * [stretched, stretched, 1]]]
     poses = [Pose(*map(float, row)) for row in truth]
@@ -26,7 +26,7 @@ def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: 
         for pose, error in zip(poses, errors, strict=True)
     ]
     ticks = [Tick(i, i * 10**9, log, i) for i, log in enumerate(logs or [0] * len(truth))]
-    return ErrorCurves(**parameters).step(Context("curves"), collected(ticks, poses, steps, estimates)).metrics.values
+    return ErrorCurves().step(Context("curves"), collected(ticks, poses, steps, estimates)).metrics.values
 
 
 def test_a_lap_ends_where_the_path_is_nearest_to_its_start_again():
@@ -57,16 +57,18 @@ def test_each_lap_has_its_own_errors():
     assert [lap["odometry_error_m"]["mean"] for lap in laps] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
-def test_over_the_steps_each_entry_is_the_mean_of_its_share():
-    found = curves(circle(1), np.arange(40.0), points=4)["over_steps"]
+def test_over_the_steps_each_entry_is_the_mean_of_its_share(monkeypatch):
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.POINTS", 4)
+    found = curves(circle(1), np.arange(40.0))["over_steps"]
     assert found["step"] == [4.5, 14.5, 24.5, 34.5]
     assert found["position_error_m"] == pytest.approx([4.5, 14.5, 24.5, 34.5])
 
 
-def test_over_the_distance_odometry_is_that_of_the_first_lap():
+def test_over_the_distance_odometry_is_that_of_the_first_lap(monkeypatch):
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.STEP_M", 2.0)
     straight = np.zeros((7, 3))
     straight[:, 0] = np.arange(7.0)
-    found = curves(straight, np.zeros(7), stretched=1.1, distance_m=2.0)["over_distance"]
+    found = curves(straight, np.zeros(7), stretched=1.1)["over_distance"]
     assert found["distance_m"] == [1.0, 3.0, 5.0, 7.0]
     assert found["first_lap_odometry_error_m"] == pytest.approx([0.05, 0.25, 0.45, 0.6])
     one, three = (curves(circle(laps), np.zeros(40 * laps), stretched=1.1)["over_distance"] for laps in (1, 3))
@@ -105,12 +107,14 @@ def test_a_lap_is_told_by_mean_median_and_largest_error_of_place_and_heading():
     assert found["over_distance"]["distance_m"][:10] == [0.5 + k for k in range(10)]
 
 
-def test_frames_are_numbered_from_the_first_and_distances_are_from_the_first_true_pose():
+def test_frames_are_numbered_from_the_first_and_distances_are_from_the_first_true_pose(monkeypatch: pytest.MonkeyPatch):
     truth = [None, *[Pose(4.0 + x, 0.0, 0.0) for x in range(5)]]
     seen = [None, None, *[PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in truth[2:]]]
     motion = [None, None, *[Motion(1.5, 0.0, 0.0)] * 4]
     ticks = [Tick(i, i, 0, i) for i in range(6)]
-    stage = ErrorCurves(points=2, distance_m=2.0)
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.POINTS", 2)
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.STEP_M", 2.0)
+    stage = ErrorCurves()
     found = stage.step(Context("curves"), collected(ticks, truth, motion, seen)).metrics.values
     assert found["over_steps"]["step"] == [2.5, 4.5]
     assert found["over_steps"]["odometry_error_m"] == pytest.approx([0.75, 1.75])

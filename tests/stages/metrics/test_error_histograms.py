@@ -21,11 +21,11 @@ def two_logs(*errors: list[float]):
     return collected(ticks, truth, None, estimates)
 
 
-def test_each_log_has_the_shares_of_its_errors():
+def test_each_log_has_the_shares_of_its_errors(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.error_histograms.BIN_M", 1.0)
+    monkeypatch.setattr("omninav.stages.metrics.error_histograms.BINS", 3)
     first, second = (
-        ErrorHistograms(bin_m=1.0, bins=3)
-        .step(CTX, two_logs([0.1, 0.3, 1.5, 9.0], [0.2, 0.2]))
-        .metrics.values["error_histograms"]
+        ErrorHistograms().step(CTX, two_logs([0.1, 0.3, 1.5, 9.0], [0.2, 0.2])).metrics.values["error_histograms"]
     )
     assert first["error_m"] == [0.5, 1.5, 2.5]
     assert first["share"] == [0.5, 0.25, 0.25]

@@ -68,19 +68,21 @@ def test_a_robot_that_drives_on_away_from_home_begins_where_it_was_put_down():
     assert found["first"]["direction_error_deg"] == pytest.approx(180.0)
 
 
-def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_from_m():
+def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_from_m(monkeypatch: pytest.MonkeyPatch):
     found = homing()
     assert found["lost_rate"] == pytest.approx(1 / 4)
     assert found["inliers"] == 14.0
     degrees = [math.degrees(error) for error in (0.3, 0.38, 0.4)]
     assert list(found["direction_error_deg"].values()) == pytest.approx(degrees)
-    assert homing(from_m=0.1)["direction_error_deg"]["max"] > 60.0
+    monkeypatch.setattr("omninav.stages.metrics.homing_errors.FROM_M", 0.1)
+    assert homing()["direction_error_deg"]["max"] > 60.0
 
 
-def test_a_vector_at_from_m_itself_is_not_measured():
+def test_a_vector_at_from_m_itself_is_not_measured(monkeypatch: pytest.MonkeyPatch):
     path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST)]
     vectors = [None, vector(math.pi + 0.1), vector(math.pi + 0.7)]
-    found = homing(path, vectors, (False,) * 3, from_m=0.5)
+    monkeypatch.setattr("omninav.stages.metrics.homing_errors.FROM_M", 0.5)
+    found = homing(path, vectors, (False,) * 3)
     assert found["direction_error_deg"]["max"] == pytest.approx(math.degrees(0.1))
 
 
@@ -89,13 +91,14 @@ def test_who_never_says_that_it_arrived_has_not():
     assert (found["arrived"], found["time_s"]) == (0, None)
 
 
-def test_it_has_reached_what_it_was_near_when_it_said_so():
+def test_it_has_reached_what_it_was_near_when_it_said_so(monkeypatch: pytest.MonkeyPatch):
     path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST), (0.6, 0.0, EAST)]
     vectors = [None, *[vector(math.pi)] * 3]
     found = homing(path, vectors, (False, False, True, True))
     assert (found["arrived"], found["reached"]) == (1, 1)
     assert homing(path, vectors, (False, False, False, True))["reached"] == 0
-    assert homing(path, vectors, (False, False, False, True), within_m=0.6)["reached"] == 1
+    monkeypatch.setattr("omninav.stages.metrics.homing_errors.WITHIN_M", 0.6)
+    assert homing(path, vectors, (False, False, False, True))["reached"] == 1
     assert homing(path, vectors, (False,) * 4)["reached"] == 0
 
 

@@ -79,14 +79,15 @@ def field(poses: list[Pose | None], vectors: list[HomingVector | None], **parame
     return HomingFieldErrors(**parameters).step(CTX, poses, vectors)
 
 
-def test_a_view_at_the_edge_of_two_rings_is_in_the_inner_one() -> None:
+def test_a_view_at_the_edge_of_two_rings_is_in_the_inner_one(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = [Pose(0.0, 0.0, 0.0), *[Pose(-x, 0.0, 0.0) for x in (0.5, 1.0, 2.0, 2.5)]]
     values = field(poses, [None, *[vector(0.0, 0.0)] * 4], rings=2).metrics.values["homing_field"]
     assert values["views"] == 4
     assert values["by_distance"]["to_m"] == [1.0, 2.0]
     assert values["by_distance"]["views"] == [2, 1]
     assert values["within"]["views"] == [2, 3]
-    wide = field(poses, [None, *[vector(0.0, 0.0)] * 4], width_m=2.5).metrics.values["homing_field"]["by_distance"]
+    monkeypatch.setattr("omninav.stages.metrics.homing_field.WIDTH_M", 2.5)
+    wide = field(poses, [None, *[vector(0.0, 0.0)] * 4]).metrics.values["homing_field"]["by_distance"]
     assert wide["views"] == [4, *[0] * 7]
     assert wide["to_m"] == [2.5 * k for k in range(1, 9)]
 

@@ -10,6 +10,11 @@ from omninav.stages.values.pose import Motion, Pose
 CTX = Context("metric")
 
 
+@pytest.fixture(autouse=True)
+def few_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.metrics.hypothesis_life.POINTS", 4)
+
+
 def belief(*places: tuple[float, float, float]) -> GaussianMixture:
     """Components at x, y, with their weights."""
     means = np.array([[x, y, 0.0] for x, y, _ in places])
@@ -26,7 +31,7 @@ def followed(weights: list[float]):
     there = [[(n + 1.0, 8.0, w)] if w else [] for n, w in enumerate(weights)]
     beliefs = [belief((0.0, 0.0, 1.0)), *(belief((n + 1.0, 0.0, 1.0), *each) for n, each in enumerate(there))]
     wrong = [None, belief((1.0, 8.0, 1.0)), *[None] * (frames - 2)]
-    return HypothesisLife(points=4).step(CTX, drive, beliefs, wrong).metrics.values["wrong_hypotheses"]
+    return HypothesisLife().step(CTX, drive, beliefs, wrong).metrics.values["wrong_hypotheses"]
 
 
 def test_a_wrong_hypothesis_lives_until_the_belief_has_nothing_there():
@@ -50,7 +55,9 @@ def test_without_wrong_hypotheses_there_is_nothing_to_measure():
     assert HypothesisLife().step(CTX, drive, [belief((0.0, 0.0, 1.0))], [None]).metrics is None
 
 
-def test_hypotheses_are_followed_along_odometry_each_from_its_own_frame_and_figures_are_means():
+def test_hypotheses_are_followed_along_odometry_each_from_its_own_frame_and_figures_are_means(
+    monkeypatch: pytest.MonkeyPatch,
+):
     # The robot turns left by a right angle, then drives a metre; what was ahead of the first is followed in its frame.
     motion = [None, Motion(0.0, 0.0, np.pi / 2), Motion(2.0, 0.0, 0.0), Motion(2.0, 0.0, 0.0)]
     drive = collected([Tick(n, n) for n in range(4)], [Pose(0.0, 0.0, 0.0)] * 4, motion)
@@ -61,7 +68,8 @@ def test_hypotheses_are_followed_along_odometry_each_from_its_own_frame_and_figu
         belief((5.0, 2.0, 0.25), (-3.0, 0.0, 0.5)),
         belief((5.0, 4.0, 0.125), (5.0, -4.0, 1.0)),
     ]
-    found = HypothesisLife(points=5).step(CTX, drive, beliefs, [one, other, None, None]).metrics.values
+    monkeypatch.setattr("omninav.stages.metrics.hypothesis_life.POINTS", 5)
+    found = HypothesisLife().step(CTX, drive, beliefs, [one, other, None, None]).metrics.values
     assert found["wrong_hypotheses"] == {
         "number": 2,
         "updates": 3.0,  # four to the end, and two until it was gone in the third
@@ -70,7 +78,8 @@ def test_hypotheses_are_followed_along_odometry_each_from_its_own_frame_and_figu
     }
 
 
-def test_the_list_has_thirty_updates():
+def test_the_list_has_thirty_updates(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.undo()
     drive = collected([Tick(n, n) for n in range(40)], [Pose(0.0, 0.0, 0.0)] * 40)
     there = belief((1.0, 0.0, 0.5))
     found = HypothesisLife().step(CTX, drive, [there] * 40, [there, *[None] * 39]).metrics.values["wrong_hypotheses"]

@@ -60,21 +60,27 @@ def measured(hypotheses, map=MAP, **parameters):
     return out.metrics.values, out.figure
 
 
-def test_a_hypothesis_is_right_where_some_images_of_both_were_taken_within_near_m():
+def test_a_hypothesis_is_right_where_some_images_of_both_were_taken_within_near_m(monkeypatch: pytest.MonkeyPatch):
     loops = measured(hypotheses())[0]["loops"]
     counts = ("hypotheses", "accepted", "rejected", "wrong", "precision", "recall")
     assert [loops[name] for name in counts] == [5, 3, 2, 2, pytest.approx(1 / 3), 0.5]
     assert [loops["loop_closures"][name] for name in counts] == [4, 2, 2, 1, 0.5, 0.5]
     assert loops["loop_closures"]["average_precision"] == pytest.approx((1.0 + 2.0 / 3.0) / 2.0)
     assert [loops["merged"][name] for name in counts] == [4, 2, 2, 0, 1.0, 1.0]
-    nearer, farther = (measured(hypotheses(), near_m=near)[0]["loops"]["loop_closures"] for near in (2.4, 7.0))
+    found = []
+    for near in (2.4, 7.0):
+        monkeypatch.setattr("omninav.stages.metrics.loop_closures.NEAR_M", near)
+        found.append(measured(hypotheses())[0]["loops"]["loop_closures"])
+    nearer, farther = found
     assert (nearer["precision"], nearer["recall"]) == (0.5, 1.0)
     assert (farther["precision"], farther["recall"]) == (1.0, pytest.approx(2 / 3))
 
 
-def test_a_loop_closure_leaps_over_at_least_so_many_images():
-    assert measured(hypotheses(), min_images_between=11)[0]["loops"]["loop_closures"]["hypotheses"] == 3
-    assert measured(hypotheses(), min_images_between=1)[0]["loops"]["loop_closures"]["hypotheses"] == 5
+def test_a_loop_closure_leaps_over_at_least_so_many_images(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.loop_closures.MIN_IMAGES_BETWEEN", 11)
+    assert measured(hypotheses())[0]["loops"]["loop_closures"]["hypotheses"] == 3
+    monkeypatch.setattr("omninav.stages.metrics.loop_closures.MIN_IMAGES_BETWEEN", 1)
+    assert measured(hypotheses())[0]["loops"]["loop_closures"]["hypotheses"] == 5
 
 
 def test_other_thresholds_of_support_accept_what_lies_above_them():
@@ -85,11 +91,12 @@ def test_other_thresholds_of_support_accept_what_lies_above_them():
     assert found["precision"][-3:] == [1.0, None, None]
 
 
-def test_the_curve_is_drawn_where_a_loop_closure_is_right():
+def test_the_curve_is_drawn_where_a_loop_closure_is_right(monkeypatch: pytest.MonkeyPatch):
     figure = measured(hypotheses())[1]
     assert "2 of 4 right" in figure.caption
     assert "83.3 %" in figure.caption
-    assert measured(hypotheses(), near_m=0.5)[1] is None
+    monkeypatch.setattr("omninav.stages.metrics.loop_closures.NEAR_M", 0.5)
+    assert measured(hypotheses())[1] is None
 
 
 def test_each_step_of_the_curve_is_as_high_as_the_precision_where_it_ends():

@@ -74,7 +74,7 @@ def test_a_map_that_was_known_is_there_before_the_first_event(learned):
     assert counts[1, 0] == later[0].views
 
 
-def test_laps_of_the_first_log_are_parts_of_their_own():
+def test_laps_of_the_first_log_are_parts_of_their_own(monkeypatch: pytest.MonkeyPatch):
     run = small_run(60)
     twice = small_run(60)
     run.ticks += [type(tick)(60 + n, tick.stamp + 6 * 10**9, 0, 60 + n) for n, tick in enumerate(twice.ticks)]
@@ -82,7 +82,8 @@ def test_laps_of_the_first_log_are_parts_of_their_own():
     run.truth += twice.truth
     run.motion += twice.motion
     events = mixture_run(run)[2]
-    found = MapHistory(home_m=1.0).step(CTX, run.drive, events).metrics.values
+    monkeypatch.setattr("omninav.stages.metrics.map_history.HOME_M", 1.0)
+    found = MapHistory().step(CTX, run.drive, events).metrics.values
     assert found["map_per_lap"]["frames"] == [60, 60]
     assert found["first_map"]["frames"] == 59  # the last of the first lap is within a metre of the start
 

@@ -34,7 +34,7 @@ def test_a_map_of_references_is_as_large_as_its_arrays():
 def test_a_map_of_views_is_as_large_as_its_arrays_and_as_dense_as_what_was_visited():
     run = small_run(frames=12)
     map = mixture_run(run)[0]
-    found = ViewMapSize(near_m=1.0).step(CTX, run.drive, map).metrics.values["map"]
+    found = ViewMapSize().step(CTX, run.drive, map).metrics.values["map"]
     views, parts = len(map), len(map.weights)
     assert (views, parts) == (10, 11)
     assert found["size_bytes"] == views * (6 * 4 + 2 * 8) + parts * (8 + 3 * 8 + 9 * 8 + 8 + 8)

@@ -40,8 +40,9 @@ def test_a_robot_that_was_never_right_has_no_share() -> None:
     assert once_right([(9.0, 0.0), (1.0, 40.0)]) == {"after_frames": None, "right_rate": None}
 
 
-def test_an_estimate_at_the_limits_is_right() -> None:
-    out = OnceRight(within_deg=90.0).step(Context("once_right"), believed([(2.0, 90.0), (2.0, -91.0)]))
+def test_an_estimate_at_the_limits_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.metrics.once_right.WITHIN_DEG", 90.0)
+    out = OnceRight().step(Context("once_right"), believed([(2.0, 90.0), (2.0, -91.0)]))
     assert out.metrics is not None
     assert out.metrics.values["once_right"] == {"after_frames": 0, "right_rate": 0.5}
 

@@ -105,9 +105,11 @@ def test_a_view_that_looks_another_way_by_more_than_five_degrees_is_not_of_the_p
     ).own == pytest.approx(0.8)
 
 
-def test_a_view_at_the_limits_is_of_the_place() -> None:
+def test_a_view_at_the_limits_is_of_the_place(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = [(0.0, 0.125, np.pi / 2), (90.0, 0.0, 0.0)]
-    assert own([0.9, 0.2], poses=poses, own_m=0.125, within_deg=90.0).own == pytest.approx(0.9)
+    monkeypatch.setattr("omninav.stages.metrics.own_place.OWN_M", 0.125)
+    monkeypatch.setattr("omninav.stages.metrics.own_place.WITHIN_DEG", 90.0)
+    assert own([0.9, 0.2], poses=poses).own == pytest.approx(0.9)
 
 
 def test_without_truth_or_map_nothing_is_compared_and_without_views_nothing_is_told() -> None:

@@ -17,6 +17,11 @@ from omninav.stages.values.pose import Pose
 ROW = made_map([(0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (6.0, 0.0)], {(0, 1): 0, (1, 2): 0, (2, 3): 0})
 
 
+@pytest.fixture(autouse=True)
+def few_updates(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.metrics.place_accuracy.UPDATES", 3)
+
+
 def tick(index: int) -> Tick:
     return Tick(index=index, stamp=index, log=0, frame=index, first_of_log=index == 0)
 
@@ -26,7 +31,7 @@ def believed(place: int) -> PlaceBelief:
 
 
 def hits(places, xs, begun):
-    out = PlaceAccuracy(updates=3).step(
+    out = PlaceAccuracy().step(
         Context("hits"),
         collected([tick(k) for k in range(len(xs))], [None if x is None else Pose(x, 0.0, 0.0) for x in xs]),
         [believed(place) for place in places],
@@ -49,15 +54,14 @@ def test_updates_are_counted_from_where_the_belief_began():
     assert found["accuracy_after"] == [0.5, 0.5, 1.0]
 
 
-def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
+def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest(monkeypatch: pytest.MonkeyPatch):
     made = made_map([(0.0, 0.0), (2.0, 0.0)], {(0, 1): 1})
     poses = made.poses.copy()
     poses[2, 0] = 1.2  # the path image on the way, which belongs to the first place
     long = dataclasses.replace(made, poses=poses)
     beliefs = [PlaceBelief(np.eye(2)[0], long.poses[:2])]
-    out = PlaceAccuracy(updates=1).step(
-        Context("hits"), collected([tick(0)], [Pose(1.25, 0.0, 0.0)]), beliefs, beliefs, long
-    )
+    monkeypatch.setattr("omninav.stages.metrics.place_accuracy.UPDATES", 1)
+    out = PlaceAccuracy().step(Context("hits"), collected([tick(0)], [Pose(1.25, 0.0, 0.0)]), beliefs, beliefs, long)
     found = out.metrics.values["localisation"]
     assert found["accuracy_after"] == [0.0]
     assert found["image_accuracy_after"] == [1.0]
@@ -101,7 +105,9 @@ def test_figures_are_shares_and_medians_over_all_images():
     assert found["adjacent_accuracy_after"] == [1.0, 1.0, 1.0]
 
 
-def test_five_updates_are_told_and_half_a_metre_is_tolerated():
+def test_five_updates_are_told_and_half_a_metre_is_tolerated(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.undo()
+
     def tolerant(x: float) -> list[float | None]:
         drive = collected([tick(0)], [Pose(x, 0.0, 0.0)])
         out = PlaceAccuracy().step(Context("hits"), drive, [believed(0)], [believed(0)], ROW)
@@ -115,7 +121,7 @@ def test_an_image_without_a_belief_is_an_update_that_does_not_count_and_odometry
     drive = collected([tick(k) for k in range(3)], [Pose(0.0, 0.0, 0.0)] * 3)
     beliefs = [believed(0), None, believed(1)]
     given = Context("hits"), drive, beliefs, [believed(0), None, None]
-    found = PlaceAccuracy(updates=3).step(*given, ROW).metrics.values["localisation"]
+    found = PlaceAccuracy().step(*given, ROW).metrics.values["localisation"]
     assert found["accuracy_after"] == [1.0, None, 0.0]
     assert found["images"] == 2
     assert PlaceAccuracy().step(*given, dataclasses.replace(ROW, pose_source="odometry")).metrics is None

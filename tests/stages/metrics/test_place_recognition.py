@@ -27,11 +27,15 @@ def test_an_image_far_from_every_reference_does_not_count():
     assert (nowhere["queries"], nowhere["recall_at_1"]) == (0, None)
 
 
-def test_references_are_ranked_by_their_best_heading_and_named_by_their_number_in_the_map():
+def test_references_are_ranked_by_their_best_heading_and_named_by_their_number_in_the_map(
+    monkeypatch: pytest.MonkeyPatch,
+):
     values = np.array([[0.1, 0.2], [0.9, 0.0], [0.3, 0.5]], np.float32)
-    assert RankReferences(best=2).step(CTX, Similarities(values, None)).ranked.references.tolist() == [1, 2]
+    monkeypatch.setattr("omninav.stages.metrics.place_recognition.BEST", 2)
+    assert RankReferences().step(CTX, Similarities(values, None)).ranked.references.tolist() == [1, 2]
     some = Similarities(values, np.array([7, 3, 9]))
-    assert RankReferences(best=2).step(CTX, some).ranked.references.tolist() == [3, 9]
+    monkeypatch.setattr("omninav.stages.metrics.place_recognition.BEST", 2)
+    assert RankReferences().step(CTX, some).ranked.references.tolist() == [3, 9]
 
 
 def test_a_run_whose_best_reference_is_always_the_nearest_has_full_recall_and_none_without_truth():
@@ -43,7 +47,7 @@ def test_a_run_whose_best_reference_is_always_the_nearest_has_full_recall_and_no
     assert PlaceRecognition().step(CTX, run.blind, ranked, run.map).metrics is None
 
 
-def test_recall_is_told_for_several_numbers_and_distances():
+def test_recall_is_told_for_several_numbers_and_distances(monkeypatch: pytest.MonkeyPatch):
     ranked = [np.array([5, 4, 3, 2, 1, 0]), np.array([1, 0, 2, 3, 4, 5])]
     found = [recalls(np.full((2, 2), (3.0, 0.0)), ranked, REFERENCES, metres) for metres in (2.0, 4.0, 8.0)]
     assert [each["queries"] for each in found] == [0, 2, 2]
@@ -51,7 +55,8 @@ def test_recall_is_told_for_several_numbers_and_distances():
     assert found[2]["recall_at_1"] == 0.5
     run = small_run(frames=20)
     lists = [RankedReferences(np.array([0])) for _ in run.truth]
-    out = PlaceRecognition(distances_m=(0.5, 100.0)).step(CTX, run.drive, lists, run.map)
+    monkeypatch.setattr("omninav.stages.metrics.place_recognition.DISTANCES_M", (0.5, 100.0))
+    out = PlaceRecognition().step(CTX, run.drive, lists, run.map)
     assert out.metrics.values["place_recognition"]["at_distances"]["recall_at_1"][1] == 1.0
     assert [row[0] for row in out.table.rows] == ["0.5", "100"]
 
@@ -104,7 +109,7 @@ def test_ten_references_are_kept_the_first_of_equals_first_and_none_where_none_w
     assert RankReferences().step(CTX, Similarities(values[:0], None)).ranked.references.tolist() == []
 
 
-def test_an_image_without_a_ranking_is_not_recalled_and_only_the_last_log_counts():
+def test_an_image_without_a_ranking_is_not_recalled_and_only_the_last_log_counts(monkeypatch: pytest.MonkeyPatch):
     run = small_run(frames=10, logs=2)
     away = [np.hypot(*(run.map.poses[:, :2] - (pose.x, pose.y)).T) for pose in run.truth]
     ranked = [RankedReferences(np.argsort(-metres)) for metres in away[:10]]
@@ -112,7 +117,8 @@ def test_an_image_without_a_ranking_is_not_recalled_and_only_the_last_log_counts
     ranked[12] = None
     drive = run.drive
     drive.truth[13] = np.nan
-    out = PlaceRecognition(distances_m=(2.0,)).step(CTX, drive, ranked, run.map)
+    monkeypatch.setattr("omninav.stages.metrics.place_recognition.DISTANCES_M", (2.0,))
+    out = PlaceRecognition().step(CTX, drive, ranked, run.map)
     found = out.metrics.values["place_recognition"]
     assert (found["queries"], found["recall_at_1"], found["distance_m"]) == (9, pytest.approx(8 / 9), 2.0)
     assert found["at_distances"]["queries"] == [9]
@@ -123,11 +129,12 @@ def test_an_image_without_a_ranking_is_not_recalled_and_only_the_last_log_counts
     assert PlaceRecognition().step(CTX, drive, ranked, reference_graph(0)).metrics is None
 
 
-def test_recall_is_told_at_half_a_metre_one_two_and_five():
+def test_recall_is_told_at_half_a_metre_one_two_and_five(monkeypatch: pytest.MonkeyPatch):
     run = small_run(frames=5)
     lists = [RankedReferences(np.array([0])) for _ in run.truth]
     far = dataclasses.replace(run.map, poses=run.map.poses + 1000.0)
     out = PlaceRecognition().step(CTX, run.drive, lists, far)
     assert out.table.rows == tuple((name, "–", "–", "–", 0) for name in ("0.5", "1", "2", "5"))
-    alone = PlaceRecognition(distances_m=()).step(CTX, run.drive, lists, run.map)
+    monkeypatch.setattr("omninav.stages.metrics.place_recognition.DISTANCES_M", ())
+    alone = PlaceRecognition().step(CTX, run.drive, lists, run.map)
     assert alone.metrics.values["place_recognition"]["at_distances"] == {}

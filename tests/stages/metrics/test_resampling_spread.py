@@ -69,7 +69,8 @@ def test_they_agree_above_a_density_of_a_ten_thousandth():
     assert [frames(limit - 0.001), frames(limit + 0.001)] == [1, 0]
 
 
-def test_at_the_limit_itself_they_do_not_agree():
+def test_at_the_limit_itself_they_do_not_agree(monkeypatch: pytest.MonkeyPatch):
     near, there = two(0.1, 0.0), seen(1.0)
-    stage = ResamplingSpread(agree_above=agreement(near, there))
+    monkeypatch.setattr("omninav.stages.metrics.resampling_spread.AGREE_ABOVE", agreement(near, there))
+    stage = ResamplingSpread()
     assert stage.step(CTX, [near], [there], [near]).metrics.values["resampling"]["frames"] == 0

@@ -8,7 +8,7 @@ from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 
 
-def test_the_error_at_home_is_that_of_the_frames_at_the_end_of_each_lap():
+def test_the_error_at_home_is_that_of_the_frames_at_the_end_of_each_lap(monkeypatch: pytest.MonkeyPatch):
     # Three rounds on a circle of 10 m, 40 frames each. The estimate is 1, 2 and 3 m too high in them.
     angles = 2 * np.pi * np.arange(121) / 40
     truth = [Pose(10 * np.cos(a), 10 * np.sin(a), a + np.pi / 2) for a in angles.tolist()]
@@ -16,7 +16,8 @@ def test_the_error_at_home_is_that_of_the_frames_at_the_end_of_each_lap():
     estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
     motion = [None, *(Motion(1.0, 0.0, 0.0) for _ in range(120))]
     drive = collected([Tick(n, n, 0, n, n == 0) for n in range(121)], truth, motion, estimates)
-    returns = ReturnsHome(frames=3).step(Context("metric"), drive).metrics.values["returns"]
+    monkeypatch.setattr("omninav.stages.metrics.returns_home.FRAMES", 3)
+    returns = ReturnsHome().step(Context("metric"), drive).metrics.values["returns"]
     assert [each["step"] for each in returns] == [40, 80]
     assert [each["position_error_m"] for each in returns] == pytest.approx([2.0, 3.0])
     path = drive.odometry_alone()
@@ -29,7 +30,9 @@ def test_nothing_is_measured_without_truth():
     assert ReturnsHome().step(Context("metric"), collected([Tick(0, 0)], [None])).metrics is None
 
 
-def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_estimate_do_not():
+def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_estimate_do_not(
+    monkeypatch: pytest.MonkeyPatch,
+):
     # Out to 4.5 m and back, twice; the estimate is off by the frame's number.
     xs = [0.0, 4.5, 0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 4.5, 0.0]
     truth = [Pose(50.0, 0.0, 0.0), None, *[Pose(x, 0.0, 0.0) for x in xs]]
@@ -40,9 +43,12 @@ def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_e
     returns = ReturnsHome().step(Context("metric"), collected(ticks, truth, None, estimates)).metrics.values["returns"]
     # Home at frame 5 of the run, which is frame 4 of its log; then frames 6, 8, 9, 10.
     assert returns == [{"step": 4, "position_error_m": pytest.approx(38 / 5), "odometry_error_m": None}]
-    few = ReturnsHome(frames=1, home_m=2.2).step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
+    monkeypatch.setattr("omninav.stages.metrics.returns_home.FRAMES", 1)
+    monkeypatch.setattr("omninav.stages.metrics.returns_home.HOME_M", 2.2)
+    few = ReturnsHome().step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
     assert few["returns"][0]["position_error_m"] == 5.0
-    wide = ReturnsHome(home_m=2.3).step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
+    monkeypatch.setattr("omninav.stages.metrics.returns_home.HOME_M", 2.3)
+    wide = ReturnsHome().step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
     assert wide["returns"] == []
 
 

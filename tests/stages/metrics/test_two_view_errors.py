@@ -43,8 +43,9 @@ def test_a_turn_is_measured_about_any_axis(axis, turn):
     assert measured["success_rate"] == 0.0
 
 
-def test_an_error_at_the_limit_is_solved():
-    exact = errors([view(0.0, 0.0)], [view(90.0, 90.0)], within_deg=90.0)
+def test_an_error_at_the_limit_is_solved(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.two_view_errors.WITHIN_DEG", 90.0)
+    exact = errors([view(0.0, 0.0)], [view(90.0, 90.0)])
     assert exact["success_rate"] == 1.0
 
 

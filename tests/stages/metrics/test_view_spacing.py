@@ -32,8 +32,9 @@ def test_each_view_is_as_far_as_its_nearest_other_one_in_views_and_in_metres():
     assert found["between_views"]["unevenness"] == pytest.approx(np.std([5, 1, 1, 7]) / 3.5)
 
 
-def test_of_many_views_only_some_are_asked_but_all_are_neighbours():
-    found = spacing(a_map([(k * k, 0) for k in range(9)], [(k, 0) for k in range(9)]), max_views=3)["spacing"]
+def test_of_many_views_only_some_are_asked_but_all_are_neighbours(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.view_spacing.MAX_VIEWS", 3)
+    found = spacing(a_map([(k * k, 0) for k in range(9)], [(k, 0) for k in range(9)]))["spacing"]
     assert found["between_views"]["mean"] == pytest.approx((1 + 7 + 15) / 3)  # of views 0, 4 and 8
 
 

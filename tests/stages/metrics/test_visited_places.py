@@ -23,12 +23,14 @@ def there_and_back(times: int, drift: float, kept: float):
     return collected([Tick(n, n * 10**9) for n in range(len(truth))], truth, motion, estimates)
 
 
-def test_errors_are_those_of_the_odometry_of_the_first_visit():
-    found = VisitedPlaces(away_m=0.5).step(CTX, there_and_back(3, 0.1, 1.0)).metrics.values["first_visits"]
+def test_errors_are_those_of_the_odometry_of_the_first_visit(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.visited_places.AWAY_M", 0.5)
+    found = VisitedPlaces().step(CTX, there_and_back(3, 0.1, 1.0)).metrics.values["first_visits"]
     assert found["places"] == 11
     assert found["ratio"] == pytest.approx(1.0)
     assert found["correlation"] == pytest.approx(1.0)
-    halved = VisitedPlaces(away_m=0.5).step(CTX, there_and_back(3, 0.1, 0.5)).metrics.values["first_visits"]
+    monkeypatch.setattr("omninav.stages.metrics.visited_places.AWAY_M", 0.5)
+    halved = VisitedPlaces().step(CTX, there_and_back(3, 0.1, 0.5)).metrics.values["first_visits"]
     assert halved["ratio"] == pytest.approx(0.5)
     assert halved["odometry_error_m"] == pytest.approx(0.5)
 
@@ -39,10 +41,11 @@ def test_a_place_is_visited_again_once_the_robot_has_been_away():
     assert visit_numbers(cells, ways, 5.0).tolist() == [1, 1, 1, 1, 1, 1, 2, 3]
 
 
-def test_each_number_of_visits_has_its_own_mean():
+def test_each_number_of_visits_has_its_own_mean(monkeypatch: pytest.MonkeyPatch):
     drive = there_and_back(2, 0.1, 1.0)
     drive.estimate[20:, 1] += 1.0  # the second time
-    visits = VisitedPlaces(away_m=0.5).step(CTX, drive).metrics.values["visits"]
+    monkeypatch.setattr("omninav.stages.metrics.visited_places.AWAY_M", 0.5)
+    visits = VisitedPlaces().step(CTX, drive).metrics.values["visits"]
     # The nine places between the ends are passed four times, 0.1 to 0.9 m off; the ends twice.
     assert visits == {"number": [1, 2, 3, 4], "position_error_m": pytest.approx([0.5, 0.5, 1.5, 1.5]), "places": 9}
 
@@ -77,17 +80,18 @@ def test_a_place_is_a_square_of_a_metre_and_another_visit_begins_beyond_five():
     assert visits == {"visits": {"number": [1], "position_error_m": [pytest.approx(first)], "places": 4}}
 
 
-def seen_at(places: list[tuple[float, float, float]], **parameters):
+def seen_at(places: list[tuple[float, float, float]]):
     """`visits` of a robot that was at these true poses, with estimates 1 m off."""
     truth = [Pose(*place) for place in places]
     seen = [PoseEstimate(Pose(x, y + 1.0, turn), np.eye(3), 1.0, Pose(x, y, turn)) for x, y, turn in places]
     drive = collected([Tick(n, n) for n in range(len(truth))], truth, None, seen)
-    return VisitedPlaces(**parameters).step(CTX, drive).metrics.values["visits"]
+    return VisitedPlaces().step(CTX, drive).metrics.values["visits"]
 
 
-def test_a_place_is_a_cell_of_the_floor_whichever_way_the_robot_looks():
+def test_a_place_is_a_cell_of_the_floor_whichever_way_the_robot_looks(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.metrics.visited_places.PLACE_M", 2.0)
     places = [(0.5, 0.5, 0.0), (1.5, 1.5, 2.0), (2.0, 0.5, 0.0), (0.5, 2.5, 0.0)]
-    assert seen_at(places, place_m=2.0) == {"number": [1], "position_error_m": [1.0], "places": 3}
+    assert seen_at(places) == {"number": [1], "position_error_m": [1.0], "places": 3}
 
 
 def test_five_and_a_half_metres_are_away():

@@ -48,8 +48,9 @@ def life():
     return driven(truth), events, mixtures
 
 
-def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(life):
-    found = WrongPlaces(points=6).step(CTX, *life).metrics.values["wrong_places"]
+def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(monkeypatch: pytest.MonkeyPatch, life):
+    monkeypatch.setattr("omninav.stages.metrics.wrong_places.POINTS", 6)
+    found = WrongPlaces().step(CTX, *life).metrics.values["wrong_places"]
     assert found["references"] == 2
     assert found["kept"] == 1
     assert found["along_m"] == [0.0, 1.0]
@@ -59,11 +60,12 @@ def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(l
     assert found["example"]["weight"] == [0.0, 1.0, 1.0, 0.5, 0.0, 0.0]
 
 
-def test_a_reference_that_is_removed_holds_no_place(life):
+def test_a_reference_that_is_removed_holds_no_place(monkeypatch: pytest.MonkeyPatch, life):
     drive, events, mixtures = life
     events[3] = event(removed=[1, 2])
     mixtures[3:] = [None, None, None]
-    found = WrongPlaces(points=6).step(CTX, drive, events, mixtures).metrics.values["wrong_places"]
+    monkeypatch.setattr("omninav.stages.metrics.wrong_places.POINTS", 6)
+    found = WrongPlaces().step(CTX, drive, events, mixtures).metrics.values["wrong_places"]
     assert found["kept"] == 0
     assert found["gone_after_steps"] == [2, 1]
 
@@ -78,7 +80,7 @@ def test_what_is_learned_late_is_held_against_where_it_was_seen(life):
     drive = life[0]
     late = [event()] * 4 + [event([0], seen=[1]), event()]
     parts = [None] * 4 + [mixture((0, 1.0, 1.0)), None]
-    near = WrongPlaces(wrong_m=2.0).step(CTX, drive, late, parts).metrics.values["wrong_places"]
+    near = WrongPlaces().step(CTX, drive, late, parts).metrics.values["wrong_places"]
     assert near["references"] == 0
 
 
@@ -120,18 +122,20 @@ def test_a_place_is_wrong_beyond_two_metres():
     assert (found["references"], found["kept"]) == (1, 1)
 
 
-def test_what_was_not_seen_on_this_drive_or_where_no_truth_is_does_not_count():
+def test_what_was_not_seen_on_this_drive_or_where_no_truth_is_does_not_count(monkeypatch: pytest.MonkeyPatch):
     truth = driven([None, Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 0.0)])
     events = [event([1], seen=[0]), event([2], seen=[1]), event()]
     parts = [mixture((0, 50.0, 1.0), (1, 50.0, 1.0)), mixture((0, 50.0, 1.0), (1, 50.0, 1.0), (2, 50.0, 1.0)), None]
-    found = WrongPlaces(points=3).step(CTX, truth, events, parts).metrics.values["wrong_places"]
+    monkeypatch.setattr("omninav.stages.metrics.wrong_places.POINTS", 3)
+    found = WrongPlaces().step(CTX, truth, events, parts).metrics.values["wrong_places"]
     assert found["references"] == 1
     assert found["weight"] == [None, 1.0, 1.0]
 
 
-def test_a_reference_without_any_weight_holds_no_place(life):
+def test_a_reference_without_any_weight_holds_no_place(monkeypatch: pytest.MonkeyPatch, life):
     events, parts = [event([0]), *[event()] * 5], [mixture((0, 9.0, 1.0)), mixture((0, 9.0, 0.0)), *[None] * 4]
-    found = WrongPlaces(points=6).step(CTX, life[0], events, parts).metrics.values["wrong_places"]
+    monkeypatch.setattr("omninav.stages.metrics.wrong_places.POINTS", 6)
+    found = WrongPlaces().step(CTX, life[0], events, parts).metrics.values["wrong_places"]
     assert found["weight"] == [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert found["gone_after_steps"] == [1]
 

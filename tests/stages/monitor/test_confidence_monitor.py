@@ -134,17 +134,16 @@ def test_chance_is_small_where_images_are_taken_everywhere_and_large_where_all_l
     assert LearnWrongPoseAgreement(within_m=0.2).step(ctx, alike, LengthScale(0.05)).when_wrong.share > 0.1
 
 
-def test_chance_in_a_map_of_one_image_is_the_least():
+def test_chance_in_a_map_of_one_image_is_the_least(monkeypatch: pytest.MonkeyPatch):
     lone = ReferenceGraph(LINE.poses[:1], LINE.features[:1], "histograms", LINE.edges, "truth")
     assert LearnWrongPoseAgreement().step(Context("chance"), lone, SCALE).when_wrong.share == 0.005
-    assert math.isclose(
-        LearnWrongPoseAgreement(min_share=0.1).step(Context("chance"), lone, SCALE).when_wrong.share, 0.1
-    )
+    monkeypatch.setattr("omninav.stages.monitor.wrong_pose_agreement.MIN_SHARE", 0.1)
+    assert math.isclose(LearnWrongPoseAgreement().step(Context("chance"), lone, SCALE).when_wrong.share, 0.1)
 
 
 def test_images_are_forgotten_as_new_ones_come_and_hardly_while_the_robot_stands():
     monitor, recent, belief = (
-        ConfidenceMonitor(memory=20.0),
+        ConfidenceMonitor(),
         ConfidenceMonitorState(),
         Particles(np.zeros((5, 3)), np.full(5, 0.2)),
     )

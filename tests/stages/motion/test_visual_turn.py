@@ -72,14 +72,15 @@ def test_nothing_to_see_leaves_odometry_alone():
     assert corrected(motion, max_sigma_deg=0.0) is motion
 
 
-def test_strips_of_few_columns_leave_odometry_alone():
+def test_strips_of_few_columns_leave_odometry_alone(monkeypatch: pytest.MonkeyPatch):
     few = [
         Panorama(cv2.resize(cv2.resize(view.pixels, (90, 20), interpolation=cv2.INTER_AREA), (COLUMNS, ROWS)))
         for view in (BEFORE, AFTER)
     ]
     motion = Motion(0.2, 0.0, 0.13)
     assert corrected(motion, *few) is motion
-    assert corrected(motion, *few, max_smoothness=4.0) is not motion
+    monkeypatch.setattr("omninav.stages.motion.visual_turn.MAX_SMOOTHNESS", 4.0)
+    assert corrected(motion, *few) is not motion
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 3), (1, 8, 3), (80, 3, 3), (2, 360, 3)])

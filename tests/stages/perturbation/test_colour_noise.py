@@ -59,8 +59,10 @@ def test_without_a_pattern_it_follows_the_seed():
     assert (covered(stage, 3, seed=1) == covered(stage, 3, seed=1)).all()
 
 
-def test_noise_has_the_mean_and_spread_asked_for_and_the_rest_is_untouched():
-    pixels = covered(ColourNoise(share=0.5, mean=120.0, sigma=20.0))
+def test_noise_has_the_mean_and_spread_asked_for_and_the_rest_is_untouched(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.perturbation.colour_noise.MEAN", 120.0)
+    monkeypatch.setattr("omninav.stages.perturbation.colour_noise.SIGMA", 20.0)
+    pixels = covered(ColourNoise(share=0.5))
     noisy = (pixels != 7).any(axis=2)
     assert noisy.mean() == pytest.approx(0.5, abs=0.01)
     assert pixels[noisy].mean(axis=0) == pytest.approx([120.0] * 3, abs=1.0)

@@ -1,5 +1,6 @@
 import cv2
 import numpy as np
+import pytest
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
@@ -34,23 +35,25 @@ def test_views_are_counted_cell_by_cell():
     np.testing.assert_array_equal(views_by_cell(areas), counts)
 
 
-def test_areas_are_drawn_over_the_grid_the_same_every_time():
+def test_areas_are_drawn_over_the_grid_the_same_every_time(monkeypatch: pytest.MonkeyPatch):
     areas = visibility_areas(POSES, ROOM, axes_of(3))
     driven = collected([Tick(k, k) for k in range(10)], [Pose(1.0 + 0.1 * k, 1.0, 0.0) for k in range(10)])
-    figure = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, driven).figure
+    monkeypatch.setattr("omninav.stages.plots.visibility_areas.EXAMPLES", 2)
+    figure = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
     assert pixels(figure.content).std() > 20
     assert "2 of 4 references" in figure.caption
     assert "3 points lambda" in figure.caption
-    again = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, driven).figure
+    again = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
     assert again.content == figure.content
-    without = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM).figure
+    without = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM).figure
     assert without.content != figure.content
 
 
-def test_a_stand_in_is_called_one():
+def test_a_stand_in_is_called_one(monkeypatch: pytest.MonkeyPatch):
     areas = visibility_areas(POSES, ROOM, axes_of(1))
     grid = OccupancyGrid(ROOM.cells, ROOM.resolution, ROOM.origin, "tour")
-    assert "stand-in" in ShowVisibilityAreas(examples=1).step(CTX, MAP, areas, grid).figure.caption
+    monkeypatch.setattr("omninav.stages.plots.visibility_areas.EXAMPLES", 1)
+    assert "stand-in" in ShowVisibilityAreas().step(CTX, MAP, areas, grid).figure.caption
 
 
 def test_a_grid_lies_under_paths_where_it_is_wired():

@@ -187,7 +187,7 @@ def test_a_grid_that_is_not_there_is_named(tmp_path):
 
 def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
     ctx = Context("grid")
-    stage = PlaceGrid(grid="from_tour", log="drive.mcap", path_half_width=2.0, resolution_m=0.1)
+    stage = PlaceGrid(grid="from_tour", log="drive.mcap", resolution_m=0.1)
     out = stage.step(ctx, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
     assert out.grid.made_from == "tour"
     assert ctx.counts["grid_is_a_stand_in"] == 1

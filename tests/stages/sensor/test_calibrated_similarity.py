@@ -35,7 +35,7 @@ def weighed(poses: np.ndarray, motion: Motion | None = None, calibration: Simila
 
 
 def test_at_a_reference_the_weight_is_its_ratio_over_the_largest():
-    ratios = likelihood_ratios(similarities(), CALIBRATION, 0.1)
+    ratios = likelihood_ratios(similarities(), CALIBRATION)
     found = weighed(PLACES).likelihood.values
     top = float(ratios.max())
     assert top == ratios[5, 0]
@@ -45,7 +45,7 @@ def test_at_a_reference_the_weight_is_its_ratio_over_the_largest():
 
 
 def test_far_from_all_references_the_ratio_is_one():
-    top = float(likelihood_ratios(similarities(), CALIBRATION, 0.1).max())
+    top = float(likelihood_ratios(similarities(), CALIBRATION).max())
     assert weighed(np.array([[5.0, 40.0, 0.0]])).likelihood.values[0] == pytest.approx(1 / top, rel=1e-5)
 
 

@@ -15,6 +15,7 @@ from omninav.stages.sensor.expected_observation import ExpectedObservation, simi
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
@@ -49,7 +50,7 @@ def test_colours_are_compared_by_their_distance() -> None:
 
 def test_the_particle_where_the_view_was_taken_wins() -> None:
     map = ReferenceGraph(REFERENCES, FEATURES, "histograms", np.zeros((0, 2), np.int64), "truth")
-    stage, ctx = ExpectedObservation(length_scale_m=0.1), Context("sensor", np.random.default_rng(0))
+    stage, ctx = ExpectedObservation(), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     seen = np.roll(FEATURES[3], 3, axis=0)  # a robot there, turned left by a quarter
     poses = np.array(
@@ -57,9 +58,9 @@ def test_the_particle_where_the_view_was_taken_wins() -> None:
     )
     field = RNG.uniform(0.3, 0.5, (40, 12)).astype(np.float32)
     field[3, 3] = 1.0
-    out = stage.step(
-        ctx, Similarities(field, exponent=0.5), SegmentHistograms(seen), Particles(poses, np.full(4, 0.25)), map
-    )
+    belief = Particles(poses, np.full(4, 0.25))
+    seen_here = Similarities(field, exponent=0.5), SegmentHistograms(seen), belief, map
+    out = stage.step(ctx, *seen_here, length_scale=LengthScale(0.1))
     likelihood = out.likelihood.values
     assert np.argmax(likelihood) == 0
     assert likelihood[0] > 100 * likelihood[1:].max()
@@ -70,10 +71,10 @@ def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L
     colours = (RNG.random((40, 9, 3)) * 60).astype(np.float32)
     map, seen = ReferenceGraph(REFERENCES, colours, "colours", np.zeros((0, 2), np.int64), "truth"), colours[4] + 5
     alike = match.step(Context("match"), SegmentColours(seen), map).similarities
-    stage, ctx = ExpectedObservation(length_scale_m=0.1, power=5.0), Context("sensor", np.random.default_rng(0))
+    stage, ctx = ExpectedObservation(power=5.0), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     belief = Particles(REFERENCES, np.full(40, 1 / 40))
-    likelihood = stage.step(ctx, alike, SegmentColours(seen), belief, map).likelihood.values
+    likelihood = stage.step(ctx, alike, SegmentColours(seen), belief, map, None, LengthScale(0.1)).likelihood.values
     # A particle at a reference is as likely as the best of the compared ones, and no other is much likelier.
     assert likelihood[4] == pytest.approx(1.0, abs=0.05)
     assert likelihood.max() < 1.05

@@ -66,11 +66,16 @@ def test_references_that_were_not_compared_do_not_count() -> None:
 
 
 def step(
-    stage: NearReferences, poses: np.ndarray, field: np.ndarray, motion: Motion | None = None
+    stage: NearReferences,
+    poses: np.ndarray,
+    field: np.ndarray,
+    motion: Motion | None = None,
+    length_scale: LengthScale | None = None,
 ) -> NearReferences.Out:
     ctx = Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
-    return stage.step(ctx, Similarities(field), Particles(poses, np.full(len(poses), 1 / len(poses))), a_map(), motion)
+    particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
+    return stage.step(ctx, Similarities(field), particles, a_map(), motion, length_scale)
 
 
 def one_good_match() -> np.ndarray:
@@ -82,7 +87,7 @@ def one_good_match() -> np.ndarray:
 def test_the_particle_at_the_matching_reference_and_heading_wins() -> None:
     right = REFERENCES[3] + np.array([0.0, 0.0, np.pi / 2])
     poses = np.array([right, REFERENCES[3] - (0.0, 0.0, np.pi / 2), REFERENCES[7], [50.0, 50.0, 0.0]])
-    likelihood = step(NearReferences(length_scale_m=0.1), poses, one_good_match()).likelihood.values
+    likelihood = step(NearReferences(), poses, one_good_match(), None, LengthScale(0.1)).likelihood.values
     assert np.argmax(likelihood) == 0
     assert likelihood[0] > 100 * likelihood[1:].max()
 
@@ -90,7 +95,7 @@ def test_the_particle_at_the_matching_reference_and_heading_wins() -> None:
 def test_off_the_map_is_as_likely_as_the_background() -> None:
     field = RNG.uniform(0.3, 0.5, (40, 36)).astype(np.float32)
     poses = np.concatenate([REFERENCES, [[50.0, 50.0, 0.0]]])
-    values = step(NearReferences(background_quantile=0.5, length_scale_m=0.2), poses, field).likelihood.values
+    values = step(NearReferences(background_quantile=0.5), poses, field, None, LengthScale(0.2)).likelihood.values
     assert values.min() > 0
     assert values[-1] == pytest.approx(values.min())
     assert np.isclose(values, values[-1]).sum() > len(poses) / 4
@@ -151,21 +156,21 @@ def test_distances_are_in_length_scales() -> None:
 def test_the_next_image_of_a_standing_robot_is_little_evidence() -> None:
     poses, stage = (
         REFERENCES + np.array([0.0, 0.0, np.pi / 2]),
-        NearReferences(independence_distance=0.4, min_novelty=0.1),
+        NearReferences(independence_distance=0.4),
     )
     moving = step(stage, poses, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood.values
     standing = step(stage, poses, one_good_match(), Motion(0.0, 0.0, 1.0)).likelihood.values
     half = step(stage, poses, one_good_match(), Motion(0.06, 0.08, 0.0)).likelihood.values
-    assert np.allclose(standing, moving**0.1)
+    assert np.allclose(standing, moving**0.05)
     assert np.allclose(half, moving**0.5)
 
 
 def test_the_mean_likelihood_takes_the_whole_evidence_of_an_image() -> None:
     # To a robot kidnapped just now the image is new.
-    stage = NearReferences(independence_distance=0.4, min_novelty=0.1)
+    stage = NearReferences(independence_distance=0.4)
     moving = step(stage, REFERENCES, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood
     standing = step(stage, REFERENCES, one_good_match(), Motion(0.0, 0.0, 0.0)).likelihood
-    assert (moving.novelty, standing.novelty) == (1.0, 0.1)
+    assert (moving.novelty, standing.novelty) == (1.0, 0.05)
     assert standing.mean_likelihood == moving.mean_likelihood
 
 

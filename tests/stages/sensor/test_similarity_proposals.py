@@ -36,13 +36,16 @@ def test_where_all_or_nothing_rises_above_the_floor_cells_are_drawn_by_weight_to
 
 
 @pytest.mark.parametrize("candidates", [None, np.arange(2, 20)], ids=["all compared", "some compared"])
-def test_poses_are_drawn_around_the_best_reference_and_heading(candidates: np.ndarray | None) -> None:
+def test_poses_are_drawn_around_the_best_reference_and_heading(
+    monkeypatch: pytest.MonkeyPatch, candidates: np.ndarray | None
+) -> None:
     values = np.full((40, 36), 0.5, np.float32)
     values[3, 9] = 0.9  # at reference 3, for a robot turned left by a quarter
     similarities = Similarities(values if candidates is None else values[candidates], candidates)
     ctx = Context("proposals", np.random.default_rng(0))
     field = similarity_field(similarities, 0.5, 0.9, 30.0)
-    proposals = SimilarityProposals(number=400, spread=0.1).step(ctx, field, MAP).proposals
+    monkeypatch.setattr("omninav.stages.sensor.similarity_proposals.SPREAD", 0.1)
+    proposals = SimilarityProposals(number=400).step(ctx, field, MAP).proposals
     assert proposals is not None
     assert proposals.weights.sum() == pytest.approx(1.0)
     gap = np.hypot(*(proposals.poses[:, :2] - REFERENCES[3, :2]).T)

@@ -274,10 +274,10 @@ def test_the_mean_of_the_database_counts_a_sampled_reference_as_all_that_it_stan
 
 
 def test_images_of_a_standing_robot_are_little_evidence_with_an_independence_distance():
-    assert evidence_novelty(0.1, 0.0, 0.05) == 1.0
-    assert evidence_novelty(None, 0.5, 0.05) == 1.0
-    assert evidence_novelty(0.0, 0.5, 0.05) == 0.05
-    assert evidence_novelty(0.1, 0.5, 0.05) == pytest.approx(0.2)
+    assert evidence_novelty(0.1, 0.0) == 1.0
+    assert evidence_novelty(None, 0.5) == 1.0
+    assert evidence_novelty(0.0, 0.5) == 0.05
+    assert evidence_novelty(0.1, 0.5) == pytest.approx(0.2)
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(50)
     stage, particles = Visibility(power=1.0, independence_distance=0.75), Particles(poses, np.full(50, 0.02))
@@ -302,7 +302,7 @@ def test_calibrated_views_count_less_the_farther_off_they_were_taken_and_an_unkn
     found = stage.step(
         Context("sensor"), Similarities(values), particles, a_map(), areas, None, LengthScale(0.4), calibration
     )
-    ratios = likelihood_ratios(Similarities(values), calibration, 0.1).astype(float)
+    ratios = likelihood_ratios(Similarities(values), calibration).astype(float)
     raised = ratios / ratios.max()
     mean = float(raised.mean())
     assert found.likelihood.mean_likelihood == pytest.approx(mean)

@@ -16,7 +16,7 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
-from omninav.stages.simulator.record_log import record_log
+from omninav.stages.simulator.record_log import metres, record_log
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
@@ -55,6 +55,15 @@ def test_a_lifted_robot_is_elsewhere_in_the_truth_and_nowhere_else():
     moments = drive.stamps[leaps] - drive.times[0]
     assert [round(moment / 1e9, 2) for moment in moments] == [3.02, 4.52]
     assert off[leaps[0], 2] == pytest.approx(1.0)
+
+
+def test_the_way_that_a_robot_is_carried_is_not_driven():
+    way = [metres(SimulatedRecording(EXACT, "there", 1, lifts)) for lifts in ((), KIDNAPPED[:1])]
+    assert way[1] == pytest.approx(way[0], abs=0.2)
+    carried = SimulatedRecording(EXACT, "there", 1, (Kidnapping(at=3.0, to=(2.0, 1.5, 0.0)),))
+    leap = np.hypot(*np.diff(carried.true_poses[:, :2], axis=0)[carried.carried].T)
+    assert metres(carried) + leap.sum() == pytest.approx(np.hypot(*np.diff(carried.true_poses[:, :2], axis=0).T).sum())
+    assert leap[0] > 0.3
 
 
 def test_a_routes_own_events_come_with_it_and_others_on_top():

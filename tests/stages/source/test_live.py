@@ -322,7 +322,7 @@ def test_an_image_waits_for_truth_half_as_long_as_for_odometry(
 ):
     now = [1000.0]
     monkeypatch.setattr(intake, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    drive = Drive(tmp_path, patience_s=1.0)
+    drive = Drive(tmp_path)
     drive.join()
     messages = said()
     image = next(n for n, each in enumerate(messages) if each.topic == "/camera/image/compressed" and n > 100)
