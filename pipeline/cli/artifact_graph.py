@@ -10,9 +10,10 @@ from typing import Any
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
+from omninav.pipeline.graph.parameters import BadStage
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
-from omninav.pipeline.graph.signature import BadStage, signature
+from omninav.pipeline.graph.signature import signature
 
 from .config_groups import LEARN, node_option, option_content
 from .words import word_of
