@@ -46,19 +46,19 @@ class ConfidenceMonitorState(State):
     """Where the robot would be now if each of the last images had been taken where its best match was: `places` (M, 3),
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
-    `doubts` (M,) how much each image still counts against its own; `contradicted` is the last image's share of it."""
+    `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
     weights: Array = field(default_factory=lambda: np.zeros(0))
     estimates: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    doubts: Array = field(default_factory=lambda: np.zeros(0))
+    contradictions: Array = field(default_factory=lambda: np.zeros(0))
     contradicted: float = 0.0
 
     def forget(self) -> None:
         """Begin anew: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
-        self.novelties, self.weights, self.doubts = np.zeros(0), np.zeros(0), np.zeros(0)
+        self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
         self.contradicted = 0.0
 
     def move(self, motion: Motion) -> None:
@@ -66,14 +66,14 @@ class ConfidenceMonitorState(State):
         moved = np.array((motion.x, motion.y, motion.turn))
         self.places, self.estimates = compose(self.places, moved), compose(self.estimates, moved)
 
-    def add(self, place: Array, estimate: Array, novelty: float, weight: float, doubt: float, memory: float) -> None:
-        """Remember an image; the older ones count less by what this one counts, 1 / e after `memory` full ones."""
-        fading = math.exp(-max(weight, doubt) / memory)
+    def add(self, place: Array, estimate: Array, novelty: float, weight: float, contradiction: float) -> None:
+        """Remember an image; the older ones count less by what this one counts, 1 / e after `MEMORY` full ones."""
+        fading = math.exp(-max(weight, contradiction) / MEMORY)
         self.places = np.concatenate((self.places, place[None]))[-MAX_IMAGES:]
         self.estimates = np.concatenate((self.estimates, estimate[None]))[-MAX_IMAGES:]
         self.novelties = np.concatenate((self.novelties, (novelty,)))[-MAX_IMAGES:]
         self.weights = np.concatenate((self.weights * fading, (weight,)))[-MAX_IMAGES:]
-        self.doubts = np.concatenate((self.doubts * fading, (doubt,)))[-MAX_IMAGES:]
+        self.contradictions = np.concatenate((self.contradictions * fading, (contradiction,)))[-MAX_IMAGES:]
 
 
 class ConfidenceMonitor(Stage):
@@ -136,12 +136,13 @@ class ConfidenceMonitor(Stage):
             repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
             first = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
-            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against, MEMORY)
+            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against)
         elif motion is not None and (blind := math.hypot(motion.x, motion.y) / length_scale.metres) > 0.0:
-            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0, MEMORY)
+            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0)
         agreeing = consistency(recent.places, pose, gate, radians)
         disagreeing = np.maximum(
-            recent.weights * (1.0 - agreeing), recent.doubts * consistency(recent.estimates, pose, gate, radians)
+            recent.weights * (1.0 - agreeing),
+            recent.contradictions * consistency(recent.estimates, pose, gate, radians),
         )
         odds = log_odds_of_right(
             recent.weights * agreeing, disagreeing, recent.novelties,

@@ -25,9 +25,14 @@ def test_the_templates_own_tests_pass():
     assert ended.stdout.startswith(".. ")
 
 
-def test_its_stage_fits_into_a_variant(omninav_process):
+def test_its_stage_fits_into_a_variant_and_a_variant_with_it_is_listed(omninav_process, tmp_path: Path):
     named = f"features.brightness={PACKAGE / 'omninav_brightness.py'}:BrightnessHistogram"
     assert "nothing wrong" in omninav_process("check", "features=brightness", check=True, OMNINAV_STAGES=named).stdout
+    (tmp_path / "variant").mkdir()
+    own = "# @package _global_\n# by brightness\ndefaults: [omniview_mcl, override /features: brightness, _self_]\n"
+    (tmp_path / "variant" / "bright.yaml").write_text(own)
+    listed = omninav_process("variants", f"--config-dir={tmp_path}", check=True, OMNINAV_STAGES=named).stdout
+    assert any(line.startswith("bright ") and "by brightness" in line for line in listed.split("\n"))
 
 
 class Drifts(Stage):

@@ -7,7 +7,7 @@ from pathlib import Path
 from hydra import compose
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.composition import read_words
+from omninav.pipeline.cli.composition import offer_plugins, read_words
 from omninav.pipeline.cli.config_groups import group_files, suggest_option
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.graph.problems import BadInput
@@ -20,6 +20,7 @@ INDENT = 27
 def command(arguments: list[str]) -> int:
     """Print what all variants, or those that are named, do and take; what several share is explained once."""
     arguments, folders = read_words(arguments)
+    offer_plugins()  # a variant of one's own may name a stage of one's own
     own = [Path(folder) / "variant" for folder in folders]
     found = [*group_files("variant"), *(file for folder in own for file in sorted(folder.glob("*.yaml")))]
     summaries = {file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in found}

@@ -13,8 +13,8 @@ UNROLLED = range(24, 49)
 """Numbers of segments that are sorted in registers; machine code of more is large, fewer are sorted in no time."""
 
 
-def _selective_sum(context: Any, alike: Any, heading: Any, reference: Any, factors: Any) -> Any:
-    """max_k (sum of the k largest) factors[k] over `alike` (headings, segments, references) at one heading and
+def _selective_sum(context: Any, similarities: Any, heading: Any, reference: Any, factors: Any) -> Any:
+    """max_k (sum of the k largest) factors[k] over `similarities` (headings, segments, references) at one heading and
     reference; `factors` is a tuple of as many float32 as there are segments.
 
     The sorting network becomes one instruction for each exchange's larger and smaller value, so that a loop over
@@ -44,7 +44,7 @@ def _selective_sum(context: Any, alike: Any, heading: Any, reference: Any, facto
             best = builder.select(builder.fcmp_ordered(">", score, best), score, best)
         return best
 
-    return types.float32(alike, heading, reference, factors), code
+    return types.float32(similarities, heading, reference, factors), code
 
 
 selective_sum: Any = intrinsic(_selective_sum)
