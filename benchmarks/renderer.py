@@ -4,7 +4,10 @@ import resource
 import time
 
 import numpy as np
+from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.graph.ports import convert
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.simulator.cameras import camera_of, camera_rays
@@ -56,11 +59,8 @@ def rows() -> list[Row]:
 
 def world_config(name: str) -> WorldConfig:
     """A world of `conf/world`."""
-    from hydra import compose, initialize_config_module
-    from omegaconf import OmegaConf
-
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        described = OmegaConf.to_container(compose("config", overrides=[f"world={name}"]).world, resolve=True)
+    with hydra_started():
+        described = OmegaConf.to_container(compose([f"world={name}"]).world, resolve=True)
     config, problems = convert(described, WorldConfig, "world")
     assert not problems, problems
     return config  # type: ignore[no-any-return]

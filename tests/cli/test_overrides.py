@@ -41,6 +41,13 @@ def test_an_option_that_is_gone_says_what_took_its_place():
     assert "variant=omninav candidates=words tour=T" in found[1].hint
 
 
+@pytest.mark.parametrize("word", ["video=none", "~nodes.video", "~nodes.belief_plot", "~nodes.retrieval_plot"])
+def test_what_the_report_now_shows_frame_by_frame_is_said_where_it_is_left_out(word: str):
+    (found,) = invalid_overrides([word], (), "")
+    assert found.what == "this setting is gone"
+    assert "frame by frame" in found.hint
+
+
 def test_a_sweep_is_tried_by_its_first_choices_and_each_other_option_of_a_group():
     jobs = list(jobs_to_try(["match=selective,l2", "seed=0,1", "day=2"], ()))
     assert jobs == [["match=selective", "seed=0", "day=2"], ["match=l2", "seed=0", "day=2"]]
