@@ -63,8 +63,8 @@ class ConfidenceMonitorState(State):
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
-        moved = np.array((motion.x, motion.y, motion.turn))
-        self.places, self.estimates = compose(self.places, moved), compose(self.estimates, moved)
+        both = compose(np.concatenate((self.places, self.estimates)), np.array((motion.x, motion.y, motion.turn)))
+        self.places, self.estimates = both[: len(self.places)], both[len(self.places) :]
 
     def add(self, place: Array, estimate: Array, novelty: float, weight: float, contradiction: float) -> None:
         """Remember an image; the older ones count less by what this one counts, 1 / e after `MEMORY` full ones."""

@@ -100,7 +100,7 @@ def render(
     Pixels without a ray are black, with noise.
     """
     moving = Bodies(*figures(people, scene.looks))
-    poses = np.atleast_2d(np.asarray(pose, dtype=np.float64))
+    poses = np.asarray(pose, dtype=np.float64).reshape(-1, 3)
     lit = np.zeros((len(rays.gain), 3), dtype=np.float32)
     if len(rays.own):
         lit[len(rays.pixels) :] = rays.own * _light_on_deck(scene, float(poses[0, 0]), float(poses[0, 1]))

@@ -102,7 +102,8 @@ class SimulatedRecording:
         # Up to that moment it was where its wheels had rolled, so that interpolation does not bridge the jump.
         self._true_seconds = np.insert(driven.times, put, driven.times[put])
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
-        self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
+        unwrapped = np.column_stack([self.true_poses[:, :2], np.unwrap(self.true_poses[:, 2])])
+        self._stays = np.append(self._true_seconds, np.inf), np.concatenate([unwrapped, unwrapped[-1:]])
         self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
         self.carried: I64 = put + np.arange(len(put))
         """Steps from a true pose to the next one in which the robot was carried, not driven."""
@@ -155,8 +156,12 @@ class SimulatedRecording:
 
     def _true(self, seconds: F64) -> F64:
         """Where the robot was, (N, 3), at times (N,); `se2.interpolate` would go through the whole drive each time."""
-        columns = [np.interp(seconds, self._true_seconds, column) for column in self._true_columns]
-        return np.stack([columns[0], columns[1], se2.wrap(columns[2])], axis=-1)
+        times, poses = self._stays  # at the end, for ever
+        row = np.maximum(times.searchsorted(seconds, side="right") - 1, 0)
+        speed = (poses[row + 1] - poses[row]) / (times[row + 1] - times[row])[:, None]
+        found: F64 = speed * np.maximum(seconds - times[row], 0.0)[:, None] + poses[row]
+        found[:, 2] = se2.wrap(found[:, 2])
+        return found
 
     @property
     def name(self) -> str:

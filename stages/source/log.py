@@ -202,11 +202,11 @@ class LogSource(Source):
             recording, frames = part.recording, part.frames
             while position.next < len(frames):
                 frame = int(frames[position.next])
-                known = recording.dropped.copy()
+                known = dict(recording.dropped)
                 pixels = recording.image(frame, frames[position.next + 1 :][:AHEAD].tolist())
                 if pixels is not None:
                     return self._out(ctx, position, part, Image(pixels))
-                for kind, number in sorted((Counter(recording.dropped) - known).items()):
+                for kind, number in sorted((Counter(recording.dropped) - Counter(known)).items()):
                     ctx.count(kind, number, recording.details.get(kind, ""))
                 position.next += 1
             position.log, position.next, position.last = position.log + 1, 0, -1
