@@ -20,7 +20,8 @@ class BeliefEstimate(Stage):
     """The pose that is measured and acted upon: the heaviest `mode`, or the `mean` of the whole belief, as in Wolf,
     Burgard & Burkhardt 2005, section VI-B (erratum 47 in docs/papers.md). Covariance and share are the mode's."""
     mode_radius: Annotated[float, Bounds(gt=0)] | None = None
-    """Radius of a mode of particles, in length scales of the map; null: 1 m."""
+    """Radius of a mode of particles, in length scales of the map; null: 1 m. With 2 the median error on AntWorld, whose
+    length scale is 0.06 m, is 4.6 cm in place of 6.0; in a house and on Sussex it is the same (`omninav`, seed 0)."""
     mode_radius_deg: Annotated[float, Bounds(gt=0, le=90)] = 30.0
     """The same in heading."""
 
