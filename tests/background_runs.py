@@ -12,6 +12,7 @@ from unittest.mock import patch
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.codec import decode, unseal
+from omninav.pipeline.graph.registry import built_in
 
 
 def run_here(place: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -57,6 +58,7 @@ def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path, ticks: in
 
 
 def _ticks(checkpoint: Path) -> int:
+    list(built_in())  # a checkpoint's values are read by the modules that define them
     try:
         return int(decode(unseal(checkpoint.read_bytes(), ""))["ticks"])
     except FileNotFoundError:
