@@ -37,6 +37,7 @@ def finished(place: Path, *words: str) -> Path:
 def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
     """Begins `omninav …` in a folder, which is made, in a process group of its own."""
     place.mkdir(exist_ok=True)
+    list(built_in())  # a checkpoint's values are read by the modules that define them
     command = [sys.executable, "-m", "omninav", *words]
     return subprocess.Popen(
         command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
@@ -58,7 +59,6 @@ def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path, ticks: in
 
 
 def _ticks(checkpoint: Path) -> int:
-    list(built_in())  # a checkpoint's values are read by the modules that define them
     try:
         return int(decode(unseal(checkpoint.read_bytes(), ""))["ticks"])
     except FileNotFoundError:

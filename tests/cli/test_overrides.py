@@ -38,7 +38,7 @@ def test_an_option_that_is_gone_says_what_took_its_place():
     found = invalid_overrides(["candidates=near_belief", "variant=omninav_map_words"], (), "")
     assert [problem.what for problem in found] == ["there is no 'near_belief'", "there is no 'omninav_map_words'"]
     assert "candidates=index" in found[0].hint
-    assert "variant=omninav candidates=words tour=T" in found[1].hint
+    assert "omninav map variant=omninav candidates=words log=T" in found[1].hint
 
 
 @pytest.mark.parametrize("word", ["video=none", "~nodes.video", "~nodes.belief_plot", "~nodes.retrieval_plot"])
