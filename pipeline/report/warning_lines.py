@@ -29,7 +29,7 @@ def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
     for row in skipped(manifest):
         if row["first"]:
             kind, which = row["kind"].rpartition(".")[2], "" if row["count"] == 1 else "first: "
-            times = f", {counted(row['count'], 'time')}"
+            times = "" if row["count"] == 1 else f", {counted(row['count'], 'time')}"
             lines.append(f"{kind}{times} ({which}{row['first']})")
     return lines
 

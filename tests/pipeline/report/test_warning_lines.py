@@ -20,3 +20,5 @@ def test_skipped_data_is_a_warning_where_a_first_case_is_known():
         "a",
         "undecodable image, 3 times (first: frame 7)",
     ]
+    once = {"grid_is_a_stand_in": {"count": 1, "first": "made from the tour's path"}}
+    assert warning_lines({"dropped": once}) == ["grid is a stand in (made from the tour's path)"]
