@@ -219,6 +219,7 @@ def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_sou
     assert len(lines) > 5
     assert all(re.match(r"match\.\w+ +\S", line) for line in lines)
     selective = omninav("stages", "match.selective", check=True).stdout
+    assert omninav("stages", "SelectiveMatch", check=True).stdout == selective
     for part in (
         "in   map: ReferenceGraph",
         "out  similarities: Similarities",

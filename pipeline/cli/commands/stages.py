@@ -17,6 +17,8 @@ def command(arguments: list[str]) -> int:
     """List stages in one line each, by role; of a stage that is named, print ports, parameters, source and use."""
     arguments = [word.replace("=", ".") for word in arguments]  # as it is typed for a run: match=l2
     known = list(entries())
+    classes = {re.split("[.:]", entry.target)[-1]: entry.name for entry in known}
+    arguments = [classes.get(word, word) for word in arguments]  # as pages name a stage: IndexedCandidates
     roles, names = {entry.role for entry in known}, {entry.name for entry in known}
     for word in arguments:
         if word not in roles | names:
