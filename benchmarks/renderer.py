@@ -63,7 +63,8 @@ def world_config(name: str) -> WorldConfig:
         described = OmegaConf.to_container(compose([f"world={name}"]).world, resolve=True)
     config, problems = convert(described, WorldConfig, "world")
     assert not problems, problems
-    return config  # type: ignore[no-any-return]
+    assert isinstance(config, WorldConfig)
+    return config
 
 
 def _world(name: str) -> World:

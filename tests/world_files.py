@@ -16,10 +16,12 @@ def world_of(name: str) -> WorldConfig:
     """The world of a file, upon the empty one."""
     files = [OmegaConf.load(WORLDS / f"{each}.yaml") for each in ("empty", name)]
     described = OmegaConf.to_container(OmegaConf.merge(*files))
-    described.pop("defaults", None)  # type: ignore[union-attr,call-arg]
+    assert isinstance(described, dict)
+    described.pop("defaults", None)
     world, problems = convert(described, WorldConfig, "world")
+    assert isinstance(world, WorldConfig)
     assert not problems
-    return world  # type: ignore[no-any-return]
+    return world
 
 
 DEMO = world_of("home_store_demo")

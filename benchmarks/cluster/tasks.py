@@ -1,4 +1,4 @@
-"""What the jobs of `benchmarks/jobs.py` do."""
+"""Functions that the jobs of `benchmarks/jobs.py` run."""
 
 import time
 from collections.abc import Callable

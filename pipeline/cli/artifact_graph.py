@@ -79,7 +79,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
 
 
 def _makes_artifact(group: str, word: str) -> bool:
-    """Whether an option is of the variant alone: it says how an artifact is made."""
+    """Tells whether an option belongs to the variant alone, since it says how an artifact is made."""
     specs = (option_content(group, word.partition("=")[2]).get("artifacts") or {}).values()
     return any({*MAKING} & {*spec} for spec in specs)
 
@@ -118,7 +118,7 @@ def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any
 
 
 def is_repeatable(node: Any) -> bool:
-    """Whether a node may stand in an artifact's graph too: all but sources that give their ticks once."""
+    """Tells whether a node may stand in an artifact's graph too: all may but sources that give their ticks once."""
     try:
         return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
     except UnknownStage:  # reported by `build`

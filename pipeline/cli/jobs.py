@@ -145,8 +145,7 @@ def _run(
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
     planned = check(settings)
-    if settings.get("objective"):
-        check_objective(settings["objective"], planned.graph)
+    check_objective(settings.get("objective"), planned.graph)
     if sweep is None and folder is not None:
         no_run_in(folder)
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]

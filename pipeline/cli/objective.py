@@ -12,12 +12,14 @@ from omninav.pipeline.graph.results import Metrics
 FRAMEWORK = __name__.partition(".pipeline.")[0] + ".pipeline."
 
 
-def check_objective(path: str, graph: Graph) -> None:
+def check_objective(path: str | None, graph: Graph) -> None:
     """Raise `BadInput` where no stage of the graph can give a figure of this name: before the run, not at its end.
 
     Stages name their figures when they have run. Until then the first part of the path has to stand in the source of a
     stage that measures, or of a module that it takes something from; of a name that is put together, one piece has to.
     """
+    if not path:
+        return
     first = path.partition(".")[0]
     names: set[str] = set()
     for module in {name for node in graph.nodes.values() for name in _measuring_modules(node)}:

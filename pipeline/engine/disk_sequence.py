@@ -125,7 +125,7 @@ class DiskSequence(Sequence[Any]):
         return length, checksum, number, there
 
     def _index(self) -> tuple["array[int]", "array[int]"]:
-        """Where each record begins, and how many values there are up to its end."""
+        """Offsets of the records, and for each the number of values up to its end."""
         if self._coming or self._records is None:
             end, at, number = self.size, 0, 0
             offsets, ends = array("Q"), array("Q")

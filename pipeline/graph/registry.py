@@ -25,7 +25,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeGuard
 
 from omninav.pipeline.files import digest_text, user_path
 
@@ -71,7 +71,7 @@ def resolve(target: str) -> type[Stage]:
     thing = _thing(target)
     if not _is_stage(thing):
         raise UnknownStage(f"'{target}' is not a Stage; only stages can be nodes")
-    return thing  # type: ignore[no-any-return]
+    return thing
 
 
 def _thing(target: str) -> Any:
@@ -114,7 +114,7 @@ def is_listed(target: str) -> bool:
     return own or any(target in (entry.name, entry.target) for entry in plugins() if not entry.problem)
 
 
-def _is_stage(thing: Any) -> bool:
+def _is_stage(thing: Any) -> TypeGuard[type[Stage]]:
     return inspect.isclass(thing) and issubclass(thing, Stage) and thing not in (Stage, Source)
 
 

@@ -131,8 +131,8 @@ class ConfidenceMonitor(Stage):
         gate, radians = max(self.within_m, length_scale.metres), math.radians(self.within_deg)
         if similarities is not None and similarities.values.size:
             novelty = 1.0 if likelihood is None else likelihood.novelty
-            distinct = self._counted(lead_of_best(similarities, map, ELSEWHERE * gate))
-            against = self._counted(lead_over_pose(similarities, map, pose, ELSEWHERE * gate))
+            distinct = share_counted(lead_of_best(similarities, map, ELSEWHERE * gate))
+            against = share_counted(lead_over_pose(similarities, map, pose, ELSEWHERE * gate))
             repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
             first = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
@@ -153,9 +153,10 @@ class ConfidenceMonitor(Stage):
             probability *= self.right_in_conflict
         return self.Out(confidence=PoseConfidence(probability))
 
-    def _counted(self, lead: float) -> float:
-        """How much an image counts whose best match leads others by so many standard deviations, 0 to 1."""
-        return 1.0 / (1.0 + (DISTINCT_LEAD / max(lead, 1e-9)) ** STEEPNESS)
+
+def share_counted(lead: float) -> float:
+    """Share of an image that counts, 0 to 1, whose best match leads others by so many standard deviations."""
+    return 1.0 / (1.0 + (DISTINCT_LEAD / max(lead, 1e-9)) ** STEEPNESS)
 
 
 def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:

@@ -64,7 +64,7 @@ class Watched:
 
     @property
     def at_estimate(self) -> Array:
-        """Whether matches lie at the estimate (N,)."""
+        """Flags (N,): 1 where the match lies at the estimate."""
         return self.rows[:, 7]
 
     @property
@@ -74,7 +74,7 @@ class Watched:
 
     @property
     def same(self) -> Array:
-        """Whether images equal those before (N,)."""
+        """Flags (N,): 1 where the image equals the one before."""
         return self.rows[:, 10]
 
     @property
@@ -101,7 +101,7 @@ class Watched:
 
     @cached_property
     def turn_fit(self) -> TurnFit:
-        """How these turns lie to odometry's."""
+        """Fit of the turns seen in images to those of odometry."""
         return turn_fit(self.times, self.odometry[:, 2], self.sure_turns)
 
 

@@ -43,8 +43,7 @@ def command(arguments: list[str]) -> int:
             return _check_experiment(planned_experiment(config, arguments))
         read_engine(OmegaConf.to_container(config.engine, resolve=True))
         planned = plan(complete(config))
-    if planned.config.get("objective"):
-        check_objective(planned.config["objective"], planned.graph)
+    check_objective(planned.config.get("objective"), planned.graph)
     refuse_missing(planned.config)
     input_digests(planned)  # opens every file that the run reads
     for artifact in planned.artifacts:

@@ -21,8 +21,10 @@ def turn_between(before: Strip, after: Strip) -> float:
 
 
 def turns_and_correlations(strips: Strip) -> tuple[list[float], list[float]]:
-    """Between each of some panoramas (N, rows, columns) and the next, N - 1 of each: the turn as `turn_between` finds
-    it, and the correlation of the two there: 1 where they are equal."""
+    """Turns and correlations of successive panoramas (N, rows, columns): N - 1 of each.
+
+    A turn is what `turn_between` finds; the correlation at that turn is 1 where the two are equal.
+    """
     views = strips - strips.mean(axis=2, keepdims=True)
     spectra = np.fft.rfft(views)
     likeness = np.fft.irfft((np.conj(spectra[:-1]) * spectra[1:]).sum(axis=1), strips.shape[2])

@@ -1,4 +1,4 @@
-"""What homing follows, frame by frame."""
+"""Homing is shown frame by frame."""
 
 import dataclasses
 import math

@@ -181,7 +181,7 @@ def test_what_was_lost_at_opening_is_counted_once(tmp_path: Path) -> None:
 def test_other_code_of_a_camera_model_of_ones_own_makes_other_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was kept of a log as the model read it before is not used again."""
+    """Results kept of a log are not used again once the model's code has changed."""
     monkeypatch.setitem(
         MODELS, "mine", type("Mine", (Equirectangular,), {"__module__": __name__, "projection": "mine"})
     )
