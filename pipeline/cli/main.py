@@ -139,6 +139,6 @@ def _unknown_command(name: str, second: str = "") -> int:
     elif os.path.exists(name):
         hint = f"a file or folder stands behind the setting that reads it: omninav log={name}"
     else:
-        hint = suggest(name, (*COMMANDS, *{tool.partition(" ")[0] for tool in tools()}), "commands", prefix="omninav ")
+        hint = suggest(name, {*COMMANDS, *(tool.partition(" ")[0] for tool in tools())}, "commands", prefix="omninav ")
     print(f"'{name}' is no command. {hint}", file=sys.stderr)
     return 2

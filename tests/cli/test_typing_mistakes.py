@@ -41,6 +41,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["check", "--hepl"], "--hepl: there is no such flag; did you mean --help?"),
         (["report", "--config-dri", "my"], "--config-dri: there is no such flag; did you mean --config-dir?"),
         (["stagse"], "did you mean 'omninav stages'? commands: camera, check, compare,"),
+        (["stagse"], "report, resume, simulate, stages, variants"),
         (["mapp"], "did you mean 'omninav map'?"),
         (["cammera", "look"], "did you mean 'omninav camera'?"),
         (["log=a.mcap", "log=b.mcap"], "log: a.mcap and b.mcap are typed; leave one of them out (both, where it takes"),
