@@ -35,7 +35,6 @@ def optimised_poses(
 
     poses = poses.copy()
     one, other = edges.T
-    rows = 3 * np.arange(len(edges))
     weights = np.ones(len(edges))
     scale = np.inf
     damping = sparse.diags_array(np.full(3 * len(poses) - 3, PRIOR), format="csc")
@@ -47,7 +46,7 @@ def optimised_poses(
         scale = max(1.0, min(squares[doubtful].max(initial=0.0), scale / EASING))
         weights = np.where(doubtful, 1.0 / (1.0 + squares / scale), 1.0)
         root = np.sqrt(weights)
-        jacobian = _jacobian(poses, one, other, rows, root[:, None] / sigmas)
+        jacobian = motion_jacobian(poses, edges, root[:, None] / sigmas)[:, 3:]
         normal = (jacobian.T @ jacobian + damping).tocsc()
         step = splu(normal).solve(-(jacobian.T @ (error * root[:, None]).ravel()))
         poses[1:] += step.reshape(-1, 3)
@@ -57,10 +56,15 @@ def optimised_poses(
     return poses, weights
 
 
-def _jacobian(poses: Array, one: Ints, other: Ints, rows: Ints, scale: Array) -> Any:
-    """Jacobian of `between`, times `scale` (E, 3), with respect to all poses but the first: (3 E, 3 N - 3)."""
+def motion_jacobian(poses: Array, edges: Ints, scale: Array, freedoms: int = 3) -> Any:
+    """Jacobian of `between`, times `scale` (E, 3), as a sparse matrix (3 E, `freedoms` N).
+
+    `freedoms`: columns of each pose, of which the first three are x, y and heading.
+    """
     from scipy import sparse
 
+    one, other = edges.T
+    rows = 3 * np.arange(len(edges))
     cos, sin = np.cos(poses[one, 2]), np.sin(poses[one, 2])
     dx, dy = (poses[other, :2] - poses[one, :2]).T
     unit = np.ones(len(one))
@@ -81,7 +85,6 @@ def _jacobian(poses: Array, one: Ints, other: Ints, rows: Ints, scale: Array) ->
     values = np.concatenate([scale[:, row] * value for row, _, _, value in entries])
     places = (
         np.concatenate([rows + row for row, _, _, _ in entries]),
-        np.concatenate([3 * pose + column for _, pose, column, _ in entries]),
+        np.concatenate([freedoms * pose + column for _, pose, column, _ in entries]),
     )
-    whole = sparse.coo_array((values, places), shape=(3 * len(one), 3 * len(poses))).tocsc()
-    return whole[:, 3:]
+    return sparse.coo_array((values, places), shape=(3 * len(one), freedoms * len(poses))).tocsc()

@@ -1,0 +1,50 @@
+"""A camera that is calibrated by the landmarks it sees: its fields as parameters of the bundle adjustment."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from omninav.pipeline import BadInput
+from omninav.stages.geometry.landmarks.adjustment import Lens
+
+from .model import Array, Camera
+
+Model = TypeVar("Model", bound=Camera)
+AXIS = {"centre_x": math.inf, "centre_y": math.inf}
+"""Where a mirror's or lens's axis meets the image, nothing known of it: what a robot on a flat floor observes best."""
+
+
+def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:
+    """Fields of a camera as parameters that `adjusted` corrects, seen at `pixels` (O, 2).
+
+    `sigmas`: the fields by name, and the standard deviations of what the camera's description says of them, in their
+    own units. On a flat floor the yaw is not told from the headings unless there is odometry, and the scale of
+    elevations not from that of heights: a focal length, or a mirror's half axis, needs a small standard deviation. A
+    pixel that looks nowhere has a bearing of zero, which agrees with no landmark. Raises BadInput for a field that the
+    camera does not have, or that holds no number.
+    """
+    numbers = [each.name for each in fields(camera) if type(getattr(camera, each.name)) is float]
+    for name in sigmas:
+        if name not in numbers:
+            raise BadInput(
+                f"camera: a {camera.projection} camera has no number {name!r} to calibrate, expected of "
+                f"{', '.join(numbers)}"
+            )
+
+    def bearings(corrections: Array) -> Array:
+        with np.errstate(all="ignore"):
+            rays, looks = corrected(camera, sigmas, corrections).unproject(pixels)
+        return np.where(looks[:, None], rays, 0.0)
+
+    return Lens(bearings, np.array([*sigmas.values()]))
+
+
+def corrected(camera: Model, sigmas: Mapping[str, float], corrections: Array) -> Model:
+    """The camera with corrections (K,) added to the fields that `sigmas` names."""
+    changed: dict[str, Any] = {
+        name: getattr(camera, name) + float(by) for name, by in zip(sigmas, corrections, strict=True)
+    }
+    return replace(camera, **changed)

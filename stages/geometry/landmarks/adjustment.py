@@ -1,0 +1,252 @@
+"""Bundle adjustment: landmarks, the poses that see them and the camera, brought into agreement with all bearings."""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.pose_graph import motion_jacobian
+from omninav.stages.geometry.plane.se2 import between, wrap
+
+from .schur_complement import Eliminated, Frames, Visibility, covisibility, eliminate, landmark_steps, residuals
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+EASING = 2.0
+"""Factor by which the scale of the loss (in sigmas) shrinks per step."""
+LAST_SCALE = 3.0
+"""Scale of the loss at the end (in sigmas)."""
+INLIER_SIGMAS = 4.0
+"""Sigmas up to which a bearing counts as right."""
+CONVERGED = 1e-4
+"""Relative decrease of the cost at which it ends."""
+FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-4, 1e-9, 1e6
+"""Levenberg's factor at the start, the smallest, and that beyond which no step leads further down."""
+FIXED, FREE = 1e-6, 1e4
+"""Standard deviations (m, rad, or in the unit of a camera's parameter) of what stays and of what is free."""
+DIFFERENCE = 1e-5
+"""Change of a camera's parameter (pixels, rad) by which bearings are differentiated."""
+
+
+class Motions(NamedTuple):
+    """What odometry measured. `edges` (E, 2): from which reference to which; `measured` (E, 3): the motion between them
+    in the frame of the first (m, m, rad); `sigmas` (E, 3): standard deviations."""
+
+    edges: Ints
+    measured: Array
+    sigmas: Array
+
+
+class Lens(NamedTuple):
+    """Parameters of a camera that are adjusted too, as corrections of what it is described as.
+
+    `bearings`: a function of corrections (K,) that gives the unit bearings (O, 3) of all sightings in the robot's
+    frame; `sigmas` (K,): standard deviations of the description, infinite where nothing is known.
+    """
+
+    bearings: Callable[[Array], Array]
+    sigmas: Array
+
+
+class Adjusted(NamedTuple):
+    """Poses (R, 3 or 5), points (L, 3), and what the camera's parameters are corrected by (K,).
+
+    `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad).
+    """
+
+    poses: Array
+    points: Array
+    camera: Array
+    inliers: Bools
+    rms: float
+
+
+def adjusted(
+    poses: Array,
+    points: Array,
+    references: Ints,
+    landmarks: Ints,
+    bearings: Array | Lens,
+    sigma: float,
+    pose_sigmas: Array | None = None,
+    motions: Motions | None = None,
+    max_steps: int = 100,
+) -> Adjusted:
+    """Adjust poses and landmarks, and a camera's parameters, to all bearings at once, of which some are wrong.
+
+    `poses` (R, 3): x, y, heading (m, rad) of robots on a floor, or (R, 5) with roll and pitch; the rotation is that
+    about z by the heading, then about y by the pitch, then about x by the roll. `points` (L, 3): m, with z = 0 at the
+    height of the projection centre. `references`, `landmarks` (O,): of each sighting; `bearings` (O, 3): unit vectors
+    in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
+    (R, 3 or 5): standard deviations of the poses as they are given, 0 for one that stays and infinite for one that is
+    free; None: the first stays, and all others are free. Bearings alone say nothing of the scale: it is that of
+    `motions`, or of poses of finite sigma.
+
+    Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
+    dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale
+    shrinks to `LAST_SCALE`, so that a right sighting from a wrong pose is not given up at once (graduated
+    non-convexity: Yang, Antonante, Tzoumas & Carlone 2020). A landmark that is seen once, or of which no point is known
+    (NaN), tells nothing and stays, as does a reference that nothing is known of.
+    """
+    poses, points = np.array(poses, np.float64), np.array(points, np.float64)
+    lens = bearings if isinstance(bearings, Lens) else Lens(lambda _: bearings, np.empty(0))
+    inliers = np.zeros(len(references), np.bool_)
+    several = np.bincount(landmarks, minlength=len(points)) > 1
+    used = np.flatnonzero((several & np.isfinite(points).all(axis=1))[landmarks])
+    if not len(used):
+        return Adjusted(poses, points, np.zeros(len(lens.sigmas)), inliers, math.nan)
+    used = used[np.lexsort((references[used], landmarks[used]))]
+    seen, starts = np.unique(landmarks[used], return_index=True)
+    visibility = Visibility(references[used].astype(np.int64), np.append(starts, len(used)))
+    if pose_sigmas is None:
+        pose_sigmas = np.full(poses.shape, math.inf)
+        pose_sigmas[0] = 0.0
+    problem = _Problem(visibility, lens, used, sigma, poses, pose_sigmas, motions)
+    state = problem.solved(_State(poses, points[seen], np.zeros(len(lens.sigmas))), max_steps)
+    squares = problem.squares(state)
+    agreeing = squares < INLIER_SIGMAS**2
+    inliers[used] = agreeing
+    points[seen] = state.points
+    rms = sigma * math.sqrt(squares[agreeing].mean()) if agreeing.any() else math.nan
+    beyond = np.abs(state.poses[:, 2]) > math.pi
+    state.poses[beyond, 2] = wrap(state.poses[beyond, 2])
+    return Adjusted(state.poses, points, state.camera, inliers, rms)
+
+
+class _State(NamedTuple):
+    poses: Array
+    points: Array
+    camera: Array
+
+
+class _Problem:
+    def __init__(
+        self, visibility: Visibility, lens: Lens, used: Ints, sigma: float, given: Array, pose_sigmas: Array,
+        motions: Motions | None,
+    ) -> None:  # fmt: skip
+        self.visibility, self.lens, self.used, self.sigma = visibility, lens, used, sigma
+        self.given, self.motions = given, motions
+        self.held = 1.0 / np.clip(pose_sigmas, FIXED, FREE) ** 2
+        self.held_camera = 1.0 / np.clip(lens.sigmas, FIXED, FREE) ** 2
+        self.pattern = covisibility(visibility, len(given))
+
+    def solved(self, state: _State, max_steps: int) -> _State:
+        squares = self.squares(state)
+        scale = max(LAST_SCALE**2, float(np.median(squares)))
+        damping = FIRST_DAMPING
+        for _ in range(max_steps):
+            cost = self.cost(state, squares, scale)
+            found, damping = self.descended(state, squares, scale, cost, damping)
+            if found is not None:
+                state, squares = found, self.squares(found)
+            if scale > LAST_SCALE**2:
+                scale = max(LAST_SCALE**2, scale / EASING**2)
+            elif found is None or cost - self.cost(state, squares, scale) <= CONVERGED * cost:
+                break
+        return state
+
+    def descended(
+        self, state: _State, squares: Array, scale: float, cost: float, damping: float
+    ) -> tuple[_State | None, float]:
+        """A state of smaller cost, and the damping to begin with the next time; None where there is none."""
+        weights = (scale / (scale + squares)) ** 2 / self.sigma**2
+        bearings, derivatives = self.lens.bearings(state.camera)[self.used], self.derivatives(state.camera)
+        while damping < MAX_DAMPING:
+            frames = _frames(state.poses)
+            system = eliminate(
+                frames, state.points, self.visibility, bearings, derivatives, weights, damping, self.pattern
+            )
+            steps, camera = self.steps(state, system, damping)
+            tried = _State(
+                state.poses + steps,
+                state.points + landmark_steps(system, self.visibility, steps, camera),
+                state.camera + camera,
+            )
+            if self.cost(tried, self.squares(tried), scale) < cost:
+                return tried, max(MIN_DAMPING, damping / 10.0)
+            damping *= 10.0
+        return None, FIRST_DAMPING
+
+    def steps(self, state: _State, system: Eliminated, damping: float) -> tuple[Array, Array]:
+        """Steps of the poses (R, F) and of the camera (K,)."""
+        from scipy import sparse  # slow to import, and seldom needed
+        from scipy.sparse.linalg import splu
+
+        number, freedoms = state.poses.shape
+        size, diagonal = number * freedoms, np.arange(freedoms)
+        blocks = system.diagonal.copy()
+        blocks[:, diagonal, diagonal] += damping * system.curvature + self.held
+        right = system.right + self.held * (state.poses - self.given)
+        off, rows = sparse.bsr_array((system.upper, *self.pattern[::-1]), shape=(size, size)), np.arange(number + 1)
+        matrix: Any = sparse.bsr_array((blocks, rows[:-1], rows), shape=(size, size)) + off + off.T
+        if self.motions is not None:
+            edges, _, sigmas = self.motions
+            jacobian = motion_jacobian(state.poses[:, :3], edges, 1.0 / sigmas, freedoms)
+            matrix = matrix + jacobian.T @ jacobian
+            right += (jacobian.T @ self.missed(state).ravel()).reshape(right.shape)
+        factors = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        # The camera's few parameters touch all references: they are eliminated last.
+        corner = system.corner + np.diag(damping * system.curvature_camera + self.held_camera)
+        border = system.border.reshape(size, -1)
+        through = factors.solve(np.column_stack([right.ravel(), border]))
+        alone, bordered = through[:, 0], through[:, 1:]
+        gradient = system.right_camera + self.held_camera * state.camera - border.T @ alone
+        camera = -np.linalg.solve(corner - border.T @ bordered, gradient)
+        return -(alone + bordered @ camera).reshape(number, freedoms), camera
+
+    def squares(self, state: _State) -> Array:
+        """Squared angles (O,) in sigmas."""
+        positions, rotations, _ = _frames(state.poses)
+        bearings = self.lens.bearings(state.camera)[self.used]
+        missed = residuals(positions, rotations, state.points, *self.visibility, bearings)
+        return np.asarray(np.einsum("oi,oi->o", missed, missed) / self.sigma**2)
+
+    def missed(self, state: _State) -> Array:
+        """Motions between the poses less those that odometry measured (E, 3), in sigmas."""
+        assert self.motions is not None
+        (one, other), measured = self.motions.edges.T, self.motions.measured
+        error = between(state.poses[one, :3], state.poses[other, :3]) - measured
+        error[:, 2] = wrap(error[:, 2])
+        return np.asarray(error / self.motions.sigmas)
+
+    def cost(self, state: _State, squares: Array, scale: float) -> float:
+        total = float((scale * squares / (scale + squares)).sum())
+        total += float((self.held * (state.poses - self.given) ** 2).sum())
+        total += float((self.held_camera * state.camera**2).sum())
+        return total if self.motions is None else total + float((self.missed(state) ** 2).sum())
+
+    def derivatives(self, camera: Array) -> Array:
+        """Derivatives (O, 3, K) of the bearings with respect to the camera's parameters."""
+        out = np.empty((len(self.used), 3, len(camera)))
+        for k in range(len(camera)):
+            step = np.zeros(len(camera))
+            step[k] = DIFFERENCE
+            ahead, back = self.lens.bearings(camera + step), self.lens.bearings(camera - step)
+            out[:, :, k] = (ahead - back)[self.used] / (2.0 * DIFFERENCE)
+        return out
+
+
+def _frames(poses: Array) -> Frames:
+    turns = _turns(poses[:, 2], 2)
+    axes = [turns[:, :, 2]]
+    if poses.shape[1] == 5:
+        tilted = turns @ _turns(poses[:, 4], 1)
+        axes += [tilted[:, :, 0], turns[:, :, 1]]
+        turns = tilted @ _turns(poses[:, 3], 0)
+    return Frames(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
+
+
+def _turns(angles: Array, axis: int) -> Array:
+    """Rotations (N, 3, 3) by angles (N,) about the x, y or z axis."""
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    out = np.zeros((len(angles), 3, 3))
+    out[:, axis, axis] = 1.0
+    out[:, one, one] = out[:, two, two] = np.cos(angles)
+    out[:, two, one], out[:, one, two] = np.sin(angles), -np.sin(angles)
+    return out

@@ -1,0 +1,73 @@
+"""Against the whole system, by differences of the residuals."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from landmark_world import rotations
+
+from omninav.stages.geometry.landmarks.schur_complement import (
+    Frames,
+    Visibility,
+    covisibility,
+    eliminate,
+    landmark_steps,
+    residuals,
+)
+
+REFERENCES = np.array([0, 2, 3, 1, 1, 2, 0, 1, 2, 3])  # the second landmark is seen twice by one reference
+VISIBILITY = Visibility(REFERENCES, np.array([0, 3, 6, 10]))
+DAMPING = 0.3
+
+
+@pytest.fixture
+def problem():
+    rng = np.random.default_rng(0)
+    poses = rng.normal(size=(4, 3))
+    points = rng.normal([4.0, 0.0, 1.0], 1.0, (3, 3))
+    bearings = rng.normal(size=(10, 3))
+    return poses, points, bearings / np.linalg.norm(bearings, axis=1)[:, None], rng.normal(size=(10, 3, 2)), rng
+
+
+def missed(values, bearings, lens):
+    poses, camera, points = values[:12].reshape(4, 3), values[12:14], values[14:].reshape(3, 3)
+    return residuals(poses[:, :2].copy(), rotations(poses), points, *VISIBILITY, bearings + lens @ camera).ravel()
+
+
+def test_a_step_is_that_of_the_whole_system(problem):
+    poses, points, bearings, lens, rng = problem
+    weights = rng.uniform(0.5, 2.0, 10)
+    values = np.concatenate([poses.ravel(), np.zeros(2), points.ravel()])
+    jacobian = np.stack([
+        (missed(values + step, bearings, lens) - missed(values - step, bearings, lens)) / 2e-6
+        for step in 1e-6 * np.eye(len(values))
+    ], axis=1)  # fmt: skip
+    weighted = jacobian * np.repeat(weights, 3)[:, None]
+    square, gradient = weighted.T @ jacobian, weighted.T @ missed(values, bearings, lens)
+    damped = square + DAMPING * np.diag(np.diag(square))
+    expected = -np.linalg.solve(damped, gradient)
+
+    frames = Frames(poses[:, :2].copy(), rotations(poses), np.tile([[[0.0, 0.0, 1.0]]], (4, 1, 1)))
+    pattern = covisibility(VISIBILITY, 4)
+    system = eliminate(frames, points, VISIBILITY, bearings, lens, weights, DAMPING, pattern)
+    whole = np.zeros((14, 14))
+    for one in range(4):
+        whole[3 * one : 3 * one + 3, 3 * one : 3 * one + 3] = system.diagonal[one] + DAMPING * np.diag(
+            system.curvature[one]
+        )
+        for at in range(pattern[0][one], pattern[0][one + 1]):
+            other = pattern[1][at]
+            whole[3 * one : 3 * one + 3, 3 * other : 3 * other + 3] = system.upper[at]
+            whole[3 * other : 3 * other + 3, 3 * one : 3 * one + 3] = system.upper[at].T
+    whole[:12, 12:] = system.border.reshape(12, 2)
+    whole[12:, :12] = whole[:12, 12:].T
+    whole[12:, 12:] = system.corner + DAMPING * np.diag(system.curvature_camera)
+    step = -np.linalg.solve(whole, np.concatenate([system.right.ravel(), system.right_camera]))
+    assert step == pytest.approx(expected[:14], rel=1e-5, abs=1e-8)
+    back = landmark_steps(system, VISIBILITY, step[:12].reshape(4, 3), step[12:])
+    assert back.ravel() == pytest.approx(expected[14:], rel=1e-5, abs=1e-8)
+
+
+def test_references_that_share_a_landmark_are_listed_once():
+    starts, others = covisibility(VISIBILITY, 4)
+    assert [others[a:b].tolist() for a, b in pairwise(starts)] == [[1, 2, 3], [2, 3], [3], []]
