@@ -26,11 +26,11 @@ def house(rng, references=120, landmarks=2000, wrong=0.05, tilts=None):
 
     `tilts` (R, 2): roll and pitch of each reference.
     """
-    around = np.linspace(0.0, 2 * math.pi, references // 4)
-    rooms = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
-    xy = np.concatenate(
-        [(room + 0.5 + 0.3 * np.column_stack([np.cos(around), np.sin(around)])) * ROOM for room in rooms]
-    )
+    around = np.linspace(0.0, 2 * math.pi, references // 5)
+    rooms = np.array([[0, 0], [0, 1], [1, 1], [1, 0], [0, 0]])
+    radii = np.array([0.3, 0.3, 0.3, 0.3, 0.25])  # the first room is visited twice
+    circle = np.column_stack([np.cos(around), np.sin(around)])
+    xy = ((rooms + 0.5)[:, None] + radii[:, None, None] * circle).reshape(-1, 2) * ROOM
     steps = np.gradient(xy, axis=0)
     poses = np.column_stack([xy, np.arctan2(steps[:, 1], steps[:, 0])])
     room, wall = rooms[rng.integers(0, 4, landmarks)], rng.integers(0, 4, landmarks)

@@ -1,0 +1,133 @@
+"""Loop closures by words and geometry: a drive that odometry alone has bent, straightened by what its images share."""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest, squared_distances
+from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
+from omninav.stages.geometry.plane.pose_graph import optimised_poses
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+CANDIDATES, FAR_CANDIDATES = 8, 5
+"""References that each is compared with: the most similar of all, and the most similar of those far along the drive."""
+FAR_M = 3.0
+"""Way (m) along the drive beyond which two references are far from each other: what they share closes a loop."""
+RATIO = 0.8
+"""Largest ratio of a match's distance to that of the second nearest."""
+TOLERANCE = math.radians(0.4)
+"""Angle by which a bearing may miss the epipolar plane (rad)."""
+MAX_SAMPLES = 300
+"""Samples of the relative pose at most: with fewer right matches than that finds there are too few anyway."""
+MIN_INLIERS = 12
+"""Matches that must agree on a motion: with fewer one in ten was wrong in a house, with these one in a hundred."""
+MAX_FALSE_ALARMS = 1e-6
+"""Expected number of motions that as many matches agree on by chance, at most."""
+TURN_SIGMA = math.radians(0.5)
+"""Standard deviation of a pair's turn (rad)."""
+DISTANCE_SIGMAS_M = (2.0, 0.3, 0.3)
+"""Standard deviations (m) of where the second reference of a pair lies, round by round: the first does not know how far
+away it is, the next have the distance of the round before."""
+MAX_DISTANCE_M = 4.0
+"""Distance of a pair, m, beyond which it is not believed."""
+
+
+class VerifiedPairs(NamedTuple):
+    """Pairs of references and the motion between them, its length aside, and the matches that agree with it.
+
+    `pairs` (P, 2), the earlier first; `turns` (P,): heading of the later in the frame of the earlier, and `directions`
+    (P,): where it lies in that frame (rad). `first`, `second` (M,): matched rows of features, of all pairs, with
+    `ratio` (M,): the clearer, the smaller.
+    """
+
+    pairs: Ints
+    turns: Array
+    directions: Array
+    first: Ints
+    second: Ints
+    ratio: Array
+
+
+def candidate_pairs(similarities: Iterable[Floats], driven: Array) -> Ints:
+    """Pairs (P, 2) of references to compare, each once, the earlier first.
+
+    `similarities`: row r is that of reference r to all (R,), by visual words; `driven` (R,): metres along the drive.
+    Each with its predecessor, with the most similar ones, and with the most similar ones that are far along the drive.
+    """
+    pairs = {(one - 1, one) for one in range(1, len(driven))}
+    for one, row in enumerate(similarities):
+        others = np.argsort(-row, kind="stable")
+        others = others[others != one]
+        far = others[np.abs(driven[others] - driven[one]) > FAR_M]
+        for other in (*others[:CANDIDATES].tolist(), *far[:FAR_CANDIDATES].tolist()):
+            pairs.add((min(one, other), max(one, other)))
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+
+
+def verified_pairs(
+    starts: Ints, bearings: Array, descriptors: Floats, pairs: Ints, rng: np.random.Generator
+) -> VerifiedPairs:
+    """Those of the pairs (P, 2) of which enough local features agree on one motion of a robot on a floor.
+
+    Of reference r the features `starts[r]` to `starts[r + 1]` of `bearings` (F, 3), unit vectors in the robot's frame,
+    and of `descriptors` (F, D). Draws from `rng`.
+    """
+    kept, turns, directions = [], [], []
+    matches = [np.empty((3, 0))]
+    for one, other in pairs.tolist():
+        a, b = slice(starts[one], starts[one + 1]), slice(starts[other], starts[other + 1])
+        found = mutual_nearest(squared_distances(descriptors[a], descriptors[b]), RATIO)
+        if len(found.first) < MIN_INLIERS:
+            continue
+        first, second = bearings[a][found.first], bearings[b][found.second]
+        pose = relative_pose(first, second, rng, threshold=TOLERANCE, max_samples=MAX_SAMPLES)
+        if pose is None or np.count_nonzero(pose.inliers) < MIN_INLIERS:
+            continue
+        if false_alarms(pose, first, second, TOLERANCE) > MAX_FALSE_ALARMS:
+            continue
+        kept.append((one, other))
+        turns.append(math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))
+        directions.append(math.atan2(pose.translation[1], pose.translation[0]))
+        right = found.chosen(pose.inliers)
+        matches.append(np.stack([right.first + a.start, right.second + b.start, right.ratio]))
+    first, second, ratio = np.concatenate(matches, axis=1)
+    return VerifiedPairs(
+        np.array(kept, np.int64).reshape(-1, 2),
+        np.array(turns, np.float64),
+        np.array(directions, np.float64),
+        first.astype(np.int64),
+        second.astype(np.int64),
+        ratio,
+    )
+
+
+def straightened_drive(odometry: Array, verified: VerifiedPairs) -> Array:
+    """Poses (R, 3) of one drive that agree best with its odometry (R, 3) and with the motions of verified pairs.
+
+    A pose graph with Cauchy's loss on the pairs. How long a pair's motion is, the poses of the round before say: across
+    its direction it is measured, along it each round confirms the last.
+    """
+    along = np.column_stack([np.arange(len(odometry) - 1), np.arange(1, len(odometry))])
+    steps = between(odometry[:-1], odometry[1:])
+    (one, other), pairs = verified.pairs.T, len(verified.pairs)
+    edges = np.concatenate([along, verified.pairs])
+    poses, distances = odometry.copy(), np.zeros(pairs)
+    for sigma in DISTANCE_SIGMAS_M:
+        towards = distances * np.stack([np.cos(verified.directions), np.sin(verified.directions)])
+        poses, _ = optimised_poses(
+            poses,
+            edges,
+            np.concatenate([steps, np.column_stack([*towards, verified.turns])]),
+            np.concatenate([odometry_sigmas(steps), np.tile([sigma, sigma, TURN_SIGMA], (pairs, 1))]),
+            np.arange(len(edges)) >= len(along),
+        )
+        distances = np.minimum(np.hypot(*(poses[other] - poses[one])[:, :2].T), MAX_DISTANCE_M)
+    return poses

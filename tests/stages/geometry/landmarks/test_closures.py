@@ -1,0 +1,99 @@
+import math
+
+import numpy as np
+import pytest
+from landmark_world import driven, house, misplaced
+
+from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
+from omninav.stages.geometry.plane.se2 import between, wrap
+
+
+@pytest.fixture(scope="module")
+def world():
+    return house(np.random.default_rng(0), landmarks=4000)
+
+
+@pytest.fixture(scope="module")
+def features(world):
+    """Features by reference: starts, bearings, descriptors, and the landmark of each; a descriptor varies a little."""
+    rng = np.random.default_rng(1)
+    order = np.argsort(world.references, kind="stable")
+    own = rng.normal(size=(len(world.points), 32))[world.landmarks[order]]
+    starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
+    descriptors = (own + rng.normal(0.0, 0.2, own.shape)).astype(np.float32)
+    return starts, world.bearings[order], descriptors, world.landmarks[order]
+
+
+@pytest.fixture(scope="module")
+def verified(world, features):
+    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
+    seen[world.references, world.landmarks] = 1.0
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(world.poses[:, :2], axis=0).T))])
+    pairs = candidate_pairs(iter(seen @ seen.T), way)
+    apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
+    return verified_pairs(*features[:3], np.concatenate([pairs, apart]), np.random.default_rng(2))
+
+
+def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
+    one, other = verified.pairs.T
+    true = between(world.poses[one], world.poses[other])
+    far = np.hypot(true[:, 0], true[:, 1]) > 0.3
+    turned = wrap(verified.turns - true[:, 2])
+    towards = wrap(verified.directions - np.arctan2(true[:, 1], true[:, 0]))[far]
+    assert len(one) > 300
+    assert np.degrees(np.percentile(np.abs(turned), 95)) < 0.5
+    assert np.degrees(np.percentile(np.abs(towards), 95)) < 2.0
+
+
+def test_matches_that_agree_are_of_one_landmark(features, verified):
+    landmarks = features[3]
+    assert (landmarks[verified.first] == landmarks[verified.second]).mean() > 0.97
+    assert len(verified.first) == len(verified.second) == len(verified.ratio) > 12 * len(verified.pairs)
+
+
+def test_pairs_that_share_nothing_are_left_out(verified):
+    assert not {(5, 95), (20, 80)} & set(map(tuple, verified.pairs.tolist()))
+
+
+def test_a_drive_that_odometry_has_bent_is_straightened(world, verified):
+    _, odometry = driven(world.poses)
+    straight = straightened_drive(odometry, verified)
+    assert misplaced(odometry, world.poses)[0] > 0.4
+    assert misplaced(straight, world.poses)[0] < 0.06
+    assert (straight[0] == odometry[0]).all()
+
+
+def test_without_a_pair_odometry_stays(world, features):
+    nothing = verified_pairs(*features[:3], np.zeros((0, 2), np.int64), np.random.default_rng(0))
+    _, odometry = driven(world.poses)
+    assert straightened_drive(odometry, nothing) == pytest.approx(odometry, abs=1e-6)
+
+
+def test_a_reference_without_features_has_no_pairs(features):
+    starts, bearings, descriptors, _ = features
+    emptied = starts.copy()
+    emptied[1:] -= starts[1]  # the first has none
+    found = verified_pairs(
+        emptied, bearings[starts[1] :], descriptors[starts[1] :], np.array([[0, 1], [1, 2]]), np.random.default_rng(0)
+    )
+    assert found.pairs.tolist() == [[1, 2]]
+
+
+def test_candidates_are_predecessors_the_most_similar_and_the_most_similar_far_away():
+    similarities = np.zeros((20, 20), np.float32)
+    similarities[2, 17], similarities[2, 9] = 0.5, 0.9
+    pairs = candidate_pairs(iter(similarities), np.arange(20) * 0.5)
+    assert {(one - 1, one) for one in range(1, 20)} | {(2, 9), (2, 17)} <= set(map(tuple, pairs.tolist()))
+    assert (pairs[:, 0] < pairs[:, 1]).all()
+    assert len(np.unique(pairs, axis=0)) == len(pairs)
+
+
+def test_where_a_pair_lies_is_measured_across_its_direction():
+    odometry = np.column_stack([np.arange(4.0), np.zeros((4, 2))])
+    verified = verified_pairs(
+        np.zeros(5, np.int64), np.zeros((0, 3)), np.zeros((0, 32), np.float32), np.zeros((0, 2), np.int64),
+        np.random.default_rng(0),
+    )._replace(pairs=np.array([[0, 3]]), turns=np.array([math.radians(3.0)]), directions=np.zeros(1))  # fmt: skip
+    straight = straightened_drive(odometry, verified)
+    assert straight[3, 0] == pytest.approx(3.0, abs=0.1)
+    assert 0.5 < np.degrees(straight[3, 2]) < 3.1
