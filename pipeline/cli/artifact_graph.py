@@ -73,7 +73,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
         *(word for word in groups if word.lstrip("+~").partition("=")[0] not in set_by_hand),
         *(f"++nodes.{name}={_value(node)}" for name, node in shared.items()),
         *(change for each in specs for change in _changes(name, each, swapped)),
-        *(f"++saves.{key}={other['output']}" for key, other in beside.items()),
+        *(f"++saves.{key}={each['output']}" for key, each in {name: spec, **beside}.items() if each.get("output")),
         *(text for key, text in typed if key not in (LEARN, "variant")),
     ]
 

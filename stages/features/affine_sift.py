@@ -3,8 +3,6 @@
 from typing import Literal
 
 import cv2
-import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.stages.values.image import Pixels
@@ -29,11 +27,4 @@ class AffineSift(RotationReducedSift):
         self._affine = cv2.AffineFeature.create(self._sift)
 
     def _detected(self, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
-        found, self._rows = self._affine.detectAndCompute(grey, mask)
-        for row, point in enumerate(found):
-            point.class_id = row
-        return list(found)
-
-    def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> npt.NDArray[np.float32]:
-        rows = self._rows[[point.class_id for point in found]].astype(np.float32)
-        return rows
+        return self._with_rows(*self._affine.detectAndCompute(grey, mask))

@@ -19,13 +19,13 @@ Bools = npt.NDArray[np.bool_]
 class PreparedImage(NamedTuple):
     """An image made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
 
-    `scale`: pixels of the original per pixel of this one. `ring`: of a mirror image, in these pixels; None: columns are
+    `scale` (2,): columns and rows of the original per column and row of this one. `ring`: of a mirror image, in these pixels; None: columns are
     upright. `camera`: of the original.
     """
 
     pixels: Pixels
     seen: Bools
-    scale: float
+    scale: Array
     ring: Ring | None
     camera: Camera
 
@@ -53,16 +53,17 @@ def prepared_image(image: Image | Panorama, camera: Camera | None, max_pixels: i
         raise BadInput("features: a camera's image without its camera; wire it: wires.features.camera=source.camera")
     pixels, ring = image.pixels, seen_by.ring
     rows, columns = pixels.shape[:2]
-    scale = max(1.0, math.sqrt(rows * columns / max_pixels))
-    if scale > 1.0:
-        size = round(columns / scale), round(rows / scale)
-        scale = columns / size[0]
+    shrink, scale = math.sqrt(rows * columns / max_pixels), np.ones(2)
+    if shrink > 1.0:
+        size = round(columns / shrink), round(rows / shrink)
+        scale = np.array([columns / size[0], rows / size[1]])
         pixels = cast(Pixels, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA))
     if ring is None:
         seen = np.ones(pixels.shape[:2], np.bool_)
     else:
-        middle = (ring.centre_x + 0.5) / scale - 0.5, (ring.centre_y + 0.5) / scale - 0.5
-        ring = Ring(*middle, ring.inner / scale, ring.outer / scale)
+        x, y = (np.array([ring.centre_x, ring.centre_y]) + 0.5) / scale - 0.5
+        mean = float(scale.mean())
+        ring = Ring(float(x), float(y), ring.inner / mean, ring.outer / mean)
         rows_read, columns_read = np.ogrid[: pixels.shape[0], : pixels.shape[1]]
         seen = ring.holds(columns_read, rows_read)
     return PreparedImage(pixels, seen, scale, ring, seen_by)

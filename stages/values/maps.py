@@ -10,6 +10,7 @@ from omninav.pipeline.graph.contents import RowsOf, Shape
 from omninav.stages.geometry.appearance.segments import FeatureKind, Rows
 
 from .growable_arrays import GrowableArrays
+from .landmarks import Landmarks
 from .pose import Pose, PoseSource
 
 
@@ -18,7 +19,8 @@ class ReferenceGraph(GrowableArrays, Value):
 
     `poses`: (R, 3) x, y (m), heading (rad) of the robot when the view was taken. `features`: (R, segments, bins) in
     the units of the features stage. `kind`: which features these are. `edges`: (E, 2) indices of neighbours along the
-    drive. `pose_source`: where the poses come from. Grows in place by `insert` and `join`.
+    drive. `pose_source`: where the poses come from. `landmarks`: points that the references see; None: none were learned.
+    Grows in place by `insert` and `join`.
 
     The features of a map that is larger than 64 MB stay in its file: take those that are needed, `features[rows]`
     (indices, a slice or a mask; a plain array), and never all of them. A map that grows is in memory.
@@ -32,6 +34,7 @@ class ReferenceGraph(GrowableArrays, Value):
     kind: FeatureKind
     edges: Annotated[npt.NDArray[np.int64], Shape("E", 2), RowsOf("R")]
     pose_source: PoseSource
+    landmarks: Landmarks | None = None
 
     @classmethod
     def empty(cls) -> "ReferenceGraph":

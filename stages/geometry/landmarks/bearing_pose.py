@@ -1,0 +1,152 @@
+"""The pose of a robot on a floor from the bearings of known points, some of them wrong."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import poselib
+
+from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.probability.small_systems import rotated_by, solve
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+FACES = 6
+"""Virtual pinhole cameras that share the circle: poselib's solver takes pixels, and a pinhole no full circle."""
+FOCAL_PX = 1000.0
+"""Their focal length: a pixel is about a milliradian."""
+MAX_SAMPLES = 1000
+"""Samples that are drawn at most."""
+HEIGHT_SIGMA_M, TILT_SIGMA = 0.02, math.radians(3.0)
+"""Standard deviations of the camera's height against the map's, and of the robot's tilt (rad): floors are not flat, and
+robots brake."""
+STEPS = 10
+"""Gauss-Newton steps of the refinement."""
+
+
+class BearingPose(NamedTuple):
+    """A pose with its uncertainty. `pose` (3,): x, y (m), heading (rad). `covariance` (3, 3), per unit of variance of a
+    bearing (rad^2). `sigma`: standard deviation of its inliers' bearings (rad). `inliers` (M,): which points agree.
+    `tilt`: of the robot (rad)."""
+
+    pose: Array
+    covariance: Array
+    sigma: float
+    inliers: Bools
+    tilt: float
+
+
+def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: float) -> BearingPose | None:
+    """The pose from which most points (M, 3) are seen along their unit bearings (M, 3), within `tolerance` (rad).
+
+    A sample consensus of poselib's generalised solver in six degrees of freedom, then a robust least squares in which
+    height and tilt stay near those of a floor; `sigma` (rad): standard deviation of a bearing. None where no sample of
+    three has a solution.
+    """
+    if len(bearings) < 4:
+        return None
+    rotation, translation, agreeing = _consensus(bearings, points, tolerance)
+    if agreeing.sum() < 4:
+        return None
+    R, t, square, spread = _refined(rotation, translation, bearings[agreeing], points[agreeing], sigma)
+    pose = np.array([t[0], t[1], math.atan2(R[1, 0], R[0, 0])])
+    covariance = np.linalg.inv(square)[:3, :3]
+    return BearingPose(pose, covariance, spread, _within(R, t, bearings, points, tolerance), math.acos(min(1.0, R[2, 2])))
+
+
+def _faces() -> tuple[Array, list[Any]]:
+    azimuths = np.arange(FACES) * (2.0 * math.pi / FACES)
+    forward = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(FACES)])
+    right = np.column_stack([np.sin(azimuths), -np.cos(azimuths), np.zeros(FACES)])
+    down = np.tile([0.0, 0.0, -1.0], (FACES, 1))
+    axes = np.stack([right, down, forward], axis=1)
+    cameras = []
+    for rows in axes:
+        camera = poselib.CameraPose()
+        camera.R, camera.t = rows, np.zeros(3)
+        cameras.append(camera)
+    return axes, cameras
+
+
+AXES, CAMERAS = _faces()
+PINHOLES = [{"model": "SIMPLE_PINHOLE", "width": 1, "height": 1, "params": [FOCAL_PX, 0.0, 0.0]}] * FACES
+
+
+def _consensus(bearings: Array, points: Array, tolerance: float) -> tuple[Array, Array, Bools]:
+    azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])
+    face = np.rint(azimuths * (FACES / (2.0 * math.pi))).astype(np.int64) % FACES
+    rows = [np.flatnonzero(face == f) for f in range(FACES)]
+    seen = [bearings[r] @ axes.T for r, axes in zip(rows, AXES, strict=True)]
+    pixels = [FOCAL_PX * each[:, :2] / np.maximum(each[:, 2:], 1e-6) for each in seen]
+    options = {"max_reproj_error": FOCAL_PX * math.tan(tolerance), "max_iterations": MAX_SAMPLES, "min_iterations": 100}
+    found, report = poselib.estimate_generalized_absolute_pose(
+        pixels, [points[r] for r in rows], CAMERAS, PINHOLES, options, {}
+    )
+    agreeing = np.zeros(len(bearings), np.bool_)
+    for r, inliers in zip(rows, report["inliers"], strict=True):
+        agreeing[r] = inliers
+    rotation = np.ascontiguousarray(found.R.T)
+    return rotation, -rotation @ found.t, agreeing
+
+
+@compiled(nogil=True)
+def _within(R: Array, t: Array, bearings: Array, points: Array, tolerance: float) -> Bools:
+    out, least = np.zeros(len(points), np.bool_), math.cos(tolerance)
+    for n in range(len(points)):
+        x, y, z = points[n, 0] - t[0], points[n, 1] - t[1], points[n, 2] - t[2]
+        length, cos = math.sqrt(x * x + y * y + z * z), 0.0
+        for k in range(3):
+            cos += (R[0, k] * x + R[1, k] * y + R[2, k] * z) * bearings[n, k]
+        out[n] = cos > least * length
+    return out
+
+
+@compiled(nogil=True)
+def _refined(R: Array, t: Array, bearings: Array, points: Array, sigma: float) -> tuple[Array, Array, Array, float]:
+    # Freedoms: x, y, turn about the vertical, z, roll, pitch. Residuals: the ray to the point less the bearing, in the
+    # map frame, with Cauchy's weights; and height and tilt against those of a floor.
+    square, row, seen, ray = np.zeros((6, 6)), np.zeros((3, 6)), np.empty(3), np.empty(3)
+    height, tilt = (sigma / HEIGHT_SIGMA_M) ** 2, (sigma / TILT_SIGMA) ** 2
+    total = counted = 0.0
+    for _ in range(STEPS):
+        square[:], slope, total, counted = 0.0, np.zeros(6), 0.0, 0.0
+        for n in range(len(points)):
+            length = 0.0
+            for i in range(3):
+                seen[i] = R[i, 0] * bearings[n, 0] + R[i, 1] * bearings[n, 1] + R[i, 2] * bearings[n, 2]
+                ray[i] = points[n, i] - t[i]
+                length += ray[i] * ray[i]
+            length = max(math.sqrt(length), 1e-6)
+            ray /= length
+            miss = 0.0
+            for i in range(3):
+                miss += (ray[i] - seen[i]) ** 2
+                for k in range(3):
+                    row[i, k if k < 2 else 3] = (ray[i] * ray[k] - (1.0 if i == k else 0.0)) / length
+            row[0, 2], row[1, 2] = seen[1], -seen[0]
+            row[1, 4], row[2, 4] = seen[2], -seen[1]
+            row[0, 5], row[2, 5] = -seen[2], seen[0]
+            weight = 1.0 / (1.0 + miss / (4.0 * sigma * sigma))
+            total += weight * miss
+            counted += weight
+            for k in range(6):
+                for i in range(3):
+                    slope[k] += weight * row[i, k] * (ray[i] - seen[i])
+                    for j in range(6):
+                        square[k, j] += weight * row[i, k] * row[i, j]
+        square[3, 3] += height
+        slope[3] += height * t[2]
+        square[4, 4] += tilt
+        square[5, 5] += tilt
+        slope[4] -= tilt * R[1, 2]
+        slope[5] += tilt * R[0, 2]
+        for k in range(6):
+            square[k, k] += 1e-12
+        step = -solve(square, slope)
+        t = t + np.array([step[0], step[1], step[3]])
+        R = rotated_by(R, step[4], step[5], step[2])
+        if np.abs(step).max() < 1e-7:
+            break
+    return R, t, square, math.sqrt(total / max(2.0 * counted - 4.0, 1.0))

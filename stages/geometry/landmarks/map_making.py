@@ -1,0 +1,181 @@
+"""Landmarks of a drive: features of its images, matched between neighbours, joined and triangulated."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.plane.se2 import between
+
+from .pair_check import fit_motion
+from .tracks import Tracks, joined_matches
+from .triangulation import triangulated_tracks
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+APART_M = (0.1, 2.0)
+"""Least and largest distance of two references that are matched, m: nearer ones say nothing of depths, and farther ones
+see little that is the same."""
+NEIGHBOURS = 10
+"""References that each is matched with, those that share most visual words."""
+RATIO = 0.8
+"""Largest ratio of a match's distance to that of the second nearest."""
+MIN_MATCHES = 8
+"""Matches of a pair of references below which it is left out: chance gives some."""
+OFF_PLANE = math.radians(0.35)
+"""Angle of a bearing to the plane through both cameras and the other bearing, above which a match is wrong (rad)."""
+MISS = math.radians(0.7)
+"""Angle between a bearing and its landmark above which it is left out (rad)."""
+MIN_PARALLAX = math.radians(1.5)
+"""Angle between two bearings of a landmark, below which its depth is not known (rad)."""
+MAX_DISTANCE_M = 30.0
+"""Distance beyond which a landmark is not kept, m."""
+
+
+class LocalViews(NamedTuple):
+    """Local features of references, in one list. Of reference r the rows `starts[r]` to `starts[r + 1]` of `bearings`
+    (F, 3), unit vectors in the robot's frame, and of `descriptors` (F, D) float32, of length 1."""
+
+    starts: Ints
+    bearings: Array
+    descriptors: Floats
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    @property
+    def owners(self) -> Ints:
+        """The reference (F,) of each feature."""
+        return np.repeat(np.arange(len(self)), np.diff(self.starts))
+
+    def rows(self, reference: int) -> slice:
+        """The features of a reference."""
+        return slice(int(self.starts[reference]), int(self.starts[reference + 1]))
+
+
+class Sightings(NamedTuple):
+    """Landmarks and who sees them. `points` (L, 3), m, z above the cameras; of each sighting: `landmarks` (O,) its
+    point, `features` (O,) its row among all features, ascending by landmark."""
+
+    points: Array
+    landmarks: Ints
+    features: Ints
+
+
+def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> LocalViews:
+    """One list of the features of all references."""
+    starts = np.cumsum([0, *(len(each) for each in bearings)], dtype=np.int64)
+    return LocalViews(
+        starts,
+        np.concatenate([np.empty((0, 3)), *bearings]),
+        np.concatenate([np.empty((0, 128), np.float32), *descriptors]),
+    )
+
+
+def neighbouring_pairs(poses: Array, alike: Iterable[Floats]) -> Ints:
+    """Pairs (P, 2) of references to match, each once: the most alike ones among those at a distance of `APART_M`.
+
+    `alike`: row r is the similarity (R,) of reference r to all.
+    """
+    from scipy.spatial import cKDTree  # slow to import, and not needed without landmarks
+
+    tree = cKDTree(poses[:, :2])
+    pairs: set[tuple[int, int]] = set()
+    for reference, (near, similarities) in enumerate(
+        zip(tree.query_ball_point(poses[:, :2], APART_M[1]), alike, strict=True)
+    ):
+        others = np.sort(np.array(near, np.int64))
+        others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > APART_M[0]]
+        best = others[np.argsort(-similarities[others], kind="stable")[:NEIGHBOURS]]
+        pairs.update((min(reference, other), max(reference, other)) for other in best.tolist())
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+
+
+def matched_pairs(views: LocalViews, pairs: Ints, poses: Array) -> Tracks:
+    """Tracks of features that neighbours share, of matches that fit the motion between them."""
+    found = [np.empty((3, 0))]
+    for one, other in pairs.tolist():
+        a, b = views.rows(one), views.rows(other)
+        alike = mutual_nearest(2.0 - 2.0 * (views.descriptors[a] @ views.descriptors[b].T), RATIO)
+        if len(alike.first) < MIN_MATCHES:
+            continue
+        motion = between(poses[one], poses[other])
+        fits = fit_motion(views.bearings[a][alike.first], views.bearings[b][alike.second], motion, OFF_PLANE)
+        kept = alike.chosen(fits)
+        found.append(np.stack([kept.first + a.start, kept.second + b.start, kept.ratio]))
+    first, second, ratio = np.concatenate(found, axis=1)
+    order = np.argsort(ratio, kind="stable")
+    return joined_matches(first[order].astype(np.int64), second[order].astype(np.int64), views.owners)
+
+
+def in_map_frame(views: LocalViews, poses: Array) -> tuple[Array, Array]:
+    """Camera centres (F, 3) and unit vectors (F, 3) in the map frame, of all features."""
+    owners = views.owners
+    cos, sin = np.cos(poses[owners, 2]), np.sin(poses[owners, 2])
+    x, y, z = views.bearings.T
+    return (
+        np.column_stack([poses[owners, :2], np.zeros(len(owners))]),
+        np.column_stack([cos * x - sin * y, sin * x + cos * y, z]),
+    )
+
+
+def triangulated(views: LocalViews, tracks: Tracks, poses: Array) -> Sightings:
+    """Landmarks of tracks, and the sightings that agree with them."""
+    centres, bearings = in_map_frame(views, poses)
+    made = triangulated_tracks(
+        tracks.starts, centres[tracks.features], bearings[tracks.features], MISS, MIN_PARALLAX, MAX_DISTANCE_M
+    )
+    there = np.isfinite(made.points[:, 0])
+    number = np.cumsum(there) - 1
+    return Sightings(made.points[there], number[tracks.owners[made.kept]], tracks.features[made.kept])
+
+
+def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:
+    """The mean (L, D) float32 of each landmark's descriptors, at length 1."""
+    starts = np.searchsorted(sightings.landmarks, np.arange(len(sightings.points)))
+    if not len(starts):
+        return np.empty((0, views.descriptors.shape[1]), np.float32)
+    total = np.add.reduceat(views.descriptors[sightings.features], starts, axis=0)
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9), np.float32)
+
+
+def bearing_sigma(views: LocalViews, sightings: Sightings, poses: Array) -> float:
+    """Robust standard deviation (rad) of a bearing, by how the sightings miss their landmarks; of each of its two parts.
+
+    A landmark of few sightings bends towards them, so their squares are divided by the freedoms that are left.
+    """
+    if not len(sightings.points):
+        return OFF_PLANE
+    centres, bearings = in_map_frame(views, poses)
+    rays = sightings.points[sightings.landmarks] - centres[sightings.features]
+    cos = np.einsum("ij,ij->i", rays, bearings[sightings.features]) / np.linalg.norm(rays, axis=1)
+    counts = np.bincount(sightings.landmarks)
+    free = (2.0 * counts - 3.0) / (2.0 * counts)
+    angles = np.arccos(np.clip(cos, -1.0, 1.0)) / np.sqrt(free[sightings.landmarks])
+    return max(float(np.median(angles)) / RAYLEIGH_MEDIAN, 1e-5)
+
+
+RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))
+"""Median of a Rayleigh distribution of scale 1: of an angle whose two parts are normal."""
+
+
+def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Ints, npt.NDArray[np.int32]]:
+    """Landmarks of each reference: starts (R + 1,) and the landmarks (O,)."""
+    owners = views.owners[sightings.features]
+    order = np.argsort(owners, kind="stable")
+    counts = np.bincount(owners, minlength=len(views))
+    return np.concatenate([[0], np.cumsum(counts)]), sightings.landmarks[order].astype(np.int32)
+
+
+def similarity_rows(starts: Ints, words: npt.NDArray[np.int32], weights: Floats, size: int) -> Iterator[Floats]:
+    """Similarities (R,) of each of R references to all by their visual words, one row after the other."""
+    from scipy.sparse import csr_matrix  # slow to import, and not needed without landmarks
+
+    rows = csr_matrix((weights, words, starts), shape=(len(starts) - 1, size))
+    for reference in range(len(starts) - 1):
+        yield np.asarray((rows @ rows[reference].toarray().T)[:, 0], np.float32)

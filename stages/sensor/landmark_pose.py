@@ -1,0 +1,145 @@
+"""Finds the pose of an image by the landmarks that it shows."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, pose_of_bearings
+from omninav.stages.geometry.plane.point_cells import distinct
+from omninav.stages.geometry.plane.se2 import wrap_angle
+from omninav.stages.geometry.probability.particles import systematic
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, LandmarkFix
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.visual_words import VisualWords
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+RATIO = 0.85
+"""Largest ratio of a match's distance to that of the second nearest landmark."""
+TOLERANCE = math.radians(0.6)
+"""Angle to its landmark within which a bearing agrees with a pose (rad)."""
+BELIEF_SAMPLES = 5
+"""Particles, drawn evenly by weight, around which references are candidates too."""
+NEAR_EACH = 2
+"""References that are candidates around each of them."""
+ELSEWHERE = (0.5, math.radians(10.0))
+"""Distance (m) and turn (rad) from the best pose beyond which another one is a rival."""
+MAX_POSES = 2
+"""Poses that an image may have: the best one, and its rival."""
+COVARIANCE_FACTOR = 4.0
+"""Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
+SIGMA_FLOOR = (0.001, 0.001, math.radians(0.01))
+"""Standard deviations below which no pose is taken to be known (m, m, rad)."""
+
+
+class LandmarkPose(Stage):
+    """Gives the poses from which an image may have been taken, with covariances, from bearings of known landmarks.
+
+    Candidates are the references that share most visual words with the image, over the whole map, and those near the
+    belief, both always: a belief may be wrong, and words may be ambiguous. Features are matched with the landmarks that
+    candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
+    elsewhere, since wrong matches agree with each other in places that repeat themselves. An image with too few inliers
+    says nothing, and so does a map without landmarks. Raises BadInput for features of another kind than the map's.
+    """
+
+    word_references: Annotated[int, Bounds(ge=1)] = 10
+    """References that share most words with the image, whose landmarks are looked for."""
+    min_inliers: Annotated[int, Bounds(ge=4)] = 12
+    """Landmarks that must agree on a pose."""
+
+    class Out(Outputs):
+        """Poses of the image; absent where too few landmarks agree on one."""
+
+        fix: LandmarkFix | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        features: LocalFeatures,
+        map: ReferenceGraph,
+        near: Particles | None = None,
+    ) -> Out:
+        """Find the pose of one image."""
+        landmarks = map.landmarks
+        if landmarks is None or not len(landmarks) or len(features) < self.min_inliers:
+            return self.Out()
+        if features.descriptors.shape[1] != landmarks.descriptors.shape[1]:
+            raise BadInput(
+                f"landmarks: the map's have descriptors of {landmarks.descriptors.shape[1]} numbers, the image's have "
+                f"{features.descriptors.shape[1]}; use the features the map was learned with, or learn it again"
+            )
+        rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
+        theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
+        squares = 2.0 - 2.0 * (root_descriptors(features.descriptors) @ theirs.T)
+        pairs = mutual_nearest(squares, RATIO)
+        bearings = np.ascontiguousarray(features.bearings[pairs.first])
+        points = landmarks.points[rows[pairs.second]].astype(np.float64)
+        found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
+        if not found:
+            return self.Out()
+        inliers = np.array([int(each.inliers.sum()) for each in found], np.int64)
+        return self.Out(
+            fix=LandmarkFix(
+                np.array([each.pose for each in found]),
+                np.array([covariance_of(each, landmarks.sigma_rad) for each in found]),
+                inliers,
+                probabilities_of(inliers),
+                len(points),
+            )
+        )
+
+    def _candidates(
+        self, features: LocalFeatures, words: VisualWords, map: ReferenceGraph, near: Particles | None
+    ) -> Ints:
+        alike = words.similarities(features.descriptors)
+        best = np.argsort(-alike, kind="stable")[: self.word_references if alike.any() else 0]
+        if near is None:
+            return best
+        places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]
+        gaps = ((map.poses[: len(words), None, :2] - places[:, :2]) ** 2).sum(axis=2)
+        closest = np.argpartition(gaps, min(NEAR_EACH, len(gaps)) - 1, axis=0)[:NEAR_EACH]
+        return distinct(np.concatenate([best, closest.ravel()]))
+
+
+def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> list[BearingPose]:
+    """The poses that most bearings (M, 3) agree on, and a rival elsewhere that those left over agree on."""
+    found: list[BearingPose] = []
+    left = np.ones(len(points), np.bool_)
+    for _ in range(MAX_POSES):
+        rows = np.flatnonzero(left)
+        if len(rows) < min_inliers:
+            break
+        pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma)
+        if pose is None or pose.inliers.sum() < min_inliers or (found and not _is_elsewhere(pose, found[0])):
+            break
+        found.append(pose)
+        left[rows[pose.inliers]] = False
+    return found
+
+
+def _is_elsewhere(pose: BearingPose, other: BearingPose) -> bool:
+    away = pose.pose - other.pose
+    return math.hypot(away[0], away[1]) > ELSEWHERE[0] or abs(wrap_angle(float(away[2]))) > ELSEWHERE[1]
+
+
+def covariance_of(pose: BearingPose, sigma: float) -> Array:
+    """Covariance (3, 3) of a pose from bearings of this standard deviation (rad)."""
+    covariance: Array = COVARIANCE_FACTOR * max(sigma, pose.sigma) ** 2 * pose.covariance + np.diag(np.square(SIGMA_FLOOR))
+    return covariance
+
+
+def probabilities_of(inliers: Ints) -> Array:
+    """Probabilities (K,) that each of rival poses is right, of which so many landmarks agree (K,)."""
+    odds = np.exp(0.5 * (np.minimum(inliers, 60) - 14.0))
+    probabilities: Array = odds / (1.0 + odds.sum())
+    return probabilities
