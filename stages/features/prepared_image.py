@@ -19,8 +19,8 @@ Bools = npt.NDArray[np.bool_]
 class PreparedImage(NamedTuple):
     """An image made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
 
-    `scale` (2,): columns and rows of the original per column and row of this one. `ring`: of a mirror image, in these pixels; None: columns are
-    upright. `camera`: of the original.
+    `scale` (2,): columns and rows of the original per column and row of this one. `ring`: of a mirror image, in these
+    pixels; None: columns are upright. `camera`: of the original.
     """
 
     pixels: Pixels

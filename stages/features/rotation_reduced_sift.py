@@ -55,7 +55,11 @@ class RotationReducedSift(Stage):
         # Features that turn by themselves are found and described in one pass: some more, since edges take away.
         most = 2 * self.max_features if self.orientation == "own" else 0
         self._sift = cv2.SIFT.create(
-            nfeatures=most, contrastThreshold=self.contrast, edgeThreshold=EDGE_RATIO, sigma=BLUR_PX, enable_precise_upscale=True
+            nfeatures=most,
+            contrastThreshold=self.contrast,
+            edgeThreshold=EDGE_RATIO,
+            sigma=BLUR_PX,
+            enable_precise_upscale=True,
         )
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:

@@ -81,7 +81,7 @@ class LandmarkPose(Stage):
         rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
         theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
         squares = 2.0 - 2.0 * (root_descriptors(features.descriptors) @ theirs.T)
-        pairs = mutual_nearest(squares, RATIO)
+        pairs = mutual_nearest(np.asarray(squares, np.float32), RATIO)
         bearings = np.ascontiguousarray(features.bearings[pairs.first])
         points = landmarks.points[rows[pairs.second]].astype(np.float64)
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
@@ -134,7 +134,8 @@ def _is_elsewhere(pose: BearingPose, other: BearingPose) -> bool:
 
 def covariance_of(pose: BearingPose, sigma: float) -> Array:
     """Covariance (3, 3) of a pose from bearings of this standard deviation (rad)."""
-    covariance: Array = COVARIANCE_FACTOR * max(sigma, pose.sigma) ** 2 * pose.covariance + np.diag(np.square(SIGMA_FLOOR))
+    variance = COVARIANCE_FACTOR * max(sigma, pose.sigma) ** 2
+    covariance: Array = variance * pose.covariance + np.diag(np.square(SIGMA_FLOOR))
     return covariance
 
 

@@ -53,15 +53,15 @@ class Landmarks(Value):
 
 def stored_descriptors(values: Floats) -> Bytes:
     """Rows (N, D) of length 1 as they are stored, a byte each."""
-    return np.clip(np.rint(values * np.float32(DESCRIPTOR_SCALE)), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(values * np.float32(DESCRIPTOR_SCALE)), 0, 255).astype(np.uint8), np.uint8)
 
 
 class LandmarkFix(Value):
     """Poses from which an image may have been taken, each by the landmarks that it saw from there, the best first.
 
     `poses` (K, 3): x, y (m), heading (rad), map frame. `covariances` (K, 3, 3): m, m, rad. `inliers` (K,): how many
-    landmarks agree. `matches`: how many were compared. `probabilities` (K,): that each is right; their sum is at most 1,
-    and the rest is that none is.
+    landmarks agree. `matches`: how many were compared. `probabilities` (K,): that each is right; their sum is at most
+    1, and the rest is that none is.
     """
 
     poses: Annotated[Array, Shape("K", 3)]

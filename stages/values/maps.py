@@ -19,8 +19,8 @@ class ReferenceGraph(GrowableArrays, Value):
 
     `poses`: (R, 3) x, y (m), heading (rad) of the robot when the view was taken. `features`: (R, segments, bins) in
     the units of the features stage. `kind`: which features these are. `edges`: (E, 2) indices of neighbours along the
-    drive. `pose_source`: where the poses come from. `landmarks`: points that the references see; None: none were learned.
-    Grows in place by `insert` and `join`.
+    drive. `pose_source`: where the poses come from. `landmarks`: points that the references see, or None. Grows
+    in place by `insert` and `join`.
 
     The features of a map that is larger than 64 MB stay in its file: take those that are needed, `features[rows]`
     (indices, a slice or a mask; a plain array), and never all of them. A map that grows is in memory.

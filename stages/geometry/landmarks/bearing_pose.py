@@ -52,8 +52,9 @@ def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: fl
         return None
     R, t, square, spread = _refined(rotation, translation, bearings[agreeing], points[agreeing], sigma)
     pose = np.array([t[0], t[1], math.atan2(R[1, 0], R[0, 0])])
-    covariance = np.linalg.inv(square)[:3, :3]
-    return BearingPose(pose, covariance, spread, _within(R, t, bearings, points, tolerance), math.acos(min(1.0, R[2, 2])))
+    covariance: Array = np.linalg.inv(square)[:3, :3].astype(np.float64)
+    inliers = _within(R, t, bearings, points, tolerance)
+    return BearingPose(pose, covariance, spread, inliers, math.acos(min(1.0, R[2, 2])))
 
 
 def _faces() -> tuple[Array, list[Any]]:

@@ -82,9 +82,9 @@ def neighbouring_pairs(poses: Array, alike: Iterable[Floats]) -> Ints:
 
     `alike`: row r is the similarity (R,) of reference r to all.
     """
-    from scipy.spatial import cKDTree  # slow to import, and not needed without landmarks
+    from scipy.spatial import KDTree  # slow to import, and not needed without landmarks
 
-    tree = cKDTree(poses[:, :2])
+    tree = KDTree(poses[:, :2])
     pairs: set[tuple[int, int]] = set()
     for reference, (near, similarities) in enumerate(
         zip(tree.query_ball_point(poses[:, :2], APART_M[1]), alike, strict=True)
@@ -145,7 +145,7 @@ def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:
 
 
 def bearing_sigma(views: LocalViews, sightings: Sightings, poses: Array) -> float:
-    """Robust standard deviation (rad) of a bearing, by how the sightings miss their landmarks; of each of its two parts.
+    """Robust standard deviation (rad) of a bearing, of each of its two parts, by how sightings miss.
 
     A landmark of few sightings bends towards them, so their squares are divided by the freedoms that are left.
     """

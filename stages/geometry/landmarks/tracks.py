@@ -36,7 +36,7 @@ def joined_matches(first: Ints, second: Ints, image: Ints) -> Tracks:
     _join(first, second, image, parent, following, last)
     roots = _roots(parent)
     order = np.argsort(roots, kind="stable")
-    _, starts, counts = np.unique(roots[order], return_index=True, return_counts=True)
+    counts = np.unique(roots[order], return_counts=True)[1]
     several = counts > 1
     kept = np.repeat(several, counts)
     return Tracks(np.concatenate([[0], np.cumsum(counts[several])]), order[kept])

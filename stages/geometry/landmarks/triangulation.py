@@ -35,8 +35,8 @@ def triangulated_tracks(
 
     `centres` (O, 3): where each sighting was taken from (m), and `bearings` (O, 3) the unit vector it looks along, in
     the map frame. The least squares of the distances to the lines, each divided by the point's distance, so that angles
-    are minimised. Sightings that are off by more than `miss` (rad) are dropped. A point needs two images, `min_parallax`
-    (rad) between them, and to lie within `max_distance` (m) of all.
+    are minimised. Sightings that are off by more than `miss` (rad) are dropped. A point needs two images and
+    `min_parallax` (rad) between them, and lies within `max_distance` (m) of all.
     """
     points = np.full((len(starts) - 1, 3), np.nan)
     kept, parallax = np.zeros(len(centres), np.bool_), np.zeros(len(starts) - 1)
@@ -88,9 +88,9 @@ def _triangulate(
         for a in range(low, high):
             for b in range(a + 1, high):
                 if kept[a] and kept[b]:
-                    cos = (
-                        bearings[a, 0] * bearings[b, 0] + bearings[a, 1] * bearings[b, 1] + bearings[a, 2] * bearings[b, 2]
-                    )
+                    cos = 0.0
+                    for i in range(3):
+                        cos += bearings[a, i] * bearings[b, i]
                     widest = min(widest, cos)
         parallax[t] = math.acos(min(1.0, max(-1.0, widest)))
         if views >= MIN_VIEWS and parallax[t] > min_parallax:
