@@ -101,8 +101,8 @@ class LandmarkPose(Stage):
     def _candidates(
         self, features: LocalFeatures, words: VisualWords, map: ReferenceGraph, near: Particles | None
     ) -> Ints:
-        alike = words.similarities(features.descriptors)
-        best = np.argsort(-alike, kind="stable")[: self.word_references if alike.any() else 0]
+        similarities = words.similarities(features.descriptors)
+        best = np.argsort(-similarities, kind="stable")[: self.word_references if similarities.any() else 0]
         if near is None:
             return best
         places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]

@@ -47,7 +47,7 @@ def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: fl
     """
     if len(bearings) < 4:
         return None
-    rotation, translation, agreeing = _consensus(bearings, points, tolerance)
+    rotation, translation, agreeing = _ransac(bearings, points, tolerance)
     if agreeing.sum() < 4:
         return None
     R, t, square, spread = _refined(rotation, translation, bearings[agreeing], points[agreeing], sigma)
@@ -75,7 +75,7 @@ AXES, CAMERAS = _faces()
 PINHOLES = [{"model": "SIMPLE_PINHOLE", "width": 1, "height": 1, "params": [FOCAL_PX, 0.0, 0.0]}] * FACES
 
 
-def _consensus(bearings: Array, points: Array, tolerance: float) -> tuple[Array, Array, Bools]:
+def _ransac(bearings: Array, points: Array, tolerance: float) -> tuple[Array, Array, Bools]:
     azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])
     face = np.rint(azimuths * (FACES / (2.0 * math.pi))).astype(np.int64) % FACES
     rows = [np.flatnonzero(face == f) for f in range(FACES)]

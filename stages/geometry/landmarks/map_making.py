@@ -77,17 +77,17 @@ def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> Loc
     )
 
 
-def neighbouring_pairs(poses: Array, alike: Iterable[Floats]) -> Ints:
+def neighbouring_pairs(poses: Array, similarity: Iterable[Floats]) -> Ints:
     """Pairs (P, 2) of references to match, each once: the most alike ones among those at a distance of `APART_M`.
 
-    `alike`: row r is the similarity (R,) of reference r to all.
+    `similarity`: row r is the similarity (R,) of reference r to all.
     """
     from scipy.spatial import KDTree  # slow to import, and not needed without landmarks
 
     tree = KDTree(poses[:, :2])
     pairs: set[tuple[int, int]] = set()
     for reference, (near, similarities) in enumerate(
-        zip(tree.query_ball_point(poses[:, :2], APART_M[1]), alike, strict=True)
+        zip(tree.query_ball_point(poses[:, :2], APART_M[1]), similarity, strict=True)
     ):
         others = np.sort(np.array(near, np.int64))
         others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > APART_M[0]]
@@ -101,12 +101,12 @@ def matched_pairs(views: LocalViews, pairs: Ints, poses: Array) -> Tracks:
     found = [np.empty((3, 0))]
     for one, other in pairs.tolist():
         a, b = views.rows(one), views.rows(other)
-        alike = mutual_nearest(2.0 - 2.0 * (views.descriptors[a] @ views.descriptors[b].T), RATIO)
-        if len(alike.first) < MIN_MATCHES:
+        matches = mutual_nearest(2.0 - 2.0 * (views.descriptors[a] @ views.descriptors[b].T), RATIO)
+        if len(matches.first) < MIN_MATCHES:
             continue
         motion = between(poses[one], poses[other])
-        fits = fit_motion(views.bearings[a][alike.first], views.bearings[b][alike.second], motion, OFF_PLANE)
-        kept = alike.chosen(fits)
+        fits = fit_motion(views.bearings[a][matches.first], views.bearings[b][matches.second], motion, OFF_PLANE)
+        kept = matches.chosen(fits)
         found.append(np.stack([kept.first + a.start, kept.second + b.start, kept.ratio]))
     first, second, ratio = np.concatenate(found, axis=1)
     order = np.argsort(ratio, kind="stable")

@@ -49,7 +49,7 @@ def _triangulate(
     starts: Ints,
     centres: Array,
     bearings: Array,
-    least_cos: float,
+    min_cos: float,
     min_parallax: float,
     max_distance: float,
     points: Array,
@@ -81,7 +81,7 @@ def _triangulate(
                 x, y, z = point[0] - centres[o, 0], point[1] - centres[o, 1], point[2] - centres[o, 2]
                 length = math.sqrt(x * x + y * y + z * z)
                 cos = x * bearings[o, 0] + y * bearings[o, 1] + z * bearings[o, 2]
-                kept[o] = cos > least_cos * length and 0.0 < length < max_distance
+                kept[o] = cos > min_cos * length and 0.0 < length < max_distance
                 weights[o] = 1.0 / max(length * length, 1e-6)
                 views += kept[o]
         widest = 1.0
