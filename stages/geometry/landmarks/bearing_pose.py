@@ -22,6 +22,10 @@ MAX_SAMPLES = 1000
 HEIGHT_SIGMA_M, TILT_SIGMA = 0.02, math.radians(3.0)
 """Standard deviations of the camera's height against the map's, and of the robot's tilt (rad): floors are not flat, and
 robots brake."""
+MAX_TILT = math.radians(30.0)
+"""Tilt above which a pose is none of a robot on a floor (rad): the mirror image of a wall is seen from upside down."""
+START_DECIMALS = 4
+"""Decimals of the refinement's start, m and of a quaternion."""
 STEPS = 10
 """Gauss-Newton steps of the refinement."""
 
@@ -51,10 +55,13 @@ def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: fl
     if agreeing.sum() < 4:
         return None
     R, t, square, spread = _refined(rotation, translation, bearings[agreeing], points[agreeing], sigma)
+    tilt = math.acos(min(1.0, max(-1.0, float(R[2, 2]))))
+    if not tilt <= MAX_TILT:
+        return None
     pose = np.array([t[0], t[1], math.atan2(R[1, 0], R[0, 0])])
     covariance: Array = np.linalg.inv(square)[:3, :3].astype(np.float64)
     inliers = _within(R, t, bearings, points, tolerance)
-    return BearingPose(pose, covariance, spread, inliers, math.acos(min(1.0, R[2, 2])))
+    return BearingPose(pose, covariance, spread, inliers, tilt)
 
 
 def _faces() -> tuple[Array, list[Any]]:
@@ -88,8 +95,10 @@ def _ransac(bearings: Array, points: Array, tolerance: float) -> tuple[Array, Ar
     agreeing = np.zeros(len(bearings), np.bool_)
     for r, inliers in zip(rows, report["inliers"], strict=True):
         agreeing[r] = inliers
-    rotation = np.ascontiguousarray(found.R.T)
-    return rotation, -rotation @ found.t, agreeing
+    # The solver's last bits differ from call to call: rounded, the same image has the same pose to the last bit.
+    centre = np.round(-found.R.T @ found.t, START_DECIMALS)
+    found.q = np.round(found.q, START_DECIMALS) / np.linalg.norm(np.round(found.q, START_DECIMALS))
+    return np.ascontiguousarray(found.R.T), centre, agreeing
 
 
 @compiled(nogil=True)

@@ -3,13 +3,14 @@
 import dataclasses
 import math
 
+import cv2
 import numpy as np
 import pytest
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.features.rotation_reduced_sift import BLUR_PX, EDGE_RATIO, RotationReducedSift
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -100,3 +101,28 @@ def test_a_picture_of_nothing_has_no_features_and_one_without_a_camera_is_refuse
     stage.setup(Context("features"))
     with pytest.raises(BadInput, match=r"wires\.features\.camera=source\.camera"):
         stage.step(Context("features"), image=Image(np.zeros((48, 64, 3), np.uint8)))
+
+
+def test_descriptors_of_own_orientation_are_those_of_their_points() -> None:
+    picture = look("mirror", 0.4)
+    own = found(picture, orientation="own", max_features=100, contrast=0.01, max_pixels=10**6)
+    sift = cv2.SIFT.create(contrastThreshold=0.01, edgeThreshold=EDGE_RATIO, sigma=BLUR_PX, enable_precise_upscale=True)
+    points, descriptors = sift.detectAndCompute(cv2.cvtColor(picture.pixels, cv2.COLOR_BGR2GRAY), None)
+    known = {(*each.pt, row.astype(np.uint8).tobytes()) for each, row in zip(points, descriptors, strict=True)}
+    assert len(own) == 100
+    seen = {(*np.float32(at).tolist(), row.tobytes()) for at, row in zip(own.points, own.descriptors, strict=True)}
+    assert seen <= known
+
+
+@pytest.mark.parametrize("turn", [0.7, 2.9])
+def test_with_own_orientation_a_turned_robot_sees_the_same_patches_too(turn: float) -> None:
+    one, other = (found(look("mirror", each), orientation="own", contrast=0.01) for each in (0.0, turn))
+    first, second = mutual(one, other)
+    azimuth = [np.arctan2(f.bearings[:, 1], f.bearings[:, 0]) for f in (one, other)]
+    off = np.abs(wrapped(azimuth[1][second] - azimuth[0][first] + turn))
+    assert (off < math.radians(0.5)).sum() > 150
+    assert (off < math.radians(0.5)).mean() > 0.7
+
+
+def test_own_orientation_finds_nothing_in_a_picture_of_nothing() -> None:
+    assert len(found(Panorama(np.zeros((80, 360, 3), np.uint8)), orientation="own")) == 0

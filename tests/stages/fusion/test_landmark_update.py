@@ -1,0 +1,115 @@
+import math
+
+import numpy as np
+import pytest
+from landmark_tour import graph_of, tour_poses
+
+from omninav.pipeline import Context
+from omninav.stages.fusion.landmark_update import LandmarkUpdate
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import LandmarkFix
+
+MAP = graph_of(tour_poses())
+HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
+SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
+
+
+def belief(mean: np.ndarray, spread: float = 0.2, number: int = 500) -> Particles:
+    rng = np.random.default_rng(0)
+    return Particles(mean + rng.normal(0.0, spread, (number, 3)) * [1.0, 1.0, 0.3], np.full(number, 1.0 / number))
+
+
+def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> LandmarkFix:
+    number = len(poses)
+    return LandmarkFix(
+        np.array(poses).reshape(-1, 3), np.tile(SURE, (number, 1, 1)), np.full(number, 60), np.array(probabilities), 100
+    )
+
+
+def updated(now: Particles, *fixes: LandmarkFix | None, seed: int = 0) -> Particles:
+    stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed))
+    for fix in fixes:
+        now = stage.step(ctx, now, MAP, fix).belief
+    return now
+
+
+def share_at(now: Particles, pose: np.ndarray, within: float = 0.3) -> float:
+    return float(now.weights[np.hypot(*(now.poses - pose)[:, :2].T) < within].sum())
+
+
+def test_a_belief_of_decimetres_takes_in_millimetres() -> None:
+    found = updated(belief(HERE), fix_at(HERE + np.array([0.08, -0.05, 0.02]))).estimate()
+    assert np.hypot(found.pose.x - HERE[0] - 0.08, found.pose.y - HERE[1] + 0.05) < 0.002
+    assert found.pose.heading == pytest.approx(HERE[2] + 0.02, abs=math.radians(0.05))
+    assert np.sqrt(np.diag(found.covariance))[:2] == pytest.approx(0.005, rel=0.3)
+
+
+def test_a_sharp_belief_and_a_fix_as_sharp_meet_half_way() -> None:
+    sharp = Particles(
+        HERE + np.random.default_rng(0).normal(size=(5000, 3)) * np.sqrt(np.diag(SURE)), np.full(5000, 1 / 5000)
+    )
+    found = updated(sharp, fix_at(HERE + np.array([0.01, 0.0, 0.0]))).estimate()
+    assert found.pose.x == pytest.approx(HERE[0] + 0.005, abs=0.001)
+    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(0.005 / math.sqrt(2.0), rel=0.3)
+
+
+def test_headings_meet_across_the_seam_of_the_circle() -> None:
+    west = np.array([3.0, 3.0, math.pi - 0.02])
+    found = updated(belief(west), fix_at(np.array([3.0, 3.0, -math.pi + 0.02]))).estimate()
+    assert abs(abs(found.pose.heading) - math.pi + 0.02) < math.radians(0.3)
+    assert found.mode_weight > 0.9
+
+
+def test_a_belief_far_away_gives_way_after_two_fixes() -> None:
+    twice = updated(belief(HERE), fix_at(THERE), fix_at(THERE))
+    assert share_at(twice, THERE) > 0.9
+    assert np.hypot(twice.estimate().pose.x - THERE[0], twice.estimate().pose.y - THERE[1]) < 0.01
+
+
+def test_one_fix_elsewhere_does_not_wipe_out_the_belief() -> None:
+    once = updated(belief(HERE), fix_at(THERE))
+    assert share_at(once, HERE, 1.0) > 0.01
+    assert (np.hypot(*(once.poses - HERE)[:, :2].T) < 1.0).sum() >= 20
+    back = updated(once, fix_at(HERE), fix_at(HERE))
+    assert share_at(back, HERE) > 0.9
+
+
+def test_of_two_poses_the_one_where_the_belief_is_wins() -> None:
+    found = updated(belief(HERE), fix_at(THERE, HERE, probabilities=(0.5, 0.49)))
+    assert share_at(found, HERE) > 0.9
+
+
+def test_without_a_fix_the_belief_stays_as_it_is() -> None:
+    now = belief(HERE)
+    assert updated(now, None) is now
+    assert updated(now, fix_at(probabilities=())) is now
+
+
+def test_a_fix_that_is_probably_wrong_changes_little() -> None:
+    found = updated(belief(HERE), fix_at(THERE, probabilities=(1e-6,)))
+    assert share_at(found, HERE, 1.5) > 0.99
+
+
+@pytest.mark.parametrize("where", [HERE, THERE])
+def test_weights_are_shares_and_recovery_particles_come_last(where) -> None:
+    found = updated(belief(HERE), fix_at(where))
+    assert found.weights.sum() == pytest.approx(1.0)
+    assert np.isfinite(found.poses).all()
+    assert np.abs(found.poses[:, 2]).max() <= math.pi
+    assert 0 < found.recovery_particles < len(found.poses)
+    assert np.hypot(*(found.poses[-found.recovery_particles :] - where)[:, :2].T).max() < 0.05
+
+
+def test_the_number_of_particles_does_not_grow_from_image_to_image() -> None:
+    now, sizes = belief(HERE), []
+    for _ in range(12):
+        now = updated(now, fix_at(HERE))
+        sizes.append(len(now.poses))
+    assert max(sizes) < 2 * len(belief(HERE).poses)
+    assert sizes[-1] <= sizes[0]
+
+
+def test_chance_comes_from_the_seed_alone() -> None:
+    one, other = (updated(belief(HERE), fix_at(HERE), fix_at(THERE)) for _ in range(2))
+    assert one.poses.tobytes() == other.poses.tobytes()
+    assert one.weights.tobytes() == other.weights.tobytes()

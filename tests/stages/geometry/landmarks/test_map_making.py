@@ -1,0 +1,126 @@
+import numpy as np
+import pytest
+from landmark_world import NOISE, house
+
+from omninav.stages.geometry.landmarks.map_making import (
+    LocalViews,
+    bearing_sigma,
+    local_views,
+    matched_pairs,
+    mean_descriptors,
+    neighbouring_pairs,
+    sightings_by_reference,
+    similarity_rows,
+    triangulated,
+)
+
+
+@pytest.fixture(scope="module")
+def world():
+    return house(np.random.default_rng(0), landmarks=4000)
+
+
+@pytest.fixture(scope="module")
+def features(world):
+    """Features of each reference, and the landmark of each; a descriptor varies a little."""
+    rng = np.random.default_rng(1)
+    order = np.argsort(world.references, kind="stable")
+    looks = rng.normal(size=(len(world.points), 128))[world.landmarks[order]]
+    looks = looks + rng.normal(0.0, 0.2, looks.shape)
+    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
+    cuts = np.searchsorted(world.references[order], np.arange(1, len(world.poses)))
+    views = local_views(np.split(world.bearings[order], cuts), np.split(looks.astype(np.float32), cuts))
+    return views, world.landmarks[order]
+
+
+@pytest.fixture(scope="module")
+def pairs(world):
+    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
+    seen[world.references, world.landmarks] = 1.0
+    return neighbouring_pairs(world.poses, iter(seen @ seen.T))
+
+
+@pytest.fixture(scope="module")
+def found(world, features, pairs):
+    views, _ = features
+    return triangulated(views, matched_pairs(views, pairs, world.poses), world.poses)
+
+
+def test_landmarks_lie_where_the_points_of_the_world_are(world, features, found) -> None:
+    own = features[1][found.features]
+    off = np.linalg.norm(found.points[found.landmarks] - world.points[own], axis=1)
+    assert len(found.points) > 1000
+    assert np.median(off) < 0.02
+    assert np.percentile(off, 95) < 0.2
+
+
+def test_sightings_of_a_landmark_are_of_one_point_from_different_references(features, found) -> None:
+    views, landmarks = features
+    first = landmarks[found.features][np.searchsorted(found.landmarks, np.arange(len(found.points)))]
+    assert (landmarks[found.features] == first[found.landmarks]).mean() > 0.99
+    seen_by = np.column_stack([found.landmarks, views.owners[found.features]])
+    assert len(np.unique(seen_by, axis=0)) == len(seen_by)
+    assert np.bincount(found.landmarks).min() >= 2
+
+
+@pytest.mark.parametrize("flip", [[1, -1, 1], [-1, 1, 1]])
+def test_a_mirrored_camera_gives_next_to_no_landmarks(world, features, pairs, found, flip) -> None:
+    starts, bearings, descriptors = features[0]
+    views = LocalViews(starts, bearings * flip, descriptors)
+    mirrored = triangulated(views, matched_pairs(views, pairs, world.poses), world.poses)
+    assert len(mirrored.points) < 0.15 * len(found.points)
+
+
+def test_the_deviation_of_bearings_is_that_of_the_images(world, features, found) -> None:
+    assert bearing_sigma(features[0], found, world.poses) == pytest.approx(NOISE, rel=0.15)
+
+
+def test_each_reference_has_the_landmarks_that_it_sees(features, found) -> None:
+    views, _ = features
+    starts, seen = sightings_by_reference(views, found)
+    assert len(starts) == len(views) + 1
+    for reference in (0, 50, len(views) - 1):
+        own = found.landmarks[views.owners[found.features] == reference]
+        assert sorted(seen[starts[reference] : starts[reference + 1]]) == sorted(own)
+
+
+def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None:
+    views, _ = features
+    looks = mean_descriptors(views, found)
+    assert np.linalg.norm(looks, axis=1) == pytest.approx(1.0, abs=1e-5)
+    alike = np.einsum("od,od->o", looks[found.landmarks], views.descriptors[found.features])
+    assert np.median(alike) > 0.97
+
+
+def test_neighbours_are_the_most_similar_ones_within_reach_each_pair_once() -> None:
+    poses = np.zeros((30, 3))
+    poses[:, 0] = np.arange(30) * 0.15
+    poses[29] = poses[28] + [0.05, 0.0, 0.0]  # too near to say anything of depths
+    similarity = np.random.default_rng(0).random((30, 30)).astype(np.float32)
+    pairs = neighbouring_pairs(poses, iter(similarity))
+    gaps = np.abs(np.diff(poses[pairs, 0], axis=1))
+    assert gaps.min() > 0.1
+    assert gaps.max() <= 2.0
+    assert (pairs[:, 0] < pairs[:, 1]).all()
+    assert len(np.unique(pairs, axis=0)) == len(pairs)
+    there = [n for n in range(30) if 0.1 < abs(poses[n, 0] - poses[14, 0]) <= 2.0]
+    best = sorted(there, key=lambda n: -similarity[14, n])[:10]
+    assert {(min(14, n), max(14, n)) for n in best} <= set(map(tuple, pairs.tolist()))
+
+
+def test_similarities_by_words_are_cosines() -> None:
+    starts, words = np.array([0, 2, 3, 3]), np.array([0, 2, 2], np.int32)
+    weights = np.array([0.6, 0.8, 1.0], np.float32)
+    rows = np.array(list(similarity_rows(starts, words, weights, 4)))
+    assert rows == pytest.approx(np.array([[1.0, 0.8, 0.0], [0.8, 1.0, 0.0], [0.0, 0.0, 0.0]]))
+
+
+def test_references_without_features_have_no_landmarks() -> None:
+    views = local_views([np.empty((0, 3))] * 2, [np.empty((0, 128), np.float32)] * 2)
+    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    found = triangulated(views, matched_pairs(views, np.array([[0, 1]]), poses), poses)
+    assert found.points.shape == (0, 3)
+    assert mean_descriptors(views, found).shape == (0, 128)
+    assert sightings_by_reference(views, found)[0].tolist() == [0, 0, 0]
+    assert bearing_sigma(views, found, poses) > 0.0
+    assert neighbouring_pairs(np.empty((0, 3)), iter(())).shape == (0, 2)

@@ -1,0 +1,109 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, with_landmarks
+from made_tour import Landmarks as Points
+from made_words import NOTHING, features_of
+
+from omninav.pipeline import Context
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceGraph
+
+FIRST = np.array([3.1, 2.9, 0.4])
+AWAY = np.array([40.0, 0.0, 0.0])
+
+
+def fix(
+    features: LocalFeatures, map: ReferenceGraph | None = None, near: Particles | None = None, **parameters: int
+) -> LandmarkFix | None:
+    stage, ctx = LandmarkPose(**parameters), Context("landmark_pose")
+    stage.setup(ctx)
+    return stage.step(ctx, features, map or mapped_room(), near).fix
+
+
+def belief(*pose: float) -> Particles:
+    rng = np.random.default_rng(0)
+    return Particles(np.array(pose) + rng.normal(0.0, 0.1, (50, 3)), np.full(50, 0.02))
+
+
+@pytest.mark.parametrize("near", [None, belief(3.0, 3.0, 0.4), belief(10.9, 0.5, -2.0)])
+@pytest.mark.parametrize("pose", [(3.1, 2.9, 0.4), (5.3, 3.2, 3.1), (1.6, 2.2, -1.7)])
+def test_the_pose_is_known_to_a_millimetre_whatever_is_believed(pose, near) -> None:
+    found = fix(seen_from(room(), np.array(pose)), near=near)
+    assert np.hypot(*(found.poses[0] - pose)[:2]) < 1e-3
+    assert abs(wrap(found.poses[0, 2] - pose[2])) < math.radians(0.02)
+    assert 12 <= found.inliers[0] <= found.matches
+    assert np.argmax(found.probabilities) == 0
+    assert 0.0 < found.probabilities.sum() <= 1.0
+    assert np.sqrt(np.linalg.eigvalsh(found.covariances[0])).max() < 0.05
+
+
+def test_where_words_say_nothing_the_belief_names_the_candidates() -> None:
+    map = mapped_room()
+    words = replace(map.landmarks.words, rarity=np.zeros_like(map.landmarks.words.rarity))
+    wordless = replace(map, landmarks=replace(map.landmarks, words=words))
+    features = seen_from(room(), FIRST)
+    assert fix(features, wordless) is None
+    assert fix(features, wordless, belief(10.5, 3.5, 0.0)) is None
+    assert fix(features, wordless, belief(3.0, 2.8, 0.0)).poses[0] == pytest.approx(FIRST, abs=1e-3)
+
+
+def test_a_mirrored_image_and_one_of_another_room_have_no_pose() -> None:
+    features = seen_from(room(), FIRST)
+    assert fix(replace(features, bearings=features.bearings * [1.0, -1.0, 1.0])) is None
+    looks = np.random.default_rng(1).integers(0, 100, features.descriptors.shape).astype(np.uint8)
+    assert fix(replace(features, descriptors=looks)) is None
+
+
+def test_two_places_that_look_the_same_are_rivals() -> None:
+    one = np.random.default_rng(2).uniform([0, 0, 0], [8, 6, 2.2], (500, 3))
+    points = Points(np.concatenate([one, one + AWAY]), np.tile(np.arange(500), 2))
+    points.looks[500::2] = np.random.default_rng(3).integers(0, 100, (250, 128))  # every other one differs
+    poses = np.concatenate([tour_poses(), tour_poses() + AWAY])
+    map = with_landmarks(graph_of(poses), [seen_from(points, pose) for pose in poses])
+    features = seen_from(points, FIRST)
+    other = seen_from(points, FIRST + AWAY)
+    half = np.arange(len(features)) % 2 == 0
+    mixed = replace(features, descriptors=np.where(half[:, None], features.descriptors, other.descriptors))
+    found = fix(mixed, map, word_references=30)
+    assert len(found) == 2
+    assert sorted(found.poses[:, 0]) == pytest.approx([FIRST[0], FIRST[0] + 40.0], abs=1e-2)
+    assert found.inliers[0] >= found.inliers[1] >= 12
+
+
+def test_an_image_that_shows_too_little_says_nothing() -> None:
+    features = seen_from(room(), FIRST)
+    assert fix(NOTHING) is None
+    assert fix(features.chosen(slice(0, 11))) is None
+    assert fix(features, min_inliers=len(features) + 1) is None
+
+
+def test_a_map_without_landmarks_says_nothing() -> None:
+    features, map = seen_from(room(), FIRST), graph_of(tour_poses()[:3])
+    assert fix(features, map) is None
+    assert fix(features, with_landmarks(map, [NOTHING] * 3), belief(*FIRST)) is None
+
+
+def test_features_of_another_kind_than_the_maps_are_refused() -> None:
+    short = features_of(np.ones((40, 64), np.uint8))
+    with pytest.raises(BadInput, match="128 numbers, the image's have 64; use the features the map was learned with"):
+        fix(short)
+
+
+def test_references_that_a_map_has_learned_since_are_no_candidates() -> None:
+    map = mapped_room()
+    grown = replace(map, poses=np.concatenate([map.poses, [[3.0, 2.9, 0.0]]]), features=np.zeros((len(map) + 1, 12, 4)))
+    assert fix(seen_from(room(), FIRST), grown, belief(*FIRST)).poses[0] == pytest.approx(FIRST, abs=1e-3)
+
+
+def test_the_same_image_has_the_same_pose_to_the_last_bit() -> None:
+    one, other = (fix(seen_from(room(), FIRST), near=belief(*FIRST)) for _ in range(2))
+    assert one.poses.tobytes() == other.poses.tobytes()
+    assert one.covariances.tobytes() == other.covariances.tobytes()
