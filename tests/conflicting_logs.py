@@ -27,7 +27,8 @@ from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnRef
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.monitor.map_check import CheckMap
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 from omninav.stages.unwarp.table import PanoramaTable
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -268,7 +269,7 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
 def ticks(source: LogSource, ctx: Context) -> Iterator[Any]:
     """All that a source gives; `ctx` is at each tick."""
     source.setup(ctx)
-    position = LogSourceState()
+    position = PlaybackState()
     while (out := source.step(ctx, position)) is not None:
         ctx.tick = out.tick
         yield out

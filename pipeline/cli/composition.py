@@ -27,6 +27,7 @@ from .composition_cache import compose
 from .config_groups import listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
+from .stand_ins import contradictions, take_stand_ins
 from .words import read_flags
 
 OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
@@ -35,6 +36,9 @@ OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "ob
 """Settings that every run reads, whatever its graph is."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
+
+LINK = re.compile(r"\$\{(\w+)\}")
+"""A value that is another setting."""
 
 
 def _unless(given: str, wanted: str, *, _root_: Any) -> Any:
@@ -85,9 +89,11 @@ def complete(config: Any) -> dict[str, Any]:
     """
     try:
         _name_past_links(config)
+        take_stand_ins(config)
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
         problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
+        problems += contradictions(config)
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
             if spec.variant is not None:
@@ -109,7 +115,10 @@ def complete(config: Any) -> dict[str, Any]:
             if spec.file is not None:
                 own["file"] = _past_links(spec.file)
             elif choices is not None and making.file is None and not _lacks(config, maker):
-                own["graph"] = copy.deepcopy(graph_of(maker))
+                graph, its_settings = graph_of(maker)
+                own["graph"] = copy.deepcopy(graph)
+                if "set" in own:
+                    own["set"] = {key: value for key, value in own["set"].items() if key in its_settings}
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
@@ -138,7 +147,8 @@ def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
     return convert_fields(settings, RunSettings, "")[1]
 
 
-def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> dict[str, Any]:
+def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> tuple[dict[str, Any], set[str]]:
+    """The graph that makes an artifact, and the settings that it reads."""
     spec = specs[name]
     words = words_of_graph(str(config.variant), spec.choices or {})
     try:
@@ -155,6 +165,7 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
             hint = suggest(key, settings, "settings")
             raise ProblemsFound([Problem(f"artifacts.{name}.set.{key}", "there is no such setting", hint)])
         other[key] = value
+    take_stand_ins(other)
     absent = {*spec.inherit} - {*other.nodes}
     for each in (spec, *(other for other in specs.values() if other.together_with == name)):
         for node in filter(lambda node: is_repeatable(config.nodes[node]), each.inherit):
@@ -169,7 +180,7 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
     made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
     if absent:
         made["nodes"] = dict(sorted(made["nodes"].items(), key=lambda item: _place_in_groups(item[0])))
-    return {key: made.get(key) for key in ("nodes", "wires", "saves")}
+    return {key: made.get(key) for key in ("nodes", "wires", "saves")}, settings_read(other)
 
 
 def _place_in_groups(node: str) -> int:
@@ -185,7 +196,7 @@ def _linked(config: Any, name: str) -> dict[str, str]:
     """Settings of an artifact's graph that are other settings of this run (`set: {a: ${b}}`): name -> that one."""
     changed = config.artifacts[name].get("set")
     raw: Any = OmegaConf.to_container(changed, resolve=False) if changed is not None else {}
-    links = {key: re.fullmatch(r"\$\{(\w+)\}", value) for key, value in raw.items() if isinstance(value, str)}
+    links = {key: LINK.fullmatch(value) for key, value in raw.items() if isinstance(value, str)}
     return {key: link[1] for key, link in links.items() if link}
 
 
@@ -231,7 +242,10 @@ def _past_links(file: str) -> str:
 
 
 def settings_read(config: Any) -> set[str]:
-    """The settings that the graph and its artifacts read, directly or by way of other settings."""
+    """The settings that the graph and its artifacts read, directly or by way of other settings.
+
+    A block that an artifact's `set` takes over whole is written there, and is none of them.
+    """
     read: set[str] = set()
     waiting = list(OF_THE_VARIANT)
     raw: Any = OmegaConf.to_container(config, resolve=False)
@@ -243,7 +257,8 @@ def settings_read(config: Any) -> set[str]:
                 if each in config and each not in read:
                     read.add(each)
                     waiting.append(each)
-    return read - set(OF_THE_VARIANT)
+    taken_over = (str((spec or {}).get("set")) for spec in (raw["artifacts"] or {}).values())
+    return read - {*OF_THE_VARIANT, *(link[1] for link in map(LINK.fullmatch, taken_over) if link)}
 
 
 def _without_taken_out(config: dict[str, Any]) -> dict[str, Any]:

@@ -47,6 +47,13 @@ def replaced() -> dict[str, str]:
     return _read("replaced.yaml")
 
 
+@functools.cache
+def stand_ins() -> tuple[tuple[str, str, dict[str, str]], ...]:
+    """Reads which option of a group another stands in for: group, option, and the rule (see `take_stand_ins`)."""
+    listed = ((name.partition("="), rule) for name, rule in _read("stand_ins.yaml").items())
+    return tuple((group, option, rule) for (group, _, option), rule in listed)
+
+
 def learnable() -> list[str]:
     """The artifacts that can be made by themselves (`learn=NAME`, `omninav NAME`)."""
     return [file.name.removesuffix(".yaml") for file in group_files(LEARN)]

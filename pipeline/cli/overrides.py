@@ -26,6 +26,7 @@ from omninav.pipeline.graph.signature import signature
 from .composition_cache import compose
 from .config_groups import replaced, suggest_option
 from .hydra_session import SETTABLE, not_settable
+from .stand_ins import decisive_settings, exchanged
 
 MAX_JOBS = 100_000
 """Jobs of a sweep, and values of each setting that varies."""
@@ -45,8 +46,9 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     groups = {name: _options(name, folders) for name in _groups(folders)}
     swaps = [word for word in parsed if word.key_or_group in groups]
     options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
+    deciding = [word for word in parsed if word.key_or_group in decisive_settings()]
     known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
-    plain = _plain(known, folders)
+    plain = _plain([*known, *deciding], folders)
     for word in parsed if plain else ():
         # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
         if word not in swaps and not (options and word.key_or_group.startswith(WITHIN_GRAPH)):
@@ -78,8 +80,8 @@ def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> li
     if not any(word.startswith("nodes.") for word in words):
         return list(words)
     _, parsed = parsed_words(words)
-    groups = _groups(folders)
-    plain = _plain([word for word in parsed if word.key_or_group in groups], folders)
+    deciding = {*_groups(folders), *decisive_settings()}
+    plain = _plain([word for word in parsed if word.key_or_group in deciding], folders)
     return [f"++{word}" if word.startswith("nodes.") and _unlisted(word, plain) else word for word in words]
 
 
@@ -133,10 +135,12 @@ def _number_of_values(word: Override) -> int:
 
 
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
-    """The configuration with these options of groups alone, the first of each that is swept; {} where there is none."""
+    """The configuration with these options alone, the first of each that is swept; {} where there is none."""
     try:
         config = compose([text for word in swaps for text in _texts(word)[:1]])
         plain: Any = OmegaConf.to_container(config, resolve=False)
+        for name, node in exchanged(config):
+            plain["nodes"][name]["_target_"] = node["_target_"]  # lists what it listed, and has other parameters
     except HydraException:
         plain = {}
     return dict(plain)

@@ -13,9 +13,6 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
-from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.occupancy import occupancy
-from omninav.stages.simulator.world import World
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
@@ -37,16 +34,13 @@ class PlaceGrid(Stage):
 
     grid: str | None = None
     """A map_server file, or its folder; from_tour: a stand-in made of the free path of the map's references; null: the
-    simulated world's own on its first day, where no log is named."""
+    one that is wired as `known`."""
     resolution_m: Annotated[float, Bounds(gt=0)] = 0.1
     """Side of a cell, about: a file's cells are merged, not split."""
     log: str | tuple[str, ...] | None = None
     """The log that is driven: its grid is not known, unless `grid` names it."""
     tour: str | tuple[str, ...] | None = None
     """The log that the map was made from; grids beside it are suggested."""
-    world: WorldConfig = WorldConfig()
-    """The simulated world."""
-
     clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
     """Least distance of free space from anything occupied."""
 
@@ -64,7 +58,13 @@ class PlaceGrid(Stage):
         self._read(file)
         return grid_digest(file)
 
-    def step(self, ctx: Context, map: ReferenceGraph | None = None, length_scale: LengthScale | None = None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        known: OccupancyGrid | None = None,
+        map: ReferenceGraph | None = None,
+        length_scale: LengthScale | None = None,
+    ) -> Out:
         """Read, take or make the grid."""
         file = self._file()
         if self.grid == FROM_TOUR:
@@ -80,12 +80,10 @@ class PlaceGrid(Stage):
         elif file is not None:
             grid = self._read(file)
             ctx.fact("grid", file.name)
+        elif known is not None:
+            grid = known
         else:
-            if math.prod(self.world.size) > MAX_CELLS * self.resolution_m**2:
-                raise BadInput(f"grid: {self.world.name} has more than {MAX_CELLS:,} cells; use a larger resolution_m")
-            cells, origin = occupancy(World(self.world, 0), self.resolution_m)
-            grid = OccupancyGrid(np.where(cells, OCCUPIED, FREE).astype(np.uint8), self.resolution_m, origin, "world")
-            ctx.fact("grid", f"of the built-in world {self.world.name}")
+            raise BadInput(f"grid: none is named; give grid=FOLDER/map.yaml (of ROS map_server), or grid={FROM_TOUR}")
         clearance = 0.0 if grid.made_from == "tour" else self.clearance_m
         space = free_space(grid, clearance, None if map is None else map.poses)
         if space is None:

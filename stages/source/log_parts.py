@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.simulator.config import Kidnapping, WorldConfig
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
 
@@ -20,7 +19,7 @@ OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 @dataclass(frozen=True)
 class Selection:
-    """Which frames of a log are used; see the parameters of the same names of `LogSource`."""
+    """Which frames of a log are used; see the parameters of the same names of `Playback`."""
 
     first: int
     stop: int | None
@@ -43,18 +42,6 @@ class LogPart:
     driven: Array
     truth: Array | None
     kind: OdometryKind
-
-
-def simulated_drives(
-    world: WorldConfig, route: str, day: int | tuple[int, ...], kidnappings: tuple[Kidnapping, ...]
-) -> list[Recording]:
-    """Drives through a simulated world, one for each day."""
-    from omninav.stages.simulator.simulated_recording import (  # brings the compiler, which a log does not need
-        SimulatedRecording,
-        in_order,
-    )
-
-    return [SimulatedRecording(world, route, each, kidnappings) for each in in_order(day)]
 
 
 def parts_of(recording: Recording, truth: Array | None, selection: Selection, guess: bool) -> list[LogPart]:

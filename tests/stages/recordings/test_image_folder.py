@@ -17,7 +17,8 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.tables import NO_TIME, Angle, Length, Time, read_table
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.encoded_image import decode_image, orientation_of
 
 DESCRIPTION = """
@@ -345,6 +346,6 @@ def test_a_folder_of_images_of_a_turned_camera_is_upright_and_said(tmp_path: Pat
         (tmp_path / f"{name}.jpg").write_bytes(as_held(pixels, orientation))
     source, ctx = LogSource(log=str(tmp_path), camera="equirectangular", rate_hz=1.0, speed_m_s=0.5), Context("source")
     source.setup(ctx)
-    first, second = (source.step(ctx, LogSourceState(next=number)).image.pixels for number in (0, 1))
+    first, second = (source.step(ctx, PlaybackState(next=number)).image.pixels for number in (0, 1))
     assert np.abs(first.astype(float) - second).mean() < 3.0
     assert ctx.facts["turned_images"] == "1, as their EXIF orientation says"

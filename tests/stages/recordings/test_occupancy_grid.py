@@ -10,9 +10,9 @@ from world_files import DEMO
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
-from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
+from omninav.stages.simulator.world_grid import WorldGrid
 from omninav.stages.source.grid import PlaceGrid, along_path, free_space
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale
@@ -162,12 +162,19 @@ def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
 
 
 def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path):
-    out = PlaceGrid(world=DEMO, resolution_m=0.1).step(CTX)
+    known = WorldGrid(world=DEMO, resolution_m=0.1).step(CTX).grid
+    out = PlaceGrid(resolution_m=0.1).step(CTX, known)
     read = read_occupancy(write_grid(World(DEMO, 0), tmp_path, 0.1))
     assert out.grid.made_from == "world"
     np.testing.assert_array_equal(out.grid.cells, read.cells)
     assert PlaceGrid().inputs_digest() is None
-    assert isinstance(PlaceGrid().world, WorldConfig)
+    with pytest.raises(BadInput, match=r"grid: none is named; give grid=FOLDER/map.yaml"):
+        PlaceGrid().step(CTX)
+
+
+def test_a_world_gives_no_grid_of_a_log_or_beside_one_that_is_named():
+    assert WorldGrid(world=DEMO, log="drive.mcap").step(CTX).grid is None
+    assert WorldGrid(world=DEMO, grid="from_tour").step(CTX).grid is None
 
 
 def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
@@ -188,7 +195,7 @@ def test_a_grid_that_is_not_there_is_named(tmp_path):
 def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
     ctx = Context("grid")
     stage = PlaceGrid(grid="from_tour", log="drive.mcap", resolution_m=0.1)
-    out = stage.step(ctx, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
+    out = stage.step(ctx, None, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
     assert out.grid.made_from == "tour"
     assert ctx.counts["grid_is_a_stand_in"] == 1
     assert "stand-in" in ctx.facts["grid"]
@@ -214,7 +221,7 @@ def test_a_stand_in_without_a_map_is_refused():
 def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path):
     ctx = Context("grid")
     written(tmp_path, [[254] * 4] * 4)
-    out = PlaceGrid(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, a_map((50.0, 50.0)))
+    out = PlaceGrid(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, map=a_map((50.0, 50.0)))
     assert len(out.free.centres) == 16
     assert ctx.counts["references_off_the_free_space"] == 1
 

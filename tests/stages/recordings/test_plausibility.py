@@ -28,7 +28,8 @@ from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits, believed, seconds_within, without_jumps
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.pose import BridgedMotion, Motion
 
 Pose = tuple[float, float, float]
@@ -128,7 +129,7 @@ def test_true_poses_may_jump_as_those_of_a_robot_that_is_carried(tmp_path: Path)
 
 def test_the_motion_across_a_gap_is_less_certain(tmp_path: Path) -> None:
     path = log_with(tmp_path / "log.mcap", far(1e4))
-    source, state, ctx = LogSource(log=str(path)), LogSourceState(), Context("source", np.random.default_rng(0))
+    source, state, ctx = LogSource(log=str(path)), PlaybackState(), Context("source", np.random.default_rng(0))
     source.setup(ctx)
     motions = [source.step(ctx, state).motion for _ in range(FRAMES)]
     assert ctx.counts == {"impossible_motion": 1}

@@ -13,7 +13,8 @@ from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.truth_file import read_trajectory
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 
 SECONDS = tuple(0.1 * number for number in range(101))
 
@@ -69,7 +70,7 @@ def test_what_is_no_trajectory_says_what_is_missing(tmp_path: Path) -> None:
 
 def outs(source: LogSource, ctx: Context) -> list:
     source.setup(ctx)
-    position, found = LogSourceState(), []
+    position, found = PlaybackState(), []
     while (out := source.step(ctx, position)) is not None:
         found.append(out)
     return found

@@ -21,7 +21,9 @@ from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
+from omninav.stages.source.simulated import SimulatedSource
 
 SMALL = mirror(columns=160)
 WORLD = replace(
@@ -158,7 +160,7 @@ def test_the_log_source_gives_ranges_with_each_tick_and_does_without(log: Path):
     def first(**parameters: object) -> LogSource.Out:
         source, ctx = LogSource(log=str(log), **parameters), Context("source")  # type: ignore[arg-type]
         source.setup(ctx)
-        out = source.step(ctx, LogSourceState())
+        out = source.step(ctx, PlaybackState())
         assert out is not None
         return out
 
@@ -192,8 +194,8 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
     days = [SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", day) for day in (0, 2)]
     record(days, tmp_path / "days.mcap")
 
-    def ticks(source: LogSource) -> list[LogSource.Out]:
-        ctx, position, outs = Context("source"), LogSourceState(), []
+    def ticks(source: LogSource | SimulatedSource) -> list[LogSource.Out | SimulatedSource.Out]:
+        ctx, position, outs = Context("source"), PlaybackState(), []
         source.setup(ctx)
         while (out := source.step(ctx, position)) is not None:
             outs.append(out)
@@ -201,7 +203,7 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
         return outs
 
     read = ticks(LogSource(log=str(tmp_path / "days.mcap")))
-    driven = ticks(LogSource(world=replace(WORLD, delivery=Delivery()), route="there", day=(2, 0)))
+    driven = ticks(SimulatedSource(world=replace(WORLD, delivery=Delivery()), route="there", day=(2, 0)))
     assert [out.tick.log for out in read] == [0] * len(days[0].stamps) + [1] * len(days[1].stamps)
     assert [out.motion is None for out in read] == [out.tick.first_of_log for out in read]
     assert sum(out.tick.first_of_log for out in read) == 2
@@ -216,7 +218,7 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
 
 def test_days_that_cannot_be_are_refused():
     with pytest.raises(UnreadableRecording, match=r"days are numbered from 0; type day=1 or day=\[0,1,2\]"):
-        LogSource(world=WORLD, route="there", day=(0, -1)).setup(Context("source"))
+        SimulatedSource(world=WORLD, route="there", day=(0, -1)).setup(Context("source"))
 
 
 def test_what_a_written_log_states_does_not_count_the_metres_it_was_carried(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.visual_compass import turn_between
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.pose import GuessedMotion, Motion
 
 TURNS_DEG = (0.0, 5.0, 5.0, -20.0, 90.0)
@@ -46,7 +47,7 @@ def test_the_compass_finds_turns_between_columns():
 
 
 def test_a_video_drives_straight_at_the_stated_speed_and_turns_as_it_is_seen(turning: str) -> None:
-    source, ctx, position, outs = LogSource(log=turning, speed_m_s=0.8), context(), LogSourceState(), []
+    source, ctx, position, outs = LogSource(log=turning, speed_m_s=0.8), context(), PlaybackState(), []
     source.setup(ctx)
     while (out := source.step(ctx, position)) is not None:
         outs.append(out)
@@ -82,7 +83,7 @@ def test_a_guessed_motion_is_as_uncertain_as_it_says():
 
 
 def test_a_rate_takes_the_first_image_of_each_period(turning: str) -> None:
-    source, ctx, position = LogSource(log=turning, rate_hz=0.5), context(), LogSourceState()
+    source, ctx, position = LogSource(log=turning, rate_hz=0.5), context(), PlaybackState()
     source.setup(ctx)
     frames = []
     while (out := source.step(ctx, position)) is not None:

@@ -20,7 +20,8 @@ from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.source import live
 from omninav.stages.source.live import LiveSource, LiveSourceState
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 
 DRIVE = Path(__file__).parents[2] / "data/drive.mcap"
 CAMERA = str(Path(__file__).parents[2] / "data/camera.yaml")
@@ -103,7 +104,7 @@ class Drive:
 
 
 def replayed(record: Path) -> list[LogSource.Out]:
-    source, state = LogSource(log=str(record)), LogSourceState()
+    source, state = LogSource(log=str(record)), PlaybackState()
     ctx = Context("source")
     source.setup(ctx)
     outs = []

@@ -13,7 +13,8 @@ from omninav.pipeline import BadInput, Context
 from omninav.stages.live import camera_transport
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.source.live import LiveSource, LiveSourceState
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 
 FRAMES = 8
 
@@ -46,7 +47,7 @@ def turns(monkeypatch: pytest.MonkeyPatch) -> threading.Semaphore:
 
 def ticks(
     source: LiveSource | LogSource,
-    state: LiveSourceState | LogSourceState,
+    state: LiveSourceState | PlaybackState,
     ctx: Context,
     turns: threading.Semaphore,
 ) -> list:
@@ -70,7 +71,7 @@ def test_a_camera_that_is_plugged_in_is_a_live_run_whose_record_gives_the_same(
     turned = math.degrees(live[-1].odometry.heading - live[0].odometry.heading)
     assert turned % 5.0 == pytest.approx(0.0, abs=0.7) or turned % 5.0 == pytest.approx(5.0, abs=0.7)
     assert turned > 4.0
-    log = ticks(LogSource(log=str(tmp_path / "live.mcap"), speed_m_s=0.5), LogSourceState(), Context("source"), turns)
+    log = ticks(LogSource(log=str(tmp_path / "live.mcap"), speed_m_s=0.5), PlaybackState(), Context("source"), turns)
     assert len(log) == len(live)
     for one, other in zip(live, log, strict=True):
         assert vars(one.tick) == vars(other.tick)

@@ -17,7 +17,8 @@ from omninav.stages.camera.model import MODELS
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.log import LogSource
+from omninav.stages.source.playback import PlaybackState
 from omninav.stages.source.synthetic_odometry import add_odometry_noise
 from omninav.stages.values.pose import GuessedMotion
 
@@ -27,9 +28,9 @@ def context(seed: int = 0) -> Context:
 
 
 def drive(
-    source: LogSource, ctx: Context | None = None, position: LogSourceState | None = None, most: int = 10**6
+    source: LogSource, ctx: Context | None = None, position: PlaybackState | None = None, most: int = 10**6
 ) -> list:
-    ctx, position, outs = ctx or context(), position or LogSourceState(), []
+    ctx, position, outs = ctx or context(), position or PlaybackState(), []
     source.setup(ctx)
     while len(outs) < most and (out := source.step(ctx, position)) is not None:
         outs.append(out)
@@ -94,9 +95,9 @@ def test_a_source_resumed_from_its_state_goes_on_with_the_same_values(
 ) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", None if measured else without(ODOMETRY)))
     whole = drive(LogSource(log=(path, path)))
-    ctx, position = context(), LogSourceState()
+    ctx, position = context(), PlaybackState()
     head = drive(LogSource(log=(path, path)), ctx, position, stop)
-    later, kept = context(99), LogSourceState(**copy.deepcopy(vars(position)))
+    later, kept = context(99), PlaybackState(**copy.deepcopy(vars(position)))
     later.rng.bit_generator.state = ctx.rng.bit_generator.state
     tail = drive(LogSource(log=(path, path)), later, kept)
     assert len(head) + len(tail) == len(whole) == 2 * FRAMES
@@ -189,7 +190,9 @@ def test_other_code_of_a_camera_model_of_ones_own_makes_other_results(
     camera.write_text("{projection: mine, image: {width: 48, height: 16}, column_of_forward: 24}")
     digests = set()
     for code in ("first", "second"):
-        monkeypatch.setattr("omninav.stages.source.log.module_version", lambda module, code=code: f"{module} {code}")
+        monkeypatch.setattr(
+            "omninav.stages.source.playback.module_version", lambda module, code=code: f"{module} {code}"
+        )
         digests.add(LogSource(log=path, camera=str(camera)).inputs_digest())
     assert len(digests) == 2
 

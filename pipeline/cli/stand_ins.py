@@ -1,0 +1,53 @@
+"""Options that another option stands in for where a setting is null, as `conf/stand_ins.yaml` says.
+
+Which one it is follows from settings, and Hydra composes options before it sets any. So the node is exchanged in the
+composed configuration; what was changed of it stays changed.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from omninav.pipeline.graph.problems import Problem
+
+from .config_groups import node_option, option_content, stand_ins
+
+
+def take_stand_ins(config: Any) -> None:
+    """Exchange the nodes of a composed configuration, in place."""
+    for group, node in exchanged(config):
+        config.nodes[group] = node
+
+
+def exchanged(config: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The nodes in whose place others stand, and those, with all that was changed."""
+    for group, option, rule in stand_ins():
+        listed, given = node_option(group, option) or {}, _node(config, group)
+        is_option = given.get("_target_") == listed["_target_"] and listed.keys() <= given.keys()
+        if is_option and config.get(rule["where_null"]) is None:
+            changed = {key: value for key, value in given.items() if key not in listed or value != listed[key]}
+            yield group, _stand_in(group, rule) | changed
+
+
+def contradictions(config: Any) -> Iterator[Problem]:
+    """A problem for each setting that is given beside the option which stands in where it is null."""
+    for group, _, rule in stand_ins():
+        setting = rule["where_null"]
+        if _node(config, group).get("_target_") == _stand_in(group, rule)["_target_"] and config.get(setting):
+            typed = f"{group}={rule['take']}"
+            yield Problem(setting, f"{typed} does not read it", f"leave {typed} or {setting}=… away")
+
+
+def decisive_settings() -> set[str]:
+    """The settings that decide which option is taken."""
+    return {rule["where_null"] for _, _, rule in stand_ins()}
+
+
+def _node(config: Any, group: str) -> dict[str, Any]:
+    node = (config.get("nodes") or {}).get(group)
+    return {} if node is None else dict(OmegaConf.to_container(node, resolve=False))  # type: ignore[arg-type]
+
+
+def _stand_in(group: str, rule: Mapping[str, str]) -> dict[str, Any]:
+    return dict(option_content(group, rule["take"])["nodes"][group])

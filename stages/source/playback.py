@@ -1,0 +1,215 @@
+"""Playing recordings: one tick per usable image, whether they were written by a robot or are simulated."""
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Source, State, Tick
+from omninav.pipeline.engine.code_version import module_version
+from omninav.pipeline.files import digest_file, user_path
+from omninav.pipeline.graph.problems import counted
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.recordings.decode_ahead import AHEAD
+from omninav.stages.recordings.live_record import LiveRecording
+from omninav.stages.recordings.plausibility import MotionLimits
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
+from omninav.stages.recordings.truth_file import truth_from
+from omninav.stages.values.image import Image
+from omninav.stages.values.pose import Motion, Pose
+
+from .cuts import Cut
+from .frozen_odometry import frozen_steps
+from .log_parts import LogPart, Selection, parts_of, pauses
+from .outputs import DriveOutputs, motion_of, pose_of
+
+
+class PlaybackState(State):
+    """Position in the recordings: recording, next frame and last used frame (-1: none) as positions in the selection,
+    ticks made, the synthetic or guessed odometry so far (x, y in metres, heading in radians), and what the compass
+    keeps of the last image."""
+
+    log: int = 0
+    next: int = 0
+    last: int = -1
+    ticks: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    view: npt.NDArray[np.float32] | None = None
+
+
+class Playback(Source, ABC):
+    """Plays recordings one after another, wherever they come from.
+
+    There is a tick for every image that can be used. Poses are metres and radians; stamps are header stamps. `motion`
+    is the SE(2) increment of the odometry between the images' own times, absent at the first image of each recording;
+    where images are left out it spans the gap.
+    """
+
+    limits: MotionLimits = MotionLimits()
+    """What the robot can do: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
+    truth: str | None = None
+    """The true poses, where they are not on the log's own topic: a file beside it (TUM, or a CSV with time, x, y and
+    heading), a topic, or a frame of a tf topic as /tf:PARENT:CHILD."""
+    truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
+    """The file's clock minus the log's: an image taken at t is looked up in the file at t + this."""
+    truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
+    """How far in time a pose of the file may be from an image."""
+    first: Annotated[int, Bounds(ge=0)] = 0
+    """The first frame of each log that is used."""
+    stop: Annotated[int, Bounds(ge=1)] | None = None
+    """The first frame of each log that is not used any more; null: none."""
+    stride: Annotated[int, Bounds(ge=1)] = 1
+    """Every how many frames one is used."""
+    cuts: tuple[Cut, ...] = ()
+    """A kidnapping made of a log that has none: [[60, 300]] goes on with frame 300 of each log once the first 60 are
+    through, and odometry has not noticed."""
+    rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] | None = None
+    """Images per second that are used at most; of a folder of images without times, how many were taken. Null: all."""
+    new_log_after_s: Annotated[float, Bounds(gt=0)] = 3600.0
+    """A longer pause begins another log: several days may lie in one file."""
+
+    class Out(DriveOutputs):
+        """What is known at an image."""
+
+    @abstractmethod
+    def recordings(self) -> list[Recording]:
+        """Open the recordings. Raises `UnreadableRecording`."""
+
+    def setup(self, ctx: Context) -> None:
+        """Open all recordings; what is lost by then is counted."""
+        self._open()
+        for recording, lost in zip(self._opened, self._lost, strict=True):
+            for kind, number in sorted(lost.items()):
+                ctx.count(kind, number, recording.details.get(kind, ""))
+        ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
+        for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
+            ctx.warn(f"assumed: {sentence}")
+        for sentence in dict.fromkeys([*self._doubts, *pauses(self._parts)]):
+            ctx.warn(sentence)
+        for part in self._parts:
+            self._begin(ctx, part)
+
+    def inputs_digest(self) -> str | None:
+        """sha256 over the content of all recordings, in their order."""
+        self._open()
+        whole = hashlib.sha256()
+        for recording in self._opened:
+            whole.update(recording.digest().encode())
+            model = type(recording.camera).__module__
+            if not model.startswith("omninav."):  # its code may change while its name stays
+                whole.update(module_version(model).encode())
+        if self._truth_file is not None:
+            whole.update(digest_file(self._truth_file).encode())
+        return whole.hexdigest()
+
+    def length(self) -> int | None:
+        """Ticks to come if every image can be decoded."""
+        self._open()
+        return sum(len(part.frames) for part in self._parts)
+
+    def step(self, ctx: Context, position: PlaybackState) -> Out | None:
+        """The next image that can be used; None after the last."""
+        while position.log < len(self._parts):
+            part = self._parts[position.log]
+            recording, frames = part.recording, part.frames
+            while position.next < len(frames):
+                frame = int(frames[position.next])
+                known = dict(recording.dropped)
+                pixels = recording.image(frame, frames[position.next + 1 :][:AHEAD].tolist())
+                if pixels is not None:
+                    return self._out(ctx, position, part, Image(pixels))
+                for kind, number in sorted((Counter(recording.dropped) - Counter(known)).items()):
+                    ctx.count(kind, number, recording.details.get(kind, ""))
+                position.next += 1
+            position.log, position.next, position.last = position.log + 1, 0, -1
+            position.x = position.y = position.heading = 0.0
+        if not position.ticks:
+            lost = sum((recording.dropped for recording in self._opened), Counter[str]())
+            details = [detail for recording in self._opened for detail in recording.details.values()]
+            counts = ", ".join(f"{number} {kind}" for kind, number in sorted(lost.items()))
+            first = (details or [""])[-1]
+            name = self._opened[0].name
+            raise UnreadableRecording(f"{name}: not one of its images can be used ({counts}; {first:.300})")
+        return None
+
+    def _out(self, ctx: Context, position: PlaybackState, part: LogPart, image: Image) -> Out:
+        recording, frames = part.recording, part.frames
+        frame, first = int(frames[position.next]), position.last < 0
+        tick = Tick(
+            index=position.ticks,
+            stamp=int(recording.stamps[frame]),
+            log=position.log,
+            frame=frame,
+            first_of_log=first,
+        )
+        truth = None if part.truth is None else part.truth[frame]
+        odometry, motion = self._motion(ctx, position, part, image)
+        position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
+        return self.Out(
+            tick=tick,
+            image=image,
+            camera=recording.camera,
+            odometry=odometry,
+            motion=motion,
+            truth=pose_of(truth),
+            scan=recording.scan(frame) if ctx.is_read("scan") else None,
+            restart=recording.restart(frame) if isinstance(recording, LiveRecording) else None,
+            goal=recording.goal(frame) if isinstance(recording, LiveRecording) else None,
+        )
+
+    def _begin(self, ctx: Context, part: LogPart) -> None:
+        """Say what one has to know of a drive before it begins."""
+        recording, truth = part.recording, part.truth
+        if recording.odometry is None or truth is None:
+            return
+        steps, metres = frozen_steps(recording.odometry, truth)
+        if steps:
+            still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
+            ctx.warn(f"{recording.name}: {still}")
+
+    def _motion(
+        self, ctx: Context, position: PlaybackState, part: LogPart, image: Image
+    ) -> tuple[Pose | None, Motion | None]:
+        """The odometry pose at the next frame, and the increment since the frame that was used last."""
+        recording, frame = part.recording, int(part.frames[position.next])
+        odometry = part.driven[frame]
+        if position.last < 0:
+            return pose_of(odometry), None
+        last = int(part.frames[position.last])
+        gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
+        return pose_of(odometry), motion_of(between(part.driven[last], odometry), gap)
+
+    @property
+    def _truth_file(self) -> Path | None:
+        """The file of true poses; None where they come from a topic."""
+        if self.truth is None or (self.truth.startswith("/") and not Path(self.truth).exists()):
+            return None
+        return user_path(self.truth)
+
+    def _guesses(self) -> bool:
+        """Whether motion is guessed where none is measured, though positions may be known."""
+        return False
+
+    def _open(self) -> None:
+        if getattr(self, "_opened", None) is not None:
+            return
+        recordings = self.recordings()
+        selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz, self.new_log_after_s)
+        self._parts: list[LogPart] = []
+        self._doubts: list[str] = []
+        for recording in recordings:
+            truth, file = recording.truth, self._truth_file
+            if file is not None:
+                truth, doubts = truth_from(
+                    recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
+                )
+                self._doubts += doubts
+            self._parts += parts_of(recording, truth, selection, self._guesses())
+        self._opened = recordings
+        self._lost = [recording.dropped.copy() for recording in recordings]
