@@ -1,17 +1,21 @@
 """The floor among the landmarks: what gives a map that odometry has scaled its true size."""
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
-RANGE = 0.2
+RANGE = 0.25
 """Part of the camera's height by which the floor may seem to lie higher or lower: odometry is off by less."""
+NEAR = 1.7
+"""Horizontal distance of a landmark from the nearest reference that sees it, as a part of the camera's height, beyond
+which it is left out: the floor is then seen at less than 30 degrees below the horizon, and its depth is uncertain."""
 BANDWIDTH = 0.01
 """Standard deviation of the kernel that smooths the landmarks' depths, as a part of the camera's height."""
-STEPS = 401
+SPREAD = 0.08
+"""Part of the camera's height by which depths of the floor scatter about it."""
+STEPS = 501
 """Depths at which the density is evaluated."""
 MIN_PEAK = 2.0
 """Density at the floor, over the mean of that above it within `RANGE`, at least: less is furniture."""
@@ -19,21 +23,23 @@ MIN_LANDMARKS = 50
 """Landmarks within about a bandwidth of the floor, at least."""
 
 
-def floor_depth(points: Array, height: float) -> float | None:
+def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, height: float) -> float | None:
     """Metres of the floor below the cameras of a map: the depth at which most landmarks lie, near `height`.
 
-    `points` (L, 3): with z = 0 at the cameras' height, in the map's own scale; `height`: of the camera over the floor,
-    as it is known. A map times `height` / depth has its true size. None where no depth stands out, as on a floor
-    without texture.
+    `points` (L, 3): with z = 0 at the cameras' height, and `poses` (R, 3) of the references, both in the map's own
+    scale; `references`, `landmarks` (O,): of each sighting; `height`: of the camera over the floor, as it is known. A
+    map times `height` / depth has its true size. None where no depth stands out, as on a floor without texture.
     """
-    depths = -points[:, 2] / height
+    distances = np.full(len(points), np.inf)
+    np.minimum.at(distances, landmarks, np.hypot(*(points[landmarks] - poses[references])[:, :2].T))
+    depths = -points[distances < NEAR * height, 2] / height
     near = depths[np.abs(depths - 1.0) < RANGE + 3.0 * BANDWIDTH]
     if len(near) < MIN_LANDMARKS:
         return None
     at = np.linspace(1.0 - RANGE, 1.0 + RANGE, STEPS)
     density = np.exp(-0.5 * ((at[:, None] - near) / BANDWIDTH) ** 2).sum(axis=1)
     best = int(density.argmax())
-    above = density[at < at[best] - 4.0 * BANDWIDTH]
-    if density[best] < max(MIN_LANDMARKS, MIN_PEAK * above.mean() if len(above) else math.inf):
+    above = density[at < at[best] - SPREAD]
+    if not len(above) or density[best] < max(MIN_LANDMARKS, MIN_PEAK * above.mean()):
         return None
     return float(at[best]) * height
