@@ -28,7 +28,7 @@ TOLERANCE = math.radians(0.4)
 MAX_SAMPLES = 300
 """Samples of the relative pose at most: with fewer right matches than that finds there are too few anyway."""
 MIN_INLIERS = 12
-"""Matches that must agree on a motion: with fewer one in ten was wrong in a house, with these one in a hundred."""
+"""Matches that must agree on a motion: in a house 38 % of the motions of 8 to 11 matches were wrong, of more 0.8 %."""
 MAX_FALSE_ALARMS = 1e-6
 """Expected number of motions that as many matches agree on by chance, at most."""
 TURN_SIGMA = math.radians(0.5)
