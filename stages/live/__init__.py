@@ -1,1 +1,1 @@
-"""Robots that run now: transports of ROS 2 messages, and what is published of a run."""
+"""Robots that run now: the source of their ticks, transports of ROS 2 messages, and what is published of a run."""

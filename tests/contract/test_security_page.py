@@ -8,7 +8,7 @@ from offenders import assert_each
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/security.md").read_text()
-TRUST, LIVE = "tests/cli/test_trust.py", "tests/stages/source/test_live.py"
+TRUST, LIVE = "tests/cli/test_trust.py", "tests/stages/live/test_live_source.py"
 TESTS = {
     "Installed packages": (
         "tests/pipeline/graph/test_registry.py",

@@ -8,9 +8,9 @@ from conftest import DRIVE
 
 import omninav
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live import live_source as live
 from omninav.stages.live import publish
 from omninav.stages.live.transport import Arrival
-from omninav.stages.source import live
 
 from .conftest import Wire
 

@@ -13,10 +13,10 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message_types import standard_types
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.live import live_source as live
 from omninav.stages.live import publish
 from omninav.stages.live.publish import Publish
 from omninav.stages.live.transport import Arrival
-from omninav.stages.source import live
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Pose
 

@@ -13,9 +13,9 @@ from conftest import DRIVE, TOUR
 import omninav
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake, publish
+from omninav.stages.live import live_source as live
 from omninav.stages.live.diagnostics import WARN
 from omninav.stages.live.transport import Arrival
-from omninav.stages.source import live
 
 from .conftest import Wire
 

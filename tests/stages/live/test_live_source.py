@@ -14,12 +14,12 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake
+from omninav.stages.live import live_source as live
+from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, Transport
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
-from omninav.stages.source import live
-from omninav.stages.source.live import LiveSource, LiveSourceState
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 

@@ -12,26 +12,26 @@ from omninav.pipeline import BadInput, Bounds, Context, Source
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
-from omninav.stages.live.amcl_services import serve_amcl, serve_restart
-from omninav.stages.live.camera_device import TOPIC, device_camera
-from omninav.stages.live.camera_transport import connect_camera
-from omninav.stages.live.diagnostics import publish_diagnostics
-from omninav.stages.live.drive_record import DriveRecord, unfinished
-from omninav.stages.live.intake import Intake
-from omninav.stages.live.transport import Transport, TransportName, connect, disconnect
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.recordings.live_record import HEADER, DriveSoFar, Frame, LiveHeader, LiveRecording, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.topics import IMAGE_TOPICS
+from omninav.stages.source.guessed_motion import VisualCompass, reckon, settled_speed
+from omninav.stages.source.outputs import DriveOutputs, pose_of
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
 
-from .guessed_motion import VisualCompass, reckon, settled_speed
+from .amcl_services import serve_amcl, serve_restart
+from .camera_device import TOPIC, device_camera
+from .camera_transport import connect_camera
+from .diagnostics import publish_diagnostics
+from .drive_record import DriveRecord, unfinished
+from .intake import Intake
 from .live_position import Guess, LiveSourceState
-from .outputs import DriveOutputs, pose_of
+from .transport import Transport, TransportName, connect, disconnect
 
 LIVE, DEVICE = "live", "camera:"
 """As `log`: a robot, and what a camera of this computer begins with."""

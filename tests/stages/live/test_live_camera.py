@@ -11,8 +11,8 @@ import pytest
 
 from omninav.pipeline import BadInput, Context
 from omninav.stages.live import camera_transport
+from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.recordings.recording import Topics
-from omninav.stages.source.live import LiveSource, LiveSourceState
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 
