@@ -28,8 +28,8 @@ def play(log: str, rate: float, seconds: float) -> None:
     from omninav.pipeline.mcap.reader import LogReader
     from omninav.stages.geometry.plane.se2 import interpolate
     from omninav.stages.live.transport import connect, disconnect
+    from omninav.stages.plots.pose_messages import header, ros_pose
     from omninav.stages.recordings.messages import pose_of
-    from omninav.stages.recordings.pose_messages import header, ros_pose
 
     messages = list(LogReader(log).messages({IMAGE, ODOMETRY}))
     told = [each for each in messages if each.topic == ODOMETRY]

@@ -30,9 +30,9 @@ from omninav.stages.candidates.index import IndexedCandidates, search_in
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
-from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
 from omninav.stages.values.features import SegmentHistograms

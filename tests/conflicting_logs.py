@@ -22,11 +22,11 @@ from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.features.grey_strip import GreyStrip
 from omninav.stages.features.hsv_histogram import HsvHistogram
-from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.monitor.map_check import CheckMap
+from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.unwarp.table import PanoramaTable

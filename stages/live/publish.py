@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.recordings.pose_messages import (
+from omninav.stages.plots.pose_messages import (
     BASE,
     MAP,
     ODOM,

@@ -6,7 +6,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message
-from omninav.stages.recordings.pose_messages import header, ros_pose
+from omninav.stages.plots.pose_messages import header, ros_pose
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.pose import Pose
 

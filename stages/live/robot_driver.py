@@ -14,8 +14,8 @@ from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import interpolate
+from omninav.stages.plots.pose_messages import BASE, ODOM, Array, header, ros_pose, transform
 from omninav.stages.recordings.camera_yaml import write_camera
-from omninav.stages.recordings.pose_messages import BASE, ODOM, Array, header, ros_pose, transform
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose

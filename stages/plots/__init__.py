@@ -1,1 +1,1 @@
-"""Figures for the report, trajectories and logs for other tools."""
+"""Plots and pictures for the report, trajectories and logs for other tools."""

@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from omninav.stages.recordings.pose_messages import MAP, Fields, header, ros_pose
+from omninav.stages.plots.pose_messages import MAP, Fields, header, ros_pose
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 

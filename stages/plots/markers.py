@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.mcap.message_types import standard_types
-from omninav.stages.recordings.pose_messages import BASE, MAP, Fields, header, quaternion, ros_point
+from omninav.stages.plots.pose_messages import BASE, MAP, Fields, header, quaternion, ros_point
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
-from omninav.stages.recordings.pose_messages import path_bytes
+from omninav.stages.plots.pose_messages import path_bytes
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.map_places import AnyMap
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.pipeline.mcap.message_types import encode_message
-from omninav.stages.recordings.pose_messages import path_bytes
+from omninav.stages.plots.pose_messages import path_bytes
 from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PlaceBelief, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence

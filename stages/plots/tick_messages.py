@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import State
 from omninav.pipeline.mcap.message_rows import MessageRows, row_bytes
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.recordings.pose_messages import (
+from omninav.stages.plots.pose_messages import (
     BASE,
     MAP,
     ODOM,

@@ -16,7 +16,7 @@ from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages
 from omninav.stages.live.transport import connect
 from omninav.stages.plots.grid_message import grid_message
 from omninav.stages.plots.markers import homing_arrow, map_markers
-from omninav.stages.recordings.pose_messages import path_bytes
+from omninav.stages.plots.pose_messages import path_bytes
 from omninav.stages.values.belief import Particles, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.grid import OccupancyGrid

@@ -8,7 +8,6 @@ import pytest
 from made_views import NO_FEATURES, between_looks, made_views
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.mapping.fixed_threshold import FixedThreshold
@@ -20,10 +19,11 @@ from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
 from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.mapping.supervised_views import SupervisedViews
-from omninav.stages.mapping.thumbnails import ReferenceSnapshot, ThumbnailsState, TourSnapshot
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueState
 from omninav.stages.mapping.view_comparison import ViewComparison
+from omninav.stages.plots.thumbnails import ReferenceSnapshot, ThumbnailsState, TourSnapshot
+from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama

@@ -8,7 +8,6 @@ from small_run import reference_graph, small_run
 from world_files import DEMO
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.thumbnails import joined
 from omninav.stages.plots.error_over_time import ErrorOverTime
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.map_plan import MapPlot
@@ -16,6 +15,7 @@ from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
 from omninav.stages.plots.similarity_peaks import SimilarityPeaks
 from omninav.stages.plots.snapshot_times import even_frames, is_snapshot_frame, spread_out
+from omninav.stages.plots.thumbnails import joined
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.simulator.floor_plan import plan_of
 from omninav.stages.values.image import Panorama

@@ -14,12 +14,12 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
-from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, joined
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.homing_frames import draw_vector
 from omninav.stages.plots.homing_snapshot import HomingSnapshot
 from omninav.stages.plots.plan_chart import plan_chart
 from omninav.stages.plots.target_images import FirstThumbnail, image_of, target_view
+from omninav.stages.plots.thumbnails import TourSnapshot, ViewThumbnails, joined
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, HomingTarget, HomingVector, PathProgress, TrackedFeatures
 from omninav.stages.values.image import Image

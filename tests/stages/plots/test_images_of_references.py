@@ -5,9 +5,9 @@ from small_run import collected, small_run
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.mapping.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.plots.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose

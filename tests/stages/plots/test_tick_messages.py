@@ -8,9 +8,9 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.plots.foxglove_server import _Server
 from omninav.stages.plots.markers import GREEN, PINK, gaussian_markers, homing_arrow, weighted_points
 from omninav.stages.plots.panorama_snapshot import EncodedPanorama
+from omninav.stages.plots.pose_messages import covariance_6x6, header, pose_messages, ros_pose, transform
 from omninav.stages.plots.thin_belief import thin
 from omninav.stages.plots.tick_messages import ORDER, PATH_TICKS, PathSoFar, by_tick, tick_messages
-from omninav.stages.recordings.pose_messages import covariance_6x6, header, pose_messages, ros_pose, transform
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence

@@ -8,9 +8,9 @@ from small_run import collected, small_run
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.plots.pose_messages import covariance_6x6
 from omninav.stages.plots.thin_belief import ThinBelief, thin
 from omninav.stages.plots.trajectory_file import TrajectoryFile
-from omninav.stages.recordings.pose_messages import covariance_6x6
 from omninav.stages.values.belief import Particles, PoseEstimate, SinglePose
 from omninav.stages.values.pose import Pose
 

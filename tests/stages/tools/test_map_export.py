@@ -10,7 +10,7 @@ from small_run import reference_graph
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.artifact import write_artifact
-from omninav.stages.mapping.thumbnails import joined
+from omninav.stages.plots.thumbnails import joined
 from omninav.stages.tools.map_export import ExportMap, spaced
 
 CTX = Context("export")

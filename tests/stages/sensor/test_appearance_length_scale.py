@@ -5,7 +5,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.length_scale import excess_by_distance
-from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
+from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 STEP, PLACES = 0.1, 100

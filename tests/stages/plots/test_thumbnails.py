@@ -8,7 +8,7 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.mapping.thumbnails import (
+from omninav.stages.plots.thumbnails import (
     CollectThumbnails,
     ReferenceSnapshot,
     ReferenceThumbnails,
