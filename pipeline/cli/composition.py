@@ -158,7 +158,10 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
         raise ProblemsFound([Problem(f"artifacts.{name}.choices", p.what, p.hint) for p in problems]) from None
     OmegaConf.set_struct(other, False)
     given: Any = OmegaConf.to_container(config, resolve=False)
-    other.update({key: value for key, value in given.items() if key not in OF_THE_VARIANT})
+    own: Any = OmegaConf.to_container(other, resolve=False)
+    for key in (key for key in given if key not in OF_THE_VARIANT):
+        if key not in own or given[key] != own[key]:  # to set a whole world takes long, and it is the same
+            other[key] = given[key]
     for key, value in spec.set.items():
         if key not in other or key in OF_THE_VARIANT:
             settings = [str(setting) for setting in other if setting not in OF_THE_VARIANT]
@@ -176,8 +179,10 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
         for block, changes in ((other.nodes, each.nodes), (other.wires, each.wires)):
             for node, change in changes.items():
                 block[node] = OmegaConf.merge(block.get(node) or {}, change)
-    made = _without_taken_out(OmegaConf.to_container(other, resolve=True))  # type: ignore[arg-type]
-    made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
+    graph = {key: OmegaConf.to_container(other[key], resolve=True) for key in ("nodes", "wires", "artifacts", "saves")}
+    made = dict(
+        without_absent(_without_unset(_without_taken_out(graph)))
+    )  # what makes an artifact begins without those it can do without
     if absent:
         made["nodes"] = dict(sorted(made["nodes"].items(), key=lambda item: _place_in_groups(item[0])))
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}, settings_read(other)

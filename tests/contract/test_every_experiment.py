@@ -32,7 +32,8 @@ def hydra():
 
 
 def experiment(name: str, profile: str):
-    return read_experiment(OmegaConf.to_container(compose([f"+experiment={name}"]).experiment), profile)
+    alone = compose(["~variant", f"+experiment={name}"])  # says the same, and takes half of the time
+    return read_experiment(OmegaConf.to_container(alone.experiment), profile)
 
 
 def typed(found, condition):
