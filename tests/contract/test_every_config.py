@@ -200,7 +200,7 @@ def test_every_experiment_can_be_read():
 
 def can_be_read(path: Path) -> None:
     option = path.relative_to(CONF / "experiment").with_suffix("")
-    config = resolved_but_for_the_experiment(compose([f"+experiment={option}"]))
+    config = resolved_but_for_the_experiment(compose(["~variant", f"+experiment={option}"]))
     for profile in ("full", "quick"):
         experiment = read_experiment(config["experiment"], profile)
         measures_alone = path.parent.name == "recordings" or path.stem in ("home_store", "office")  # to start from
