@@ -1,0 +1,295 @@
+"""Limits of what is said of inputs: what lies just below each is not said, and what lies just above it is."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.monitor.input_conflicts import (
+    COLUMNS,
+    WINDOW,
+    InputConflicts,
+    InputConflictsState,
+    Watched,
+    blind,
+    compare_strips,
+    foreign,
+    frozen,
+    late,
+    leap,
+    lies_at,
+    pose_now,
+    remember,
+    tracked,
+    turned,
+)
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.image import Strip
+from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+
+Array = npt.NDArray[np.float64]
+SCALE_M = 0.4
+
+
+def watched(
+    number: int,
+    step: float = 0.2,
+    turn: float = 0.0,
+    seen: float = math.nan,
+    correlation: float = 0.9,
+    same: int = 0,
+    seconds: float = 1.0,
+) -> Watched:
+    """Images of a robot that drives `step` metres and turns by `turn` between two, of which the last are the `same`."""
+    rows = np.full((number, COLUMNS), np.nan)
+    rows[:, 0] = seconds * np.arange(number)
+    rows[:, 1], rows[:, 2], rows[:, 3] = step * np.arange(number), 0.0, turn * np.arange(number)
+    rows[:, 8], rows[:, 9], rows[:, 10] = seen, correlation, 0.0
+    rows[0, 8:10] = math.nan
+    if same:
+        rows[-same:, 10] = 1.0
+    return Watched(rows)
+
+
+def sentence_of_leap(
+    number: int = 8, after_s: float = 60.0, step: float = 0.2, usual_s: float = 1.0, off: float = 0.0, turn: float = 0.0
+) -> str:
+    """What is said of an image so long after the last, of a robot that drove on and is so far `off` its way."""
+    before = watched(number, step, seconds=usual_s)
+    recent = InputConflictsState(rows=before.rows, stamp=int(before.times[-1] * 1e9))
+    tick = Tick(9, recent.stamp + int(after_s * 1e9), 0, 9, False)
+    return leap(recent, tick, Pose(step * number + off, 0.0, turn))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, True),
+        ({"number": 7}, False),
+        ({"after_s": 29.9}, False),
+        ({"after_s": 30.0}, True),
+        ({"after_s": 0.0}, False),
+        ({"after_s": -0.1}, True),
+        ({"usual_s": 2.0, "after_s": 39.9}, False),
+        ({"usual_s": 2.0, "after_s": 40.1}, True),
+        ({"step": 0.019}, False),
+        ({"step": 0.021}, True),
+        ({"off": 0.09}, True),
+        ({"off": 0.11}, False),
+        ({"off": -0.09}, True),
+        ({"off": -0.11}, False),
+        ({"turn": math.radians(14.0)}, True),
+        ({"turn": math.radians(-16.0)}, False),
+    ],
+    ids=str,
+)
+def test_a_clock_leaps_where_the_robot_drove_on_as_before(given: dict[str, Any], said: bool) -> None:
+    assert bool(sentence_of_leap(**given)) == said
+
+
+def test_a_leap_is_said_with_what_is_more_than_usual_and_how_the_robot_drove() -> None:
+    said = sentence_of_leap(after_s=60.0)
+    assert said.startswith(
+        "the clock leaps by 59 s at image 9, while odometry drives on, 0.20 m, as in the 1.00 s before"
+    )
+    recent = InputConflictsState(rows=watched(8).rows, stamp=7 * 10**9)
+    tick = Tick(9, 67 * 10**9, 0, 9, False)
+    assert leap(recent, tick, GuessedPose(1.6, 0.0, 0.0)) == ""
+    assert leap(recent, tick, None) == ""
+
+
+@pytest.mark.parametrize(
+    ("given", "images"),
+    [
+        ({"same": 7}, 0),
+        ({"same": 8}, 8),
+        ({"same": 30}, 30),
+        ({"same": 8, "step": 0.12}, 0),
+        ({"same": 8, "step": 0.13}, 8),
+        ({"same": 8, "step": 0.0, "turn": 0.12}, 0),
+        ({"same": 8, "step": 0.0, "turn": -0.13}, 8),
+    ],
+    ids=str,
+)
+def test_a_frozen_camera_is_named_once_the_robot_moved_a_metre_or_a_radian(given: dict[str, Any], images: int) -> None:
+    said = frozen(watched(30, **given), SCALE_M)
+    assert (f"its last {images} images are one and the same" in said) if images else not said
+
+
+def test_how_far_a_frozen_camera_was_driven_counts_from_the_last_new_image() -> None:
+    said = frozen(watched(30, step=0.25, turn=0.1, same=8), SCALE_M)
+    assert "odometry drove 2.0 m and turned 46 degrees" in said
+
+
+@pytest.mark.parametrize(
+    ("number", "correlation", "said"), [(15, 0.1, False), (16, 0.1, True), (40, 0.149, True), (40, 0.151, False)]
+)
+def test_images_without_anything_in_common_are_said(number: int, correlation: float, said: bool) -> None:
+    assert bool(blind(watched(number, correlation=correlation), SCALE_M)) == said
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"number": 17, "step": 0.0, "seen": 0.1}, "odometry stands still while the images turn by 92 degrees over 16"),
+        ({"number": 16, "step": 0.0, "seen": 0.1}, ""),  # 86 degrees are too few
+        ({"number": 60, "step": 0.0, "seen": 0.052}, ""),  # below what parallax looks like
+        ({"number": 60, "step": 0.0, "seen": -0.053}, "stands still while the images turn by 179 degrees"),
+        ({"number": 60, "step": 0.0, "seen": 0.1, "correlation": 0.4}, ""),
+        ({"number": 60, "step": 0.0, "seen": 0.1, "correlation": 0.41}, "odometry stands still"),
+        ({"number": 60, "step": 1e-5, "seen": 0.1}, "odometry stands still"),
+        ({"number": 60, "step": 1e-4, "seen": 0.1}, "odometry's heading does not change (0 degrees over 59 images)"),
+        ({"number": 60, "seen": 0.1, "turn": 0.0049}, "odometry's heading does not change (17 degrees over 59 images)"),
+        ({"number": 60, "seen": 0.1, "turn": 0.0051}, ""),
+        ({"number": 60, "seen": 0.1, "turn": 0.1}, ""),
+    ],
+    ids=str,
+)
+def test_turns_that_are_seen_and_not_measured_are_said(given: dict[str, Any], said: str) -> None:
+    found = turned(watched(**given), SCALE_M)
+    assert said in found
+    assert bool(found) == bool(said)
+
+
+def swaying(delay_s: float, gain: float = 1.0) -> Watched:
+    """A robot that drives 0.2 m/s and turns to and fro; images show its turns so much later, odometry `gain` times."""
+
+    def headings(times: Array) -> Array:
+        return np.asarray(2.0 * np.sin(times / 3.0) + np.sin(times / 1.7))
+
+    times = 0.5 * np.arange(64)
+    rows = np.full((64, COLUMNS), np.nan)
+    rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = times, 0.2 * times, 0.0, gain * headings(times)
+    rows[1:, 8], rows[1:, 9], rows[:, 10] = np.diff(headings(times - delay_s)), 0.9, 0.0
+    return Watched(rows)
+
+
+@pytest.mark.parametrize(("delay_s", "said"), [(0.0, False), (0.5, True), (-0.5, True), (1.0, True)])
+def test_late_images_are_said_with_their_delay(delay_s: float, said: bool) -> None:
+    found = late(swaying(delay_s), SCALE_M)
+    assert bool(found) == said
+    if said:
+        side = "after" if delay_s > 0 else "before"
+        driven = 0.2 * abs(delay_s)
+        assert f"{abs(delay_s)} s {side} odometry measures them, in which the robot drives {driven:.2f} m" in found
+        assert late(swaying(delay_s), SCALE_M, driven - 0.01)
+        assert not late(swaying(delay_s), SCALE_M, driven + 0.01)
+
+
+def test_reversed_turns_are_said_and_are_no_delay() -> None:
+    found = turned(swaying(0.0, -1.0), SCALE_M)
+    assert found.startswith(
+        "the images turn against odometry's turns (correlation -1.00 over 63 images): check whether"
+    )
+    assert late(swaying(0.0, -1.0), SCALE_M) == ""
+
+
+def placed(number: int, at_estimate: int, scale: float = 1.0, angle: float = 0.0, scattered: bool = False) -> Watched:
+    """Best matches of a robot on a winding way, where it is, `scale` times as far or anywhere."""
+    rng, all_of = np.random.default_rng(3), watched(number)
+    times = 0.1 * np.arange(number)
+    way = np.column_stack([6.0 * np.sin(times), 9.0 * np.sin(0.7 * times), np.zeros(number)])
+    ahead = np.gradient(way[:, :2], axis=0)
+    way[:, 2] = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    matches = way * (scale, scale, 1.0) + (0.0, 0.0, angle)
+    if scattered:
+        matches = rng.uniform((-20.0, -20.0, -3.0), (20.0, 20.0, 3.0), (number, 3))
+    all_of.rows[:, 1:4], all_of.rows[:, 4:7] = way, matches
+    all_of.rows[:, 7] = np.arange(number) < at_estimate
+    return all_of
+
+
+@pytest.mark.parametrize(
+    ("number", "at_estimate", "said"),
+    [(WINDOW, 0, True), (WINDOW - 1, 0, False), (WINDOW, 12, True), (WINDOW, 13, False)],
+)
+def test_a_foreign_map_is_said_after_a_whole_window_with_few_matches_at_the_estimate(
+    number: int, at_estimate: int, said: bool
+) -> None:
+    found = foreign(placed(number, at_estimate, scattered=True), SCALE_M)
+    assert bool(found) == said
+    if said:
+        assert f"of {number} best matches {100 * at_estimate / number:.0f} % lie at the estimate" in found
+
+
+def test_matches_that_follow_odometry_are_of_this_place() -> None:
+    assert foreign(placed(WINDOW, 0), SCALE_M) == ""
+
+
+@pytest.mark.parametrize(
+    ("scale", "angle_deg", "said"),
+    [
+        (1.0, 0.0, ""),
+        (1.25, 0.0, ""),
+        (0.8, 0.0, ""),
+        (2.0, 0.0, "odometry is 0.5 times as long"),
+        (0.5, 0.0, "odometry is 2 times as long"),
+        (1.0, 15.0, ""),
+        (1.0, 90.0, "degrees off from where odometry drives"),
+    ],
+)
+def test_a_track_of_other_length_or_direction_is_said(scale: float, angle_deg: float, said: str) -> None:
+    found = tracked(placed(WINDOW, 0, scale, math.radians(angle_deg)), SCALE_M)
+    assert said in found
+    assert bool(found) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("away", "turn_deg", "lies"),
+    [(0.79, 0.0, 1.0), (0.81, 0.0, 0.0), (0.0, 29.0, 1.0), (0.0, -31.0, 0.0), (0.0, 359.0, 1.0)],
+)
+def test_a_match_lies_at_the_estimate_within_two_length_scales_and_thirty_degrees(
+    away: float, turn_deg: float, lies: float
+) -> None:
+    pose = Pose(1.0, 2.0, 0.5)
+    match = np.array([1.0, 2.0 - away, 0.5 + math.radians(turn_deg)])
+    assert lies_at(match, PoseEstimate(pose, np.eye(3), 1.0, pose), SCALE_M) == lies
+    assert math.isnan(lies_at(match, None, SCALE_M))
+
+
+def test_headings_are_not_wrapped_and_a_guess_is_not_odometry() -> None:
+    before = np.array([0.0, 0.0, 3.0])
+    np.testing.assert_allclose(pose_now(before, Pose(1.0, 2.0, -3.0), None), (1.0, 2.0, 2 * math.pi - 3.0))
+    np.testing.assert_allclose(pose_now(np.full(3, np.nan), Pose(1.0, 2.0, -3.0), None), (1.0, 2.0, -3.0))
+    driven = pose_now(np.array([0.0, 0.0, math.pi / 2]), None, Motion(1.0, 0.0, 3.0))
+    np.testing.assert_allclose(driven, (0.0, 1.0, math.pi / 2 + 3.0), atol=1e-12)
+    np.testing.assert_allclose(pose_now(np.full(3, np.nan), None, Motion(1.0, 0.5, 0.25)), (1.0, 0.5, 0.25))
+    np.testing.assert_array_equal(pose_now(before, None, None), before)
+    assert np.isnan(pose_now(before, GuessedPose(1.0, 0.0, 0.0), None)).all()
+    assert np.isnan(pose_now(before, None, GuessedMotion(1.0, 0.0, 0.0, 0.5, 0.1))).all()
+
+
+def test_a_window_of_images_is_remembered_and_its_times_begin_with_another_camera() -> None:
+    recent = InputConflictsState(pose=np.array([1.0, 2.0, 3.0]))
+    for number in range(WINDOW + 2):
+        remember(recent, number * 500_000_000, np.full((2, 8), number, np.float32))
+    assert recent.rows.shape == (WINDOW, COLUMNS)
+    assert (recent.rows[0, 0], recent.rows[-1, 0]) == (1.0, 0.5 * (WINDOW + 1))
+    np.testing.assert_array_equal(recent.rows[-1, 1:4], (1.0, 2.0, 3.0))
+    remember(recent, 10**12, np.zeros((2, 16), np.float32))
+    assert recent.rows[-1, 0] == 0.0
+
+
+def test_images_are_compared_with_the_ones_before_and_not_across_cameras() -> None:
+    recent, rng = InputConflictsState(pose=np.zeros(3)), np.random.default_rng(0)
+    first = rng.random((4, 36)).astype(np.float32)
+    for stamp, strip in enumerate((first, first, np.roll(first, 9, axis=1), first[:, ::2], first[:, ::2])):
+        remember(recent, stamp * 10**9, strip)
+    compare_strips(recent)
+    np.testing.assert_array_equal(recent.rows[:, 10], (0.0, 1.0, 0.0, 0.0, 1.0))
+    assert np.isnan(recent.rows[[0, 3], 9]).all()
+    np.testing.assert_allclose(recent.rows[[1, 2, 4], 9], 1.0, atol=1e-3)
+    assert abs(recent.rows[2, 8]) == pytest.approx(math.pi / 2, abs=0.01)
+    assert len(recent.strips) == 1
+
+
+@pytest.mark.parametrize(("interval_s", "remembered"), [(0.24, 5), (0.25, 9), (0.13, 5), (0.1, 3)])
+def test_images_that_come_too_soon_are_not_watched(interval_s: float, remembered: int) -> None:
+    ctx, state, watch = Context("conflicts"), InputConflictsState(), InputConflicts()
+    for number in range(9):
+        ctx.tick = Tick(number, round(number * interval_s * 1e9), 0, number, not number)
+        watch.step(ctx, state, Strip(np.zeros((4, 36), np.float32)), Pose(0.1 * number, 0.0, 0.0))
+    assert len(state.rows) == remembered
