@@ -70,6 +70,7 @@ def test_a_reference_is_lost_a_thousand_times_further_away_than_half_of_all(time
     poses = np.zeros((101, 3))
     poses[:, :2] = np.column_stack([np.cos(np.arange(101.0)), np.sin(np.arange(101.0))])
     poses[40, :2] = times, 0.0
+    poses[:, :2] += 700.0, -300.0  # wherever its frame begins
     found = of_poses(poses)
     assert ("reference 40 of the map" in found) == lost
     assert bool(found) == lost
