@@ -18,6 +18,8 @@ REACH_M = 3.0
 """How far the robot of this room sees: less than the room, so that its ends look different."""
 HEIGHT_M = 0.9
 """The camera's height over the floor, where the points' z is 0."""
+FEW = np.empty((0, 2), np.int64)
+"""No edges."""
 
 
 @functools.cache

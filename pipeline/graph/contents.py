@@ -101,6 +101,9 @@ def _wrong_fields(value: Value) -> Iterator[str]:
     for name, _, marks, thing in fields:
         if thing is not None and any(isinstance(mark, Shape | Bounds) for mark in marks):
             yield from _wrong_numbers(name, thing, marks, sizes)
+    contradiction = value.contradiction()
+    if contradiction is not None:
+        yield contradiction
 
 
 @functools.cache

@@ -34,6 +34,10 @@ class Value:
         dataclasses.dataclass(frozen=not cls.in_place, eq=False, repr=False)(cls)
         VALUE_TYPES[value_name(cls)] = cls
 
+    def contradiction(self) -> str | None:
+        """Describes fields that do not fit each other beyond what their annotations state; None where they fit."""
+        return None
+
     def __repr__(self) -> str:
         """Its fields; of a large array type and shape, so that however much it holds is a line."""
         fields = (field.name for field in dataclasses.fields(type(self)))  # type: ignore[arg-type]

@@ -15,6 +15,8 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 
+from .landmarks import joined_landmarks
+
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -23,7 +25,10 @@ OTHER_VIEW = math.radians(30.0)
 
 
 def joined_references(maps: Sequence[ReferenceGraph], pose_source: PoseSource) -> ReferenceGraph:
-    """One map of the references and edges of several, in their order. Raises BadInput where their features differ."""
+    """One map of the references, edges and landmarks of several, in their order.
+
+    Raises BadInput where their features differ.
+    """
     filled = [map for map in maps if len(map)] or list(maps[:1])
     first = filled[0]
     for number, map in enumerate(maps):
@@ -40,6 +45,7 @@ def joined_references(maps: Sequence[ReferenceGraph], pose_source: PoseSource) -
         first.kind,
         np.concatenate([map.edges + start for map, start in zip(filled, starts[:-1], strict=True)]),
         pose_source,
+        joined_landmarks(filled),
     )
 
 
@@ -77,8 +83,9 @@ def cut_references(map: ReferenceGraph, inside: npt.NDArray[np.bool_]) -> Refere
 
 
 def _chosen(map: ReferenceGraph, kept: Ints, edges: Ints) -> ReferenceGraph:
+    landmarks = None if map.landmarks is None else map.landmarks.of_references(kept)
     return ReferenceGraph(
-        map.poses[kept], gathered([(map.features, kept)]), map.kind, edges.astype(np.int64), map.pose_source
+        map.poses[kept], gathered([(map.features, kept)]), map.kind, edges.astype(np.int64), map.pose_source, landmarks
     )
 
 

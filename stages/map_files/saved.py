@@ -13,7 +13,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 MapOfPlaces = ReferenceGraph | TopologicalMap
 """Maps that these tools can join, thin and cut."""
-SEEN_BY = ("unwarp", "features", "global_descriptor")
+SEEN_BY = ("unwarp", "features", "points", "global_descriptor")
 """Nodes that decide what a map's views are: maps that differ in them do not join."""
 
 

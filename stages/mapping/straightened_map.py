@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -85,4 +84,4 @@ class StraightenMap(Stage):
         }
         ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
         metrics = Metrics({"straightened": values}, QUANTITIES)
-        return self.Out(map=replace(map, poses=poses), metrics=metrics)
+        return self.Out(map=map.moved(poses), metrics=metrics)

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from omninav.stages.values.landmarks import Landmarks
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
@@ -17,7 +18,10 @@ Array = npt.NDArray[np.float64]
 
 # Okabe & Ito's palette (2008), dark enough on white
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
-REFERENCE, EDGE, MARK, PARTICLE = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7"
+REFERENCE, EDGE, MARK, PARTICLE, LANDMARK = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7", "#4a4f57"
+
+LANDMARK_SHARE = 2.0
+"""Landmarks on either side that do not decide how far a plot goes, per cent."""
 
 
 def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = None) -> None:
@@ -54,6 +58,27 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
     size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
     name = f"{'places' if topological else 'references'} ({len(map)})" if label else None
     axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+
+
+def draw_landmarks(axes: "Axes", landmarks: Landmarks | None) -> None:
+    """Landmarks from above, as specks under everything else."""
+    if landmarks is None or not len(landmarks):
+        return
+    x, y = shown_landmarks(landmarks).T
+    name = f"landmarks ({len(landmarks)})"
+    speck = float(np.clip(20_000 / len(landmarks), 0.2, 2.0))
+    axes.scatter(x, y, s=speck, color=LANDMARK, alpha=0.5, linewidths=0, zorder=0.8, label=name, rasterized=True)
+
+
+def shown_landmarks(landmarks: Landmarks) -> Array:
+    """x and y (N, 2) of the landmarks, without the few that lie far from all others: depths may be uncertain."""
+    xy = landmarks.points[:, :2].astype(np.float64)
+    if not len(xy):
+        return xy
+    low, high = np.percentile(xy, [LANDMARK_SHARE, 100.0 - LANDMARK_SHARE], axis=0)
+    pad = 0.1 * float((high - low).max())
+    shown: Array = xy[((xy >= low - pad) & (xy <= high + pad)).all(axis=1)]
+    return shown
 
 
 def draw_links(axes: "Axes", map: TopologicalMap) -> None:

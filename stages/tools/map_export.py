@@ -1,4 +1,4 @@
-"""Writes a map's images as the folder that navigators which drive from image to image take for a map."""
+"""Writes a map's images as the folder that image-to-image navigators take for a map, or its landmarks as points."""
 
 import math
 import os
@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.engine.artifact import read_artifact
-from omninav.pipeline.files import user_path
+from omninav.pipeline.files import user_path, write_whole
+from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
@@ -24,11 +25,12 @@ BESIDE = "thumbnails.omap"
 
 
 class ExportMap(Tool):
-    """Writes the images of a map's references or views as `0.png`, `1.png`, … into a new folder, and nothing else.
+    """Writes the images of a map's references or views as `0.png`, `1.png`, … into a new folder, or its landmarks.
 
-    In the order of the tour: the topological map of ViNT, NoMaD and GNM (`deployment/topomaps/images/NAME`) and of
-    PlaceNav (`placenav/topomaps/images/NAME`), which know one path without branches. Raises BadInput where the map's
-    images are missing or another map's, or the folder holds something.
+    Images are in the order of the tour: the topological map of ViNT, NoMaD and GNM (`deployment/topomaps/images/NAME`)
+    and of PlaceNav (`placenav/topomaps/images/NAME`), which know one path without branches. Landmarks are a point cloud
+    that CloudCompare, MeshLab and Open3D read: x, y (m) in the map's frame, z (m) above the camera. Raises BadInput
+    where the map's images are missing or another map's, the folder holds something, or the map has no landmarks.
     """
 
     example = "runs/latest/map.omap spacing=1 out=topomap"
@@ -42,11 +44,13 @@ class ExportMap(Tool):
     field_deg: Annotated[float, Bounds(gt=0, le=360)] | None = None
     """Degrees around straight ahead that are cut out of panoramas; null: whole images."""
     out: str = "topomap"
-    """The folder to write."""
+    """The folder to write its images to, or the file (.ply) for its landmarks."""
 
     def run(self, ctx: Context) -> None:
         """Export the map."""
         (source,) = read_saved(self.maps, at_most=1)
+        if self.out.endswith(".ply"):
+            return self._export_points(source)
         folder = self._folder()
         file, thumbnails = self._thumbnails(source)
         if self.field_deg is not None and not _has_panoramas(source.map):
@@ -71,6 +75,14 @@ class ExportMap(Tool):
             shutil.rmtree(part, ignore_errors=True)
         missing = f"; {len(order) - len(there)} have none" if len(there) < len(order) else ""
         print(f"{folder}: images of {len(kept)} of {len(order)} views, 0.png to {len(kept) - 1}.png{missing}")
+
+    def _export_points(self, source: SavedMap) -> None:
+        landmarks = source.map.landmarks if isinstance(source.map, ReferenceGraph) else None
+        if landmarks is None or not len(landmarks):
+            raise BadInput(f"{source.path}: it has no landmarks to write; type landmarks=sift where a map is made")
+        path = user_path(self.out)
+        write_whole(path, ply(landmarks.points))
+        print(f"{path}: {len(landmarks)} landmarks")
 
     def _folder(self) -> Path:
         folder = user_path(self.out)

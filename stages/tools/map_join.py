@@ -1,7 +1,6 @@
 """Joins saved maps."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -63,7 +62,7 @@ def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:
     assert isinstance(map, ReferenceGraph)
     moved = np.hypot(*(found.poses - map.poses)[:, :2].T)
     print(f"aligned by {found.closures} pairs of references that look alike; moved by {moved.max():.2f} m at most")
-    return replace(map, poses=found.poses)
+    return map.moved(found.poses)
 
 
 def joined(maps: Sequence[MapOfPlaces], pose_source: PoseSource) -> MapOfPlaces:

@@ -11,7 +11,7 @@ from omninav.pipeline import BadInput, Context, Tool
 from omninav.pipeline.engine.artifact import read_artifact, read_header
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import plot
-from omninav.stages.plots.drawing import draw_grid, draw_map, plan_axes
+from omninav.stages.plots.drawing import draw_grid, draw_landmarks, draw_map, plan_axes
 from omninav.stages.recordings.occupancy_grid import read_occupancy
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.maps import ReferenceGraph
@@ -51,6 +51,7 @@ class ShowMap(Tool):
                 print("\n".join(f"{name:<12} {fact}" for name, fact in described(file, shown)))
                 plan_axes(axes)
                 draw_grid(axes, grid)
+                draw_landmarks(axes, shown.landmarks if isinstance(shown, ReferenceGraph) else None)
                 draw_map(axes, _sampled(shown))
                 axes.set_title(file.name)
                 if len(shown):
@@ -74,6 +75,7 @@ def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
         segments, bins = map.features.shape[1:]
         yield "references", f"{len(map)}, {len(map.edges)} edges between them"
         yield "views", f"{map.kind}, {segments} segments x {bins}, {map.features.nbytes / 1e6:.1f} MB"
+        yield "landmarks", described_landmarks(map)
     elif isinstance(map, TopologicalMap):
         yield (
             "places",
@@ -105,6 +107,19 @@ def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
     for name, key in (("made by", "made_by"), ("variant", "variant")):
         if isinstance(facts.get(key), str):
             yield name, facts[key][:300]
+
+
+def described_landmarks(map: ReferenceGraph) -> str:
+    """How many landmarks a map has, how many of them its references see, and how well."""
+    landmarks = map.landmarks
+    if landmarks is None:
+        return "none; type landmarks=sift where a map is made"
+    sees = np.diff(landmarks.starts)
+    few = f", {int((sees == 0).sum()) + len(map) - len(sees)} references see none" if (sees == 0).any() else ""
+    return (
+        f"{len(landmarks)}, a reference sees {np.median(sees) if len(sees) else 0:.0f} (median){few}; "
+        f"bearings to {np.degrees(landmarks.sigma_rad):.2f} deg"
+    )
 
 
 def _sampled(map: AnyMap) -> AnyMap:

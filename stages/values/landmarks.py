@@ -1,5 +1,6 @@
 """Landmarks of a map, and the pose of an image that sees them."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -49,6 +50,40 @@ class Landmarks(Value):
         for reference in references.tolist():
             shown[self.seen[self.starts[reference] : self.starts[reference + 1]]] = True
         return np.flatnonzero(shown)
+
+    def of_references(self, rows: Ints) -> "Landmarks":
+        """Those that some references (N,) see, for a map of these in this order; what none of them sees goes.
+
+        A reference that a map has learned since sees none.
+        """
+        sizes = np.append(np.diff(self.starts), 0)
+        own = np.minimum(rows, self.references)
+        counts = sizes[own]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        first = np.append(self.starts[:-1], 0)[own]
+        seen = self.seen[np.repeat(first - starts[:-1], counts) + np.arange(starts[-1])]
+        kept, renumbered = np.unique(seen, return_inverse=True)
+        return replace(
+            self,
+            points=self.points[kept],
+            descriptors=self.descriptors[kept],
+            starts=starts,
+            seen=renumbered.astype(np.int32),
+            words=self.words.of_views(own),
+        )
+
+    def moved(self, before: Array, after: Array) -> "Landmarks":
+        """Each point moved as the references that see it are, from their poses `before` (R, 3) to those `after` (R, 3):
+        to the mean of where they see it then."""
+        owners = np.repeat(np.arange(self.references), np.diff(self.starts))
+        x, y = (self.points[self.seen, :2] - before[owners, :2]).T
+        cos, sin = np.cos((after - before)[owners, 2]), np.sin((after - before)[owners, 2])
+        counts, points = np.bincount(self.seen, minlength=len(self)), self.points.copy()
+        seen = counts > 0
+        for axis, turned in enumerate((cos * x - sin * y, sin * x + cos * y)):
+            total = np.bincount(self.seen, after[owners, axis] + turned, len(self))
+            points[seen, axis] = total[seen] / counts[seen]
+        return replace(self, points=points)
 
 
 def stored_descriptors(values: Floats) -> Bytes:

@@ -1,5 +1,6 @@
 """Maps."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -64,6 +65,17 @@ class ReferenceGraph(GrowableArrays, Value):
             return False
         self.append("edges", np.array([low, high], np.int64))
         return True
+
+    def moved(self, poses: npt.NDArray[np.float64]) -> "ReferenceGraph":
+        """The map with its references at other poses (R, 3), and each landmark moved with those that see it."""
+        landmarks = None if self.landmarks is None else self.landmarks.moved(self.poses, poses)
+        return replace(self, poses=poses, landmarks=landmarks)
+
+    def contradiction(self) -> str | None:
+        """Landmarks are of the map's references, or of the first ones of a map that has grown since."""
+        if self.landmarks is None or self.landmarks.references <= len(self):
+            return None
+        return f"'landmarks' are of {self.landmarks.references} references, and the map has {len(self)}"
 
     def take_poses_from(self, source: PoseSource) -> None:
         """Say where the poses to come are from."""

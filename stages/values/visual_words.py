@@ -1,6 +1,7 @@
 """The visual words of a map's views."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -51,12 +52,24 @@ class VisualWords(Value):
         rows = csr_matrix((self.weights, self.words, self.starts), shape=(len(self), len(self.centres)))
         return np.clip(np.asarray(rows @ view, np.float32), 0.0, 1.0)
 
+    def of_views(self, rows: Ints) -> "VisualWords":
+        """The words of some views (N,) in this order, of the same vocabulary; one past the last view has none."""
+        counts = np.append(np.diff(self.starts), 0)[rows]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        taken = np.repeat(np.append(self.starts[:-1], 0)[rows] - starts[:-1], counts) + np.arange(starts[-1])
+        return replace(self, starts=starts, words=self.words[taken], weights=self.weights[taken])
+
 
 def words_of(views: Sequence[npt.NDArray[np.uint8]], centres: Floats) -> VisualWords:
     """The words of a map's views, each given by its descriptors (N, D), with a vocabulary that was learned."""
-    found = [visual_words.word_counts(visual_words.root_descriptors(each), centres) for each in views]
+    return words_of_roots((visual_words.root_descriptors(each) for each in views), centres)
+
+
+def words_of_roots(views: Iterable[Floats], centres: Floats) -> VisualWords:
+    """The same of descriptors as `root_descriptors` makes them."""
+    found = [visual_words.word_counts(each, centres) for each in views]
     words = np.concatenate([np.empty(0, np.int64), *(each for each, _ in found)])
-    rarity = visual_words.rarity(np.bincount(words, minlength=len(centres)), len(views))
+    rarity = visual_words.rarity(np.bincount(words, minlength=len(centres)), len(found))
     weights = [visual_words.weighted(*each, rarity) for each in found]
     return VisualWords(
         centres,

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from landmark_tour import mapped_room
 from small_run import reference_graph
 
 from omninav.pipeline import BadInput, Context
@@ -91,3 +92,19 @@ def test_an_image_that_is_none_is_named_and_nothing_is_left(tmp_path: Path):
     with pytest.raises(BadInput, match=r"thumbnails\.omap: image 1 cannot be decoded"):
         ExportMap(maps=name, out=str(tmp_path / "out")).run(CTX)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.omap", "thumbnails.omap"]
+
+
+def test_landmarks_are_written_as_a_point_cloud(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    map = mapped_room()
+    write_artifact(tmp_path / "map.omap", map)
+    assert main(["map", "export", str(tmp_path / "map.omap"), f"out={tmp_path / 'points.ply'}"]) == 0
+    assert f"points.ply: {len(map.landmarks)} landmarks" in capsys.readouterr().out
+    header, points = (tmp_path / "points.ply").read_bytes().split(b"end_header\n", 1)
+    assert header.split(b"\n")[1:3] == [b"format binary_little_endian 1.0", b"element vertex %d" % len(map.landmarks)]
+    assert np.frombuffer(points, "<f4").reshape(-1, 3).tolist() == map.landmarks.points.tolist()
+
+
+def test_a_map_without_landmarks_has_no_point_cloud(tmp_path: Path):
+    with pytest.raises(BadInput, match="it has no landmarks to write; type landmarks=sift"):
+        ExportMap(maps=saved(tmp_path), out=str(tmp_path / "points.ply")).run(CTX)
+    assert not (tmp_path / "points.ply").exists()

@@ -1,0 +1,13 @@
+"""Points as a file that other programs open."""
+
+import numpy as np
+import numpy.typing as npt
+
+
+def ply(points: npt.NDArray[np.float32]) -> bytes:
+    """Points (N, 3) as a binary PLY file (Turk 1994) of vertices alone."""
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n"
+    )
+    return header.encode() + points.astype("<f4").tobytes()

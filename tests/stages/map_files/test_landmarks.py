@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, with_landmarks
+
+from omninav.pipeline import BadInput, Context
+from omninav.pipeline.graph.contents import misfit
+from omninav.stages.map_files.references import cut_references, joined_references, thinned_references
+from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.values.maps import ReferenceGraph
+
+POSE = np.array([3.1, 2.9, 0.4])
+AWAY = np.array([50.0, 0.0, 0.0])
+
+
+def other_room() -> ReferenceGraph:
+    """A room 50 m away, mapped by itself."""
+    seen = [seen_from(room(1), pose) for pose in tour_poses()]
+    map = with_landmarks(graph_of(tour_poses()), seen)
+    return map.moved(map.poses + AWAY)
+
+
+def found_in(map: ReferenceGraph, seed: int = 0) -> list[float] | None:
+    """The pose that an image of a room has in a map."""
+    fix = LandmarkPose().step(Context("landmark_pose"), seen_from(room(seed), POSE), map).fix
+    return None if fix is None else fix.poses[0].tolist()
+
+
+def test_images_are_found_in_a_thinned_and_in_a_cut_map() -> None:
+    map = mapped_room()
+    thin, cut = thinned_references(map, 1.1), cut_references(map, map.poses[:, 0] < 5.0)
+    for part in (thin, cut):
+        assert misfit(part) is None
+        assert len(part) == part.landmarks.references < len(map)
+        assert len(part.landmarks) < len(map.landmarks) or part is thin
+        assert found_in(part) == pytest.approx(POSE, abs=1e-3)
+    assert cut.landmarks.points[:, 0].max() < 5.0 + 3.01
+
+
+def test_what_no_reference_of_a_part_sees_is_gone() -> None:
+    map = mapped_room()
+    assert found_in(cut_references(map, map.poses[:, 0] > 9.0)) is None
+
+
+def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
+    both = joined_references([mapped_room(), other_room()], "truth")
+    assert misfit(both) is None
+    assert len(both.landmarks) == len(mapped_room().landmarks) + len(other_room().landmarks)
+    assert found_in(both) == pytest.approx(POSE, abs=1e-3)
+    assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
+
+
+def test_parts_of_one_map_keep_their_words() -> None:
+    map = mapped_room()
+    left = map.poses[:, 0] < 5.0
+    both = joined_references([cut_references(map, left), cut_references(map, ~left)], "truth")
+    rows = np.concatenate([np.flatnonzero(left), np.flatnonzero(~left)])
+    assert both.landmarks.words.weights.tolist() == map.landmarks.words.of_views(rows).weights.tolist()
+    assert both.landmarks.words.words.tolist() == map.landmarks.words.of_views(rows).words.tolist()
+    assert found_in(both) == pytest.approx(POSE, abs=1e-3)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_references_of_a_map_without_landmarks_see_none_in_a_joined_one(first: bool) -> None:
+    plain = graph_of(tour_poses() + AWAY)
+    both = joined_references([plain, mapped_room()] if first else [mapped_room(), plain], "truth")
+    assert misfit(both) is None
+    sees = np.diff(both.landmarks.starts) > 0
+    assert (sees == (both.poses[:, 0] < 20.0)).all()
+    assert found_in(both) == pytest.approx(POSE, abs=1e-3)
+
+
+def test_maps_without_landmarks_stay_without() -> None:
+    assert joined_references([graph_of(tour_poses())] * 2, "truth").landmarks is None
+    assert thinned_references(graph_of(tour_poses()), 1.0).landmarks is None
+
+
+def test_landmarks_of_other_descriptors_do_not_join() -> None:
+    map = mapped_room()
+    short = replace(map, landmarks=replace(map.landmarks, descriptors=map.landmarks.descriptors[:, :64].copy()))
+    with pytest.raises(BadInput, match="descriptors of their landmarks have 64 and 128 numbers"):
+        joined_references([map, short], "truth")

@@ -1,0 +1,99 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from landmark_tour import FEW, mapped_room
+
+from omninav.pipeline.graph.contents import misfit
+from omninav.stages.geometry.plane.se2 import compose
+
+
+def test_some_references_keep_what_they_see_in_their_order() -> None:
+    map = mapped_room()
+    rows = np.array([30, 4, 17])
+    some = map.landmarks.of_references(rows)
+    assert some.references == len(some.words) == 3
+    for number, row in enumerate(rows):
+        own, before = (
+            each.seen[each.starts[n] : each.starts[n + 1]] for each, n in ((some, number), (map.landmarks, row))
+        )
+        assert (some.points[own] == map.landmarks.points[before]).all()
+        assert (some.descriptors[own] == map.landmarks.descriptors[before]).all()
+    assert len(some) == len(np.unique(some.seen)) < len(map.landmarks)
+    whole = map.landmarks.words
+    assert (
+        some.words.weights.tolist()
+        == np.concatenate([whole.weights[whole.starts[row] : whole.starts[row + 1]] for row in rows]).tolist()
+    )
+    assert misfit(replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)) is None
+
+
+def test_references_that_came_later_and_none_at_all_see_nothing() -> None:
+    landmarks = mapped_room().landmarks
+    later = landmarks.of_references(np.array([landmarks.references + 3, 2]))
+    assert np.diff(later.starts).tolist() == [0, np.diff(landmarks.starts)[2]]
+    assert np.diff(later.words.starts)[0] == 0
+    assert len(landmarks.of_references(np.empty(0, np.int64))) == 0
+
+
+def test_a_map_that_is_moved_takes_its_landmarks_along() -> None:
+    map = mapped_room()
+    motion = np.array([5.0, -2.0, 2.2])
+    poses = np.array([compose(motion, pose) for pose in map.poses])
+    moved = map.moved(poses)
+    points = map.landmarks.points.astype(np.float64)
+    there = np.column_stack([points[:, :2], np.zeros(len(points))])
+    expected = np.array([compose(motion, each) for each in there])
+    assert moved.landmarks.points[:, :2] == pytest.approx(expected[:, :2], abs=1e-4)
+    assert (moved.landmarks.points[:, 2] == map.landmarks.points[:, 2]).all()
+    assert (moved.poses == poses).all()
+
+
+def test_a_landmark_moves_with_the_references_that_see_it() -> None:
+    map = mapped_room()
+    poses = map.poses.copy()
+    right = poses[:, 0] > 6.0
+    poses[right, 1] += 2.0
+    moved = map.moved(poses).landmarks.points - map.landmarks.points
+    assert moved[map.landmarks.points[:, 0] > 9.0, 1] == pytest.approx(2.0, abs=1e-4)
+    assert moved[map.landmarks.points[:, 0] < 3.0] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_landmarks_of_more_references_than_the_map_has_are_a_contradiction() -> None:
+    map = mapped_room()
+    fewer = replace(map, poses=map.poses[:5], features=map.features[:5], edges=FEW)
+    assert misfit(fewer) == f"'landmarks' are of {len(map)} references, and the map has 5"
+    grown = replace(map, poses=np.concatenate([map.poses, map.poses]), features=np.concatenate([map.features] * 2))
+    assert misfit(grown) is None
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("points", np.array([[np.nan, 0.0, 0.0]], np.float32), "'points' holds nan"),
+        ("points", np.array([[1e20, 0.0, 0.0]], np.float32), "'points' holds 1e+20"),
+        ("points", np.zeros((2, 3), np.float32), "'descriptors' has the shape (1, 128)"),
+        ("points", np.zeros((1, 2), np.float32), "'points' has the shape (1, 2)"),
+        ("descriptors", np.zeros((1, 128), np.float32), "'descriptors' is an array of float32"),
+        ("starts", np.array([0, 2, 1]), "'starts' does not ascend"),
+        ("starts", np.array([0, 1, 3]), "'starts' does not ascend from 0 to 2"),
+        ("starts", np.array([0, 1, 2, 2]), "'words' has the shape (2,)"),
+        ("seen", np.array([0, 1], np.int32), "'seen' names a row that does not exist, expected 0 to 0"),
+        ("seen", np.array([0, -1], np.int32), "'seen' names a row that does not exist"),
+        ("sigma_rad", 0.0, "'sigma_rad' holds 0"),
+        ("sigma_rad", float("nan"), "'sigma_rad' holds nan"),
+    ],
+)
+def test_landmarks_that_contradict_themselves_are_said(field: str, value: object, said: str) -> None:
+    whole = mapped_room().landmarks
+    one = replace(
+        whole.of_references(np.array([0, 1])),
+        points=np.zeros((1, 3), np.float32),
+        descriptors=np.zeros((1, 128), np.uint8),
+        starts=np.array([0, 1, 2]),
+        seen=np.zeros(2, np.int32),
+    )
+    assert misfit(one) is None
+    found = misfit(replace(one, **{field: value}))
+    assert found is not None
+    assert said in found
