@@ -33,11 +33,18 @@ class Landmarks(Value):
     descriptors: Annotated[Bytes, Shape("L", "D")]
     starts: Annotated[Ints, Shape("R+1"), Starts("S")]
     seen: Annotated[npt.NDArray[np.int32], Shape("S"), RowsOf("L")]
-    sigma_rad: Annotated[float, Bounds(gt=0)]
+    sigma_rad: Annotated[float, Bounds(ge=1e-6, le=1)]
     words: Annotated[VisualWords, Shape("R")]
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def contradiction(self) -> str | None:
+        """Words are of the descriptors that landmarks have."""
+        one, other = self.descriptors.shape[1], self.words.centres.shape[1]
+        if one == other or not len(self) or not len(self.words.centres):
+            return None
+        return f"'words' are of descriptors of {other} numbers, those of the landmarks have {one}"
 
     @property
     def references(self) -> int:

@@ -15,6 +15,7 @@ FORMATS = [
     video_files.TRUTH,
     map_files.BYTES,
     map_files.CONTENT,
+    map_files.LANDMARKS,
     run_folders.RUN,
     run_folders.CACHE,
     command_words.EXPERIMENT,

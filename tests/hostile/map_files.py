@@ -1,5 +1,6 @@
 """Saved maps: damaged bytes, and files whose sums are right over content that is not."""
 
+import dataclasses
 import functools
 import hashlib
 import io
@@ -14,13 +15,22 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from landmark_tour import room, seen_from
 from made_values import made_values
 
-from omninav.pipeline import StoredRows
+from omninav.pipeline import Context, StoredRows
 from omninav.pipeline.engine import chunks as chunk_files
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.chunks import sums_of
-from omninav.pipeline.engine.codec import encode
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.fusion.landmark_update import LandmarkUpdate
+from omninav.stages.map_files.point_cloud import ply
+from omninav.stages.map_files.references import cut_references, joined_references
+from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.visual_words import VisualWords
 
 from .harness import Format
 from .mutations import BINARY, REALS, SIZES, TEXT, Files, on
@@ -48,6 +58,31 @@ def read(folder: Path, files: Files) -> Any:
     with patch.object(chunk_files, "IN_MEMORY", 0):
         rows = getattr(read_artifact(folder / MAP), "features", None)
     return facts, value, rows[:] if isinstance(rows, StoredRows) else None
+
+
+def used(folder: Path, files: Files) -> Any:
+    """A map with landmarks, and what an image, a cut and a join make of them."""
+    read(folder, files)
+    map = read_artifact(folder / MAP)
+    assert isinstance(map, ReferenceGraph)
+    ctx = Context("landmark_pose", np.random.default_rng(0))
+    fix = LandmarkPose().step(ctx, _image(), map).fix
+    belief = Particles(np.zeros((50, 3)), np.full(50, 0.02))
+    return (
+        fix,
+        LandmarkUpdate().step(ctx, belief, map, fix).belief,
+        cut_references(map, np.arange(len(map)) > 0),
+        joined_references([map, map], map.pose_source),
+        map.moved(map.poses + 1.0),
+        ply(np.empty((0, 3), np.float32) if map.landmarks is None else map.landmarks.points),
+    )
+
+
+@functools.cache
+def _image() -> LocalFeatures:
+    """What the robot sees beside the first references of the map."""
+    seen = seen_from(room(), np.array([1.2, 2.4, 0.3]))
+    return dataclasses.replace(seen, descriptors=seen.descriptors[:, :8].copy())
 
 
 def entries_of(data: bytes) -> dict[str, bytes]:
@@ -132,6 +167,14 @@ def arrays(random: Random, files: Files) -> Files:
         return files
     if array.size > MAX_ITEMS:
         return files
+    array = mutated(random, array)
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
+    return files | {MAP: sealed(entries | {name: buffer.getvalue()})}
+
+
+def mutated(random: Random, array: Any) -> Any:
+    """An array of another shape, type or content than the given one."""
     kind = random.randrange(8)
     if kind == 0:
         array = array.reshape(-1)
@@ -154,9 +197,7 @@ def arrays(random: Random, files: Files) -> Files:
         array[...] = np.zeros((), array.dtype)
     else:
         array = array.T
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
-    return files | {MAP: sealed(entries | {name: buffer.getvalue()})}
+    return array
 
 
 def members(random: Random, files: Files) -> Files:
@@ -187,8 +228,6 @@ def rest(random: Random, files: Files) -> Files:
     values: tuple[Any, ...] = (None, -1, 2**70, "x" * 9, float("nan"), [], {}, (1, 2), True, b"", "", 1e308)
     entries = _entries(files)
     try:
-        from omninav.pipeline.engine.codec import decode
-
         fields = decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
     except Exception:
         return files
@@ -198,6 +237,29 @@ def rest(random: Random, files: Files) -> Files:
         fields[random.choice(sorted(fields))] = random.choice(values)
     else:
         fields[random.choice(("poses", "kind", "surplus", "features"))] = random.choice(values)
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.frombuffer(encode(fields), np.uint8), allow_pickle=False)
+    return files | {MAP: sealed(entries | {"rest.npy": buffer.getvalue()})}
+
+
+def landmarks(random: Random, files: Files) -> Files:
+    """An array of a map's landmarks, or of their words, of another shape, type or content; or another deviation."""
+    entries = _entries(files)
+    try:
+        fields = decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
+        found = fields["landmarks"]
+        inner = random.choice((found, found, found.words))
+    except Exception:
+        return files
+    name = random.choice(
+        [field.name for field in dataclasses.fields(inner) if field.name != "words" or inner is not found]
+    )
+    value = getattr(inner, name)
+    changed = (
+        mutated(random, value) if isinstance(value, np.ndarray) else random.choice((0.0, -1.0, 1e300, float("nan")))
+    )
+    inner = dataclasses.replace(inner, **{name: changed})
+    fields["landmarks"] = dataclasses.replace(found, words=inner) if isinstance(inner, VisualWords) else inner
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.frombuffer(encode(fields), np.uint8), allow_pickle=False)
     return files | {MAP: sealed(entries | {"rest.npy": buffer.getvalue()})}
@@ -231,5 +293,10 @@ def _entries(files: Files) -> dict[str, bytes]:
         return {}
 
 
+def _with_landmarks() -> Sequence[Files]:
+    return samples()[-1:]
+
+
 BYTES = Format("map bytes", samples, [on(BINARY), zip_bytes, zip_bytes, chunks], read, cases=200)
 CONTENT = Format("map content", samples, [arrays, arrays, arrays, members, rest, header], read, cases=400)
+LANDMARKS = Format("landmarks", _with_landmarks, [landmarks], used, cases=150)

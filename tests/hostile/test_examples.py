@@ -1,5 +1,7 @@
 """Files that once made a reader fail, and files of their kinds: each is used as far as it is good, or refused."""
 
+import io
+from dataclasses import replace
 from pathlib import Path
 
 import made_logs
@@ -11,6 +13,7 @@ from conftest import DATA, needs_data
 from hostile.map_files import MAP, entries_of, sealed
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.artifact import artifact_bytes, read_artifact
+from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.source.log import LogSource
 from omninav.stages.values.maps import ReferenceGraph
@@ -55,6 +58,54 @@ def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path
         read_artifact(tmp_path / MAP)
     assert said in str(refused.value)
     assert str(refused.value).startswith(str(tmp_path / MAP))
+
+
+def landmarks_like(**fields: object) -> bytes:
+    """A map whose landmarks have these fields, its sums right."""
+    map = made_values.with_few_landmarks()
+    return artifact_bytes(replace(map, landmarks=replace(map.landmarks, **fields)))  # type: ignore[arg-type]
+
+
+FEW = made_values.with_few_landmarks().landmarks
+assert FEW is not None
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (landmarks_like(points=np.full_like(FEW.points, np.nan)), "'landmarks': 'points' holds nan, expected finite"),
+        (landmarks_like(points=FEW.points[:-1]), "'landmarks': 'descriptors' has the shape"),
+        (landmarks_like(starts=FEW.starts[::-1].copy()), "'landmarks': 'starts' does not ascend from 0 to"),
+        (landmarks_like(starts=FEW.starts[:-1]), "'landmarks': 'words' has the shape (4,), expected (R,), R = 3"),
+        (landmarks_like(seen=FEW.seen + np.int32(len(FEW))), "'landmarks': 'seen' names a row that does not exist"),
+        (landmarks_like(descriptors=FEW.descriptors[:, :4].copy()), "'words' are of descriptors of 8 numbers"),
+        (landmarks_like(sigma_rad=-1.0), "'landmarks': 'sigma_rad' holds -1"),
+        (landmarks_like(words=replace(FEW.words, words=FEW.words.words - np.int32(1))), "'words': 'words' names a row"),
+        (
+            artifact_bytes(replace(made_values.with_few_landmarks(), landmarks=FEW.of_references(np.arange(5)))),
+            "'landmarks' are of 5 references, and the map has 4",
+        ),
+    ],
+)
+def test_landmarks_that_contradict_themselves_are_refused_by_name(tmp_path: Path, content: bytes, said: str):
+    (tmp_path / MAP).write_bytes(content)
+    with pytest.raises(BadInput) as refused:
+        read_artifact(tmp_path / MAP)
+    assert said in str(refused.value)
+    assert str(refused.value).startswith(str(tmp_path / MAP))
+
+
+def test_a_map_that_was_saved_before_there_were_landmarks_is_read(tmp_path: Path):
+    entries = entries_of(artifact_bytes(made_values.with_few_landmarks()))
+    fields = decode(np.load(io.BytesIO(entries["rest.npy"])).tobytes())
+    del fields["landmarks"]
+    packed = io.BytesIO()
+    np.lib.format.write_array(packed, np.frombuffer(encode(fields), np.uint8))
+    (tmp_path / MAP).write_bytes(sealed(entries | {"rest.npy": packed.getvalue()}))
+    map = read_artifact(tmp_path / MAP)
+    assert isinstance(map, ReferenceGraph)
+    assert map.landmarks is None
+    assert len(map) == 4
 
 
 @needs_data
