@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.landmarks import Landmarks
 from omninav.stages.values.map_places import AnyMap
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -79,6 +80,12 @@ def shown_landmarks(landmarks: Landmarks) -> Array:
     pad = 0.1 * float((high - low).max())
     shown: Array = xy[((xy >= low - pad) & (xy <= high + pad)).all(axis=1)]
     return shown
+
+
+def landmarks_of(map: AnyMap | None) -> Array:
+    """x and y (N, 2) of the landmarks of a map that are shown; none of a map without."""
+    landmarks = map.landmarks if isinstance(map, ReferenceGraph) else None
+    return np.empty((0, 2)) if landmarks is None else shown_landmarks(landmarks)
 
 
 def draw_links(axes: "Axes", map: TopologicalMap) -> None:

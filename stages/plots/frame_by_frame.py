@@ -26,11 +26,12 @@ from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
-from . import homing_frames
+from . import homing_frames, landmark_matches
 from .belief_spread import spread_m
 from .best_match_picture import first_seen, picture_of_reference, picture_of_view
 from .drawing import extent_of
 from .homing_snapshot import EncodedHomingView
+from .landmark_matches import drawn_matches, match_facts
 from .panorama_snapshot import EncodedPanorama
 from .plan_chart import draw_surroundings, jumps, plan_chart
 from .snapshot_times import even_frames
@@ -49,7 +50,8 @@ class FrameByFrame(FigureStage):
 
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
     below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of
-    the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it.
+    the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it. Features
+    that were taken for landmarks are marked where a snapshot holds them.
 
     With `answers` the most similar references of a database stand there, each with the error of the pose that it means.
     With `homing` the image is the robot's own, with the features that it follows; the target view, the homing vector,
@@ -93,7 +95,8 @@ class FrameByFrame(FigureStage):
             if seen is not None:
                 spot = _pose_at(drive, seen)
             _draw_now(layer, belief, last, path, n, spot)
-            photographs, facts = [] if snapshot is None else [("image", snapshot.jpeg)], _facts(last, n, belief, spot)
+            photographs = [] if snapshot is None else [("image", drawn_matches(snapshot))]
+            facts = _facts(last, n, belief, spot) + match_facts(snapshot)
             followed, route = _of(homing, tick), _of(routes, tick)
             if followed is not None:
                 places = map if isinstance(map, TopologicalMap) else None
@@ -122,6 +125,8 @@ class FrameByFrame(FigureStage):
             chart.name("best reference", "green", "ring")
         if homing is None:
             words += _what_images_show(snapshots[int(last.row[rows[0]])])
+            if any(each is not None and each.points is not None for each in snapshots):
+                words.append(landmark_matches.COLOURS)
         else:
             chart.name("homing vector", "orange")
             chart.name("target view, truly", "orange", "ring")

@@ -9,8 +9,8 @@ from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import SOURCE_WORDS
 
-from .drawing import extent_of
-from .plan_chart import draw_surroundings, plan_chart
+from .drawing import extent_of, landmarks_of
+from .plan_chart import draw_landmarks, draw_surroundings, plan_chart
 
 Array = npt.NDArray[np.float64]
 
@@ -51,7 +51,8 @@ class MapPlot(FigureStage):
 
 def _draw(map: ReferenceGraph, plan: FloorPlan | None, before: Array | None) -> bytes:
     shown = map.poses if before is None else np.concatenate([map.poses, before])
-    chart = plan_chart(extent_of(shown, margin=0.05))
+    chart = plan_chart(extent_of(shown, landmarks_of(map), margin=0.05))
+    draw_landmarks(chart, map)
     draw_surroundings(chart, map, None, plan)
     if before is not None:
         chart.base.line(before[:, :2], "orange", 1.4, dashed=True)

@@ -1,12 +1,18 @@
 """Keeps a few panoramas as small JPEGs, because images themselves are too large to be kept."""
 
 import math
+from typing import Annotated
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
+from omninav.pipeline.graph.contents import Shape
+from omninav.stages.camera.model import seen_at
+from omninav.stages.camera.panorama import panorama_camera
 from omninav.stages.values.image import Panorama, Windows
+from omninav.stages.values.landmarks import LandmarkFix
 
 from .snapshot_times import is_snapshot_frame
 
@@ -18,11 +24,14 @@ class EncodedPanorama(Value):
     """A panorama as JPEG bytes, columns as in `Panorama`; or windows side by side, the left one on the left.
 
     `headings`: where windows look, from the left to the right (radians, counter-clockwise from forward); empty: it is
-    a panorama.
+    a panorama. `points` (N, 2): columns and rows in the JPEG of the features that were taken for landmarks, NaN where
+    it does not show them, and `agree` (N,): which of them agree with the pose that they give; None: not looked for.
     """
 
     jpeg: bytes
     headings: tuple[float, ...] = ()
+    points: Annotated[npt.NDArray[np.float32] | None, Shape("N", 2, finite=False)] = None
+    agree: Annotated[npt.NDArray[np.bool_] | None, Shape("N")] = None
 
 
 class PanoramaSnapshot(Stage):
@@ -33,11 +42,17 @@ class PanoramaSnapshot(Stage):
 
         snapshot: EncodedPanorama | None = None
 
-    def step(self, ctx: Context, tick: Tick, panorama: Panorama | Windows) -> Out:
-        """One frame."""
+    def step(self, ctx: Context, tick: Tick, panorama: Panorama | Windows, fix: LandmarkFix | None = None) -> Out:
+        """One frame; `fix`: by which of the features in it the pose was found."""
         if not is_snapshot_frame(tick.frame):
             return self.Out()
-        return self.Out(snapshot=EncodedPanorama(*small_jpeg(panorama, COLUMNS, QUALITY)))
+        jpeg, headings = small_jpeg(panorama, COLUMNS, QUALITY)
+        if fix is None or fix.bearings is None or fix.agree is None or isinstance(panorama, Windows):
+            return self.Out(snapshot=EncodedPanorama(jpeg, headings))
+        points = seen_at(panorama_camera(panorama), fix.bearings.astype(np.float64))
+        shrink = min(1.0, COLUMNS / panorama.pixels.shape[1])
+        points = ((points + 0.5) * shrink - 0.5).astype(np.float32)
+        return self.Out(snapshot=EncodedPanorama(jpeg, headings, points, fix.agree == 0))
 
 
 def small_jpeg(panorama: Panorama | Windows, max_columns: int, quality: int) -> tuple[bytes, tuple[float, ...]]:

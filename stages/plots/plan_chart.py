@@ -8,16 +8,19 @@ from omninav.pipeline.report.chart import Chart, Colour, Layer, broken
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .drawing import extent_of, grid_extent
+from .drawing import extent_of, grid_extent, shown_landmarks
 
 Array = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 
 STANDING = (152, 143, 139)
 """Grey (blue-green-red) of what stands on the floor, on light and on dark pages."""
+SPECKS_PX = 500
+"""Length of the longer side of the picture of landmarks, pixels."""
 JUMP_M = 2.5
 """A line is interrupted where an estimate jumps farther (m): nobody drove there."""
 
@@ -56,6 +59,22 @@ def draw_map(chart: Chart, map: AnyMap) -> None:
     draw_lines(chart.base, list(map.poses[map.edges]), "line", 0.9)
     chart.base.dots(map.poses, "grey", _size(len(map)), 0.8)
     chart.name(f"references ({len(map)})", "grey", "dot")
+
+
+def draw_landmarks(chart: Chart, map: AnyMap | None) -> None:
+    """A map's landmarks from above as faint specks; call it before what stands over them."""
+    if not isinstance(map, ReferenceGraph) or map.landmarks is None or not len(map.landmarks):
+        return
+    xy = shown_landmarks(map.landmarks)
+    extent = extent_of(xy, margin=0.0) or (0.0, 1.0, 0.0, 1.0)
+    columns, rows = (
+        max(1, round(SPECKS_PX * (b - a) / max(extent[1] - extent[0], extent[3] - extent[2])))
+        for a, b in (extent[:2], extent[2:])
+    )
+    edges = [[extent[2], extent[3]], [extent[0], extent[1]]]
+    counts = np.histogram2d(xy[:, 1], xy[:, 0], (rows, columns), edges)[0][::-1]
+    chart.base.raster(tinted(np.where(counts > 0, np.clip(60 + 40 * counts, 0, 180), 0).astype(np.uint8)), extent)
+    chart.name(f"landmarks ({len(map.landmarks)})", "grey", "square")
 
 
 def jumps(path: Array, metres: float = JUMP_M) -> list[int]:

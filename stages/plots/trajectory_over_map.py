@@ -15,8 +15,8 @@ from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .drawing import extent_of
-from .plan_chart import draw_surroundings, jumps, plan_chart
+from .drawing import extent_of, landmarks_of
+from .plan_chart import draw_landmarks, draw_surroundings, jumps, plan_chart
 
 
 class TrajectoryOverMap(Stage):
@@ -118,12 +118,13 @@ def _draw(
     planned: Sequence[Array] = (),
 ) -> bytes:
     kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
-    extent = extent_of(*kept, map_poses(map), margin=0.05)  # odometry and a lost filter may leave it
+    extent = extent_of(*kept, map_poses(map), landmarks_of(map), margin=0.05)  # odometry and a lost filter may leave it
     if plan is not None and _drives_itself(logs[-1]):
         extent = (-0.3, plan.width + 0.3, -0.3, plan.depth + 0.3)
     chart = plan_chart(extent)
     for number, route in enumerate(planned):
         chart.base.line(route, "green", 7.0 if number == len(planned) - 1 else 1.8, opacity=0.45)
+    draw_landmarks(chart, map)
     draw_surroundings(chart, map, grid, plan)
     for drive in logs:
         odometry = drive.odometry_alone()

@@ -40,6 +40,11 @@ COVARIANCE_FACTOR = 4.0
 """Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
 SIGMA_FLOOR = (0.001, 0.001, math.radians(0.01))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
+WITHOUT_LANDMARKS = (
+    "the map was saved without landmarks, so that images are compared as a whole, to decimetres: "
+    "learn it again from its tour with landmarks=sift, or type landmarks=none"
+)
+"""Warning of a run whose map has none."""
 
 
 class LandmarkPose(Stage):
@@ -71,6 +76,8 @@ class LandmarkPose(Stage):
     ) -> Out:
         """Find the pose of one image."""
         landmarks = map.landmarks
+        if landmarks is None:
+            ctx.warn(WITHOUT_LANDMARKS)
         if landmarks is None or not len(landmarks) or len(features) < self.min_inliers:
             return self.Out()
         if features.descriptors.shape[1] != landmarks.descriptors.shape[1]:
@@ -95,6 +102,8 @@ class LandmarkPose(Stage):
                 inliers,
                 probabilities_of(inliers),
                 len(points),
+                bearings.astype(np.float32),
+                agreeing(found),
             )
         )
 
@@ -122,9 +131,19 @@ def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> 
         pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma)
         if pose is None or pose.inliers.sum() < min_inliers or (found and not _is_elsewhere(pose, found[0])):
             break
-        found.append(pose)
-        left[rows[pose.inliers]] = False
+        inliers = np.zeros(len(points), np.bool_)
+        inliers[rows] = pose.inliers
+        found.append(pose._replace(inliers=inliers))
+        left &= ~inliers
     return found
+
+
+def agreeing(poses: list[BearingPose]) -> npt.NDArray[np.int8]:
+    """The pose (M,) that each match agrees with, -1 for none."""
+    agree = np.full(len(poses[0].inliers), -1, np.int8)
+    for number, pose in enumerate(poses):
+        agree[pose.inliers] = number
+    return agree
 
 
 def _is_elsewhere(pose: BearingPose, other: BearingPose) -> bool:

@@ -103,7 +103,8 @@ class LandmarkFix(Value):
 
     `poses` (K, 3): x, y (m), heading (rad), map frame. `covariances` (K, 3, 3): m, m, rad. `inliers` (K,): how many
     landmarks agree. `matches`: how many were compared. `probabilities` (K,): that each is right; their sum is at most
-    1, and the rest is that none is.
+    1, and the rest is that none is. `bearings` (M, 3) float32: of the matched features, unit vectors in the robot's
+    frame, and `agree` (M,): the pose that each agrees with, -1 for none; None where they were not kept.
     """
 
     poses: Annotated[Array, Shape("K", 3)]
@@ -111,6 +112,8 @@ class LandmarkFix(Value):
     inliers: Annotated[Ints, Shape("K"), Bounds(ge=0)]
     probabilities: Annotated[Array, Shape("K"), Bounds(ge=0, le=1)]
     matches: Annotated[int, Bounds(ge=0)]
+    bearings: Annotated[Floats | None, Shape("M", 3)] = None
+    agree: Annotated[npt.NDArray[np.int8] | None, Shape("M"), Bounds(ge=-1)] = None
 
     def __len__(self) -> int:
         return len(self.poses)

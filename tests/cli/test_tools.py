@@ -1,12 +1,14 @@
 """Commands with arguments of their own, which write files and leave no run."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import made_places
 import numpy as np
 import pytest
+from landmark_tour import mapped_room
 from small_run import reference_graph
 
 import omninav
@@ -73,6 +75,18 @@ def test_maps_are_joined_thinned_cut_and_shown(
     first = (tmp_path / "d.omap").read_bytes()
     assert main(["map", "thin", "c.omap", "spacing=2", "out=d.omap"]) == 0
     assert (tmp_path / "d.omap").read_bytes() == first
+
+
+def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    map = mapped_room()
+    write_artifact(tmp_path / "a.omap", map)
+    write_artifact(tmp_path / "b.omap", replace(map, landmarks=None))
+    for name, said in (("a", f"{len(map.landmarks)}, a reference sees"), ("b", "none; type landmarks=sift")):
+        out = tmp_path / f"{name}.png"
+        assert main(["map", "show", str(tmp_path / f"{name}.omap"), f"out={out}"]) == 0
+        assert f"landmarks    {said}" in capsys.readouterr().out
+    with_landmarks, without = (cv2.imread(str(tmp_path / f"{name}.png")) for name in ("a", "b"))
+    assert (with_landmarks < 200).sum() > 1.3 * (without < 200).sum()
 
 
 def test_maps_that_do_not_join_are_refused_in_one_line(

@@ -76,6 +76,7 @@ def test_two_places_that_look_the_same_are_rivals() -> None:
     assert len(found) == 2
     assert sorted(found.poses[:, 0]) == pytest.approx([FIRST[0], FIRST[0] + 40.0], abs=1e-2)
     assert found.inliers[0] >= found.inliers[1] >= 12
+    assert [(found.agree == pose).sum() for pose in (0, 1)] == found.inliers.tolist()
 
 
 def test_an_image_that_shows_too_little_says_nothing() -> None:
@@ -107,3 +108,28 @@ def test_the_same_image_has_the_same_pose_to_the_last_bit() -> None:
     one, other = (fix(seen_from(room(), FIRST), near=belief(*FIRST)) for _ in range(2))
     assert one.poses.tobytes() == other.poses.tobytes()
     assert one.covariances.tobytes() == other.covariances.tobytes()
+
+
+def test_it_is_known_which_features_agree_with_which_pose() -> None:
+    features = seen_from(room(), FIRST)
+    shuffled = features.bearings.copy()
+    shuffled[::3] = np.roll(shuffled[::3], 5, axis=0)
+    found = fix(replace(features, bearings=shuffled))
+    assert len(found.bearings) == len(found.agree) == found.matches
+    assert (found.agree == 0).sum() == found.inliers[0] < found.matches
+    right = {row.tobytes() for row in features.bearings.astype(np.float32)}
+    where = {row.tobytes(): n for n, row in enumerate(shuffled.astype(np.float32))}
+    moved = np.array([where[row.tobytes()] % 3 == 0 for row in found.bearings])
+    assert {row.tobytes() for row in found.bearings} <= right
+    assert (found.agree[~moved] == 0).all()
+    assert (found.agree[moved] == 0).mean() < 0.1
+
+
+def test_a_map_that_was_saved_without_landmarks_is_said() -> None:
+    ctx = Context("landmark_pose")
+    for _ in range(2):
+        assert LandmarkPose().step(ctx, seen_from(room(), FIRST), graph_of(tour_poses()[:3])).fix is None
+    (said,) = ctx.warnings
+    assert "landmarks=sift, or type landmarks=none" in said
+    LandmarkPose().step(ctx, seen_from(room(), FIRST), mapped_room())
+    assert len(ctx.warnings) == 1
