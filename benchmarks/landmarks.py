@@ -22,12 +22,9 @@ sys.path.insert(0, str(ROOT))
 
 from omninav.pipeline import Context  # noqa: E402
 from omninav.pipeline.engine.artifact import artifact_bytes  # noqa: E402
-from omninav.stages.geometry.appearance.feature_matching import mutual_nearest  # noqa: E402
-from omninav.stages.geometry.appearance.visual_words import root_descriptors  # noqa: E402
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks  # noqa: E402
 from omninav.stages.mapping.learned_words import LearnVisualWords  # noqa: E402
-from omninav.stages.sensor import landmark_pose  # noqa: E402
-from omninav.stages.sensor.landmark_pose import LandmarkPose  # noqa: E402
+from omninav.stages.sensor.landmark_pose import LandmarkPose, matched, poses_of  # noqa: E402
 from omninav.stages.values.belief import Particles  # noqa: E402
 from omninav.stages.values.local_features import LocalFeatures  # noqa: E402
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph  # noqa: E402
@@ -91,10 +88,10 @@ class Hall:
         return LocalFeatures(bearings, nothing[:, :2], looks.astype(np.uint8), nothing, np.ones(len(rows), np.float32))
 
 
-def timed(call: Callable[[], Any]) -> tuple[Any, float]:
+def timed(call: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
     """What a call gives, and how many seconds of the processor it takes."""
     began = time.process_time()
-    return call(), time.process_time() - began
+    return call(*arguments), time.process_time() - began
 
 
 def megabytes() -> float:
@@ -111,8 +108,8 @@ def made(hall: Hall) -> ReferenceGraph:
         hall.poses, np.zeros((number, 36, 20), np.float32), "histograms", np.empty((0, 2), np.int64), "truth"
     )
     before = megabytes()
-    words, of_words = timed(lambda: LearnVisualWords().step(Context("words"), features, events).words)
-    out, of_landmarks = timed(lambda: LearnLandmarks().step(Context("landmarks"), features, events, map, words))
+    learned, of_words = timed(LearnVisualWords().step, Context("words"), features, events)
+    out, of_landmarks = timed(LearnLandmarks().step, Context("landmarks"), features, events, map, learned.words)
     size = len(artifact_bytes(out.map)) / 1e6
     print(
         f"{number:6d} references: words {of_words:6.1f} s, landmarks {of_landmarks:6.1f} s, {size:6.1f} MB, "
@@ -128,32 +125,22 @@ def pose_times(hall: Hall, map: ReferenceGraph) -> None:
     stage, ctx, rng = LandmarkPose(), Context("landmark_pose"), np.random.default_rng(1)
     parts: dict[str, list[float]] = {"whole": [], "words": [], "candidates": [], "matching": [], "pose": []}
     errors, rows_seen = [], []
+    landmarks = map.landmarks
     for row in rng.integers(0, len(map) - 1, 55).tolist():
         pose = map.poses[row] + rng.normal(0.0, [0.15, 0.15, 0.3])
         image = hall.seen(pose)
         belief = Particles(pose + rng.normal(0.0, 0.1, (200, 3)), np.full(200, 1 / 200))
-        out, seconds = timed(lambda image=image, belief=belief: stage.step(ctx, image, map, belief))
-        parts["whole"].append(seconds)
-        errors.append(math.inf if out.fix is None else float(np.hypot(*(out.fix.poses[0] - pose)[:2])))
-        landmarks = map.landmarks
-        parts["words"].append(timed(lambda image=image: landmarks.words.similarities(image.descriptors))[1])
-        chosen = stage._candidates(image, landmarks.words, map, belief)
-        rows, seconds = timed(lambda chosen=chosen: landmarks.seen_by(chosen))
-        parts["candidates"].append(seconds)
-        rows_seen.append(len(rows))
-
-        def matched(image: LocalFeatures = image, rows: Any = rows) -> Any:
-            theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(512.0)
-            squares = 2.0 - 2.0 * (root_descriptors(image.descriptors) @ theirs.T)
-            return mutual_nearest(np.asarray(squares, np.float32), landmark_pose.RATIO)
-
-        pairs, seconds = timed(matched)
-        parts["matching"].append(seconds)
+        out, whole = timed(stage.step, ctx, image, map, belief)
+        _, words = timed(landmarks.words.similarities, image.descriptors)
+        rows, candidates = timed(landmarks.seen_by, stage._candidates(image, landmarks.words, map, belief))
+        pairs, matching = timed(matched, image, landmarks, rows)
         points = landmarks.points[rows[pairs.second]].astype(np.float64)
         bearings = np.ascontiguousarray(image.bearings[pairs.first])
-        parts["pose"].append(
-            timed(lambda b=bearings, p=points: landmark_pose.poses_of(b, p, landmarks.sigma_rad, 12))[1]
-        )
+        _, consensus = timed(poses_of, bearings, points, landmarks.sigma_rad, stage.min_inliers)
+        for name, seconds in zip(parts, (whole, words, candidates, matching, consensus), strict=True):
+            parts[name].append(seconds)
+        rows_seen.append(len(rows))
+        errors.append(math.inf if out.fix is None else float(np.hypot(*(out.fix.poses[0] - pose)[:2])))
     found = ", ".join(f"{name} {1000 * median(values[5:]):.2f}" for name, values in parts.items())
     print(f"        a pose (ms): {found}; {median(rows_seen):.0f} landmarks compared, error {median(errors):.4f} m")
 

@@ -8,14 +8,14 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.appearance.feature_matching import Pairs, mutual_nearest
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, pose_of_bearings
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, LandmarkFix
+from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, LandmarkFix, Landmarks
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
@@ -86,9 +86,7 @@ class LandmarkPose(Stage):
                 f"{features.descriptors.shape[1]}; use the features the map was learned with, or learn it again"
             )
         rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
-        theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
-        squares = 2.0 - 2.0 * (root_descriptors(features.descriptors) @ theirs.T)
-        pairs = mutual_nearest(np.asarray(squares, np.float32), RATIO)
+        pairs = matched(features, landmarks, rows)
         bearings = np.ascontiguousarray(features.bearings[pairs.first])
         points = landmarks.points[rows[pairs.second]].astype(np.float64)
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
@@ -120,6 +118,15 @@ class LandmarkPose(Stage):
         return distinct(np.concatenate([best, closest.ravel()]))
 
 
+def matched(features: LocalFeatures, landmarks: Landmarks, rows: Ints) -> Pairs:
+    """Features of an image and the landmarks (N,), of some `rows` (N,), that look like each other and like no other."""
+    theirs = landmarks.descriptors[rows].astype(np.float32)
+    ours = root_descriptors(features.descriptors) * np.float32(-2.0 / DESCRIPTOR_SCALE)
+    squares = np.asarray(ours @ theirs.T, np.float32)
+    squares += np.float32(2.0)
+    return mutual_nearest(squares, RATIO)
+
+
 def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> list[BearingPose]:
     """The poses that most bearings (M, 3) agree on, and a rival elsewhere that those left over agree on."""
     found: list[BearingPose] = []
@@ -128,7 +135,7 @@ def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> 
         rows = np.flatnonzero(left)
         if len(rows) < min_inliers:
             break
-        pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma)
+        pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma, min_inliers)
         if pose is None or pose.inliers.sum() < min_inliers or (found and not _is_elsewhere(pose, found[0])):
             break
         inliers = np.zeros(len(points), np.bool_)

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -44,13 +45,17 @@ class VisualWords(Value):
 
         `descriptors` (N, D): of the view's local features. 0 for all where it has none.
         """
+        words, counts = visual_words.word_counts(visual_words.root_descriptors(descriptors), self.centres)
+        weights = visual_words.weighted(words, counts, self.rarity)
+        return np.clip(np.asarray(self._views_of_words[words].T @ weights, np.float32), 0.0, 1.0)
+
+    @cached_property
+    def _views_of_words(self) -> Any:
+        """Weights by word and view: a view shares a few hundred of some thousand words, so that most are not read."""
         from scipy.sparse import csr_matrix  # slow to import, and not needed without words
 
-        view = np.zeros(len(self.centres), np.float32)
-        words, counts = visual_words.word_counts(visual_words.root_descriptors(descriptors), self.centres)
-        view[words] = visual_words.weighted(words, counts, self.rarity)
         rows = csr_matrix((self.weights, self.words, self.starts), shape=(len(self), len(self.centres)))
-        return np.clip(np.asarray(rows @ view, np.float32), 0.0, 1.0)
+        return rows.T.tocsr()
 
     def of_views(self, rows: Ints) -> "VisualWords":
         """The words of some views (N,) in this order, of the same vocabulary; one past the last view has none."""

@@ -17,8 +17,10 @@ FACES = 6
 """Virtual pinhole cameras that share the circle: poselib's solver takes pixels, and a pinhole no full circle."""
 FOCAL_PX = 1000.0
 """Their focal length: a pixel is about a milliradian."""
-MAX_SAMPLES = 1000
-"""Samples that are drawn at most."""
+SAMPLES = (30, 1000)
+"""Samples that are drawn at least and at most."""
+MAX_FAILURE = 1e-3
+"""Probability with which a pose of just enough inliers may be missed."""
 HEIGHT_SIGMA_M, TILT_SIGMA = 0.02, math.radians(3.0)
 """Standard deviations of the camera's height against the map's, and of the robot's tilt (rad): floors are not flat, and
 robots brake."""
@@ -42,16 +44,19 @@ class BearingPose(NamedTuple):
     tilt: float
 
 
-def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: float) -> BearingPose | None:
+def pose_of_bearings(
+    bearings: Array, points: Array, tolerance: float, sigma: float, min_inliers: int = 4
+) -> BearingPose | None:
     """The pose from which most points (M, 3) are seen along their unit bearings (M, 3), within `tolerance` (rad).
 
     A sample consensus of poselib's generalised solver in six degrees of freedom, then a robust least squares in which
     height and tilt stay near those of a floor; `sigma` (rad): standard deviation of a bearing. None where no sample of
     three has a solution.
     """
-    if len(bearings) < 4:
+    min_inliers = max(min_inliers, 4)
+    if len(bearings) < min_inliers:
         return None
-    rotation, translation, agreeing = _ransac(bearings, points, tolerance)
+    rotation, translation, agreeing = _ransac(bearings, points, tolerance, _samples(min_inliers / len(bearings)))
     if agreeing.sum() < 4:
         return None
     R, t, square, spread = _refined(rotation, translation, bearings[agreeing], points[agreeing], sigma)
@@ -61,6 +66,8 @@ def pose_of_bearings(bearings: Array, points: Array, tolerance: float, sigma: fl
     pose = np.array([t[0], t[1], math.atan2(R[1, 0], R[0, 0])])
     covariance: Array = np.linalg.inv(square)[:3, :3].astype(np.float64)
     inliers = _within(R, t, bearings, points, tolerance)
+    if inliers.sum() < min_inliers:
+        return None
     return BearingPose(pose, covariance, spread, inliers, tilt)
 
 
@@ -82,15 +89,25 @@ AXES, CAMERAS = _faces()
 PINHOLES = [{"model": "SIMPLE_PINHOLE", "width": 1, "height": 1, "params": [FOCAL_PX, 0.0, 0.0]}] * FACES
 
 
-def _ransac(bearings: Array, points: Array, tolerance: float) -> tuple[Array, Array, Bools]:
+def _samples(share: float) -> int:
+    """Samples of three after which one is of inliers alone, where they are this share of all points."""
+    right = min(share**3, 1.0 - 1e-9)
+    return min(SAMPLES[1], max(SAMPLES[0], math.ceil(math.log(MAX_FAILURE) / math.log1p(-right))))
+
+
+def _ransac(bearings: Array, points: Array, tolerance: float, samples: int) -> tuple[Array, Array, Bools]:
     azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])
     face = np.rint(azimuths * (FACES / (2.0 * math.pi))).astype(np.int64) % FACES
     rows = [np.flatnonzero(face == f) for f in range(FACES)]
     seen = [bearings[r] @ axes.T for r, axes in zip(rows, AXES, strict=True)]
     pixels = [FOCAL_PX * each[:, :2] / np.maximum(each[:, 2:], 1e-6) for each in seen]
-    options = {"max_reproj_error": FOCAL_PX * math.tan(tolerance), "max_iterations": MAX_SAMPLES, "min_iterations": 100}
+    options = {
+        "max_reproj_error": FOCAL_PX * math.tan(tolerance),
+        "max_iterations": samples,
+        "min_iterations": SAMPLES[0],
+    }
     found, report = poselib.estimate_generalized_absolute_pose(
-        pixels, [points[r] for r in rows], CAMERAS, PINHOLES, options, {}
+        pixels, [points[r] for r in rows], CAMERAS, PINHOLES, options, {"max_iterations": 0}
     )
     agreeing = np.zeros(len(bearings), np.bool_)
     for r, inliers in zip(rows, report["inliers"], strict=True):
