@@ -84,4 +84,4 @@ def _views_of_references(
     found = [each for each, event in zip(features, events, strict=True) if event is not None]
     bearings = [np.empty((0, 3)) if each is None else each.bearings for each in found]
     nothing = np.empty((0, 128), np.float32)
-    return local_views(bearings, [nothing if each is None else root_descriptors(each.descriptors) for each in found])
+    return local_views(bearings, (nothing if each is None else root_descriptors(each.descriptors) for each in found))

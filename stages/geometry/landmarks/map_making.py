@@ -33,6 +33,8 @@ MISS = math.radians(0.7)
 """Angle between a bearing and its landmark above which it is left out (rad)."""
 MIN_PARALLAX = math.radians(1.5)
 """Angle between two bearings of a landmark, below which its depth is not known (rad)."""
+AT_ONCE = 10_000
+"""Landmarks whose descriptors are averaged at once: those of all sightings take gigabytes."""
 MAX_DISTANCE_M = 30.0
 """Distance beyond which a landmark is not kept, m."""
 
@@ -68,13 +70,15 @@ class Sightings(NamedTuple):
 
 
 def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> LocalViews:
-    """One list of the features of all references."""
+    """One list of the features of all references; `descriptors` may be made one after the other, as they are large."""
     starts = np.cumsum([0, *(len(each) for each in bearings)], dtype=np.int64)
-    return LocalViews(
-        starts,
-        np.concatenate([np.empty((0, 3)), *bearings]),
-        np.concatenate([np.empty((0, 128), np.float32), *descriptors]),
-    )
+    together = np.empty((0, 128), np.float32)
+    for start, each in zip(starts, descriptors, strict=False):
+        if len(each):
+            if not len(together):
+                together = np.empty((starts[-1], each.shape[1]), np.float32)
+            together[start : start + len(each)] = each
+    return LocalViews(starts, np.concatenate([np.empty((0, 3)), *bearings]), together)
 
 
 def neighbouring_pairs(poses: Array, similarity: Iterable[Floats]) -> Ints:
@@ -137,11 +141,14 @@ def triangulated(views: LocalViews, tracks: Tracks, poses: Array) -> Sightings:
 
 def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:
     """The mean (L, D) float32 of each landmark's descriptors, at length 1."""
-    starts = np.searchsorted(sightings.landmarks, np.arange(len(sightings.points)))
-    if not len(starts):
-        return np.empty((0, views.descriptors.shape[1]), np.float32)
-    total = np.add.reduceat(views.descriptors[sightings.features], starts, axis=0)
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9), np.float32)
+    starts = np.searchsorted(sightings.landmarks, np.arange(len(sightings.points) + 1))
+    means = np.empty((len(sightings.points), views.descriptors.shape[1]), np.float32)
+    for low in range(0, len(means), AT_ONCE):
+        high = min(low + AT_ONCE, len(means))
+        features = sightings.features[starts[low] : starts[high]]
+        total = np.add.reduceat(views.descriptors[features], starts[low:high] - starts[low], axis=0)
+        means[low:high] = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
+    return means
 
 
 def bearing_sigma(views: LocalViews, sightings: Sightings, poses: Array) -> float:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from landmark_world import NOISE, house
 
+from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
     bearing_sigma,
@@ -90,6 +91,19 @@ def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None
     assert np.linalg.norm(looks, axis=1) == pytest.approx(1.0, abs=1e-5)
     alike = np.einsum("od,od->o", looks[found.landmarks], views.descriptors[found.features])
     assert np.median(alike) > 0.97
+
+
+def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(features, found, monkeypatch) -> None:
+    whole = mean_descriptors(features[0], found)
+    monkeypatch.setattr(map_making, "AT_ONCE", 7)
+    assert mean_descriptors(features[0], found).tobytes() == whole.tobytes()
+
+
+def test_features_of_any_length_are_put_together_also_with_images_without_any() -> None:
+    looks = [np.empty((0, 128), np.float32), np.full((2, 64), 0.1, np.float32), np.full((1, 64), 0.2, np.float32)]
+    views = local_views([np.empty((0, 3)), np.eye(3)[:2], np.eye(3)[2:]], iter(looks))
+    assert views.descriptors.tolist() == np.concatenate(looks[1:]).tolist()
+    assert views.owners.tolist() == [1, 1, 2]
 
 
 def test_neighbours_are_the_most_similar_ones_within_reach_each_pair_once() -> None:
