@@ -55,13 +55,19 @@ def watched(
 
 
 def sentence_of_leap(
-    number: int = 8, after_s: float = 60.0, step: float = 0.2, usual_s: float = 1.0, off: float = 0.0, turn: float = 0.0
+    number: int = 8,
+    after_s: float = 60.0,
+    step: float = 0.2,
+    usual_s: float = 1.0,
+    off: float = 0.0,
+    turn: float = 0.0,
+    side: float = 0.0,
 ) -> str:
     """What is said of an image so long after the last, of a robot that drove on and is so far `off` its way."""
     before = watched(number, step, seconds=usual_s)
     recent = InputConflictsState(rows=before.rows, stamp=int(before.times[-1] * 1e9))
     tick = Tick(9, recent.stamp + int(after_s * 1e9), 0, 9, False)
-    return leap(recent, tick, Pose(step * number + off, 0.0, turn))
+    return leap(recent, tick, Pose(step * number + off, side, turn))
 
 
 @pytest.mark.parametrize(
@@ -81,6 +87,8 @@ def sentence_of_leap(
         ({"off": 0.11}, False),
         ({"off": -0.09}, True),
         ({"off": -0.11}, False),
+        ({"side": 0.09}, True),
+        ({"side": 0.11}, False),
         ({"turn": math.radians(14.0)}, True),
         ({"turn": math.radians(-16.0)}, False),
     ],
@@ -154,6 +162,24 @@ def test_turns_that_are_seen_and_not_measured_are_said(given: dict[str, Any], sa
     assert bool(found) == bool(said)
 
 
+@pytest.mark.parametrize(("to_and_fro", "said"), [(0.208, False), (0.22, True)])
+def test_odometry_that_turns_wildly_and_not_with_the_images_is_in_another_unit(to_and_fro: float, said: bool) -> None:
+    wild = watched(60)
+    wild.rows[1:, 8] = np.where(np.arange(59) < 20, 0.1, 0.0)  # 2 rad, a sixth of 12; 4 pi are 12.6
+    wild.rows[:, 3] = np.cumsum(to_and_fro * (-1.0) ** np.arange(60))
+    found = turned(wild, SCALE_M)
+    assert bool(found) == said
+    if said:
+        assert "odometry turns by 744 degrees over 59 images, the images by 115 degrees, and not together" in found
+
+
+@pytest.mark.parametrize(("correlation", "said"), [(0.98, False), (0.96, True)])
+def test_the_best_match_of_a_standing_robot_goes_back_and_forth(correlation: float, said: bool) -> None:
+    going = placed(WINDOW, 0, 2.0)
+    going.rows[1:, 9] = correlation
+    assert bool(tracked(going, SCALE_M)) == said
+
+
 def swaying(delay_s: float, gain: float = 1.0) -> Watched:
     """A robot that drives 0.2 m/s and turns to and fro; images show its turns so much later, odometry `gain` times."""
 
@@ -167,7 +193,7 @@ def swaying(delay_s: float, gain: float = 1.0) -> Watched:
     return Watched(rows)
 
 
-@pytest.mark.parametrize(("delay_s", "said"), [(0.0, False), (0.5, True), (-0.5, True), (1.0, True)])
+@pytest.mark.parametrize(("delay_s", "said"), [(0.0, False), (0.2, False), (0.5, True), (-0.5, True), (1.0, True)])
 def test_late_images_are_said_with_their_delay(delay_s: float, said: bool) -> None:
     found = late(swaying(delay_s), SCALE_M)
     assert bool(found) == said
