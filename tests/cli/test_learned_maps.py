@@ -119,8 +119,9 @@ def test_a_variant_that_made_a_map_says_what_to_type(capsys: pytest.CaptureFixtu
     for name, hint in gone.items():
         assert main(["check", name]) == 2
         assert hint in capsys.readouterr().err
-        typed = hint.partition("omninav map ")[2].partition(" log=T")[0]
-        with hydra_started():
+    with hydra_started():
+        for hint in gone.values():
+            typed = hint.partition("omninav map ")[2].partition(" log=T")[0]
             assert "map" in plan(complete(compose(["learn=map", typed]))).saves
     name, hint = next(iter(gone.items()))
     for words in ([name, "log=T"], ["variants", name.partition("=")[2]], ["-m", name, "seed=0,1"]):
