@@ -23,8 +23,6 @@ COLOUR_RADIUS = 3.0
 """Radius of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
 EDGE_RATIO = 10.0
 """Largest ratio of principal curvatures of a feature, above which it lies on an edge: OpenCV's default."""
-BLUR_PX = 1.6
-"""Blur of the first octave, pixels: OpenCV's default."""
 
 
 class RotationReducedSift(Stage):
@@ -45,6 +43,9 @@ class RotationReducedSift(Stage):
     contrast: Annotated[float, Bounds(ge=0)] = 0.04
     """OpenCV's threshold; at 0.02 features of floors and walls that repeat come in, and maps get wrong loops."""
 
+    blur_px: Annotated[float, Bounds(gt=0.5)] = 1.6
+    """Blur of the first octave (pixels): Lowe's. With less, finer points of a small image are found too."""
+
     class Out(Outputs):
         """Features that were found, the strongest first; there may be none."""
 
@@ -58,7 +59,7 @@ class RotationReducedSift(Stage):
             nfeatures=most,
             contrastThreshold=self.contrast,
             edgeThreshold=EDGE_RATIO,
-            sigma=BLUR_PX,
+            sigma=self.blur_px,
             enable_precise_upscale=True,
         )
 

@@ -4,9 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.landmarks.left_out import found_rate, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
     bearing_sigma,
@@ -19,6 +22,7 @@ from omninav.stages.geometry.landmarks.map_making import (
     triangulated,
 )
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
+from omninav.stages.values.length_scale import DEFAULT_M
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
@@ -27,6 +31,7 @@ QUANTITIES = {
     "landmarks.number": Quantity(title="Landmarks", context=True),
     "landmarks.sightings": Quantity(title="References that see a landmark, mean", context=True),
     "landmarks.sigma_deg": Quantity(title="Standard deviation of a bearing", unit="deg", context=True),
+    "landmarks.found_rate": Quantity(title="Map's own images found by landmarks", unit="%", context=True),
 }
 
 
@@ -55,27 +60,32 @@ class LearnLandmarks(Stage):
         """The whole tour at once; `events`: which of its images became references."""
         ctx.doing("triangulating landmarks")
         views = _views_of_references(features, events)
-        rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres))
-        tracks = matched_pairs(views, neighbouring_pairs(map.poses, rows), map.poses)
+        rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
+        unit = length_scale(map.poses, map.features, map.kind) or DEFAULT_M
+        tracks = matched_pairs(views, neighbouring_pairs(map.poses, rows, unit), map.poses)
         found = triangulated(views, tracks, map.poses)
         starts, seen = sightings_by_reference(views, found)
         sigma = bearing_sigma(views, found, map.poses)
+        looks = mean_descriptors(views, found)
+        rate = found_rate(views, found, looks, map.poses, sigma, _candidates(words))
         landmarks = Landmarks(
-            found.points.astype(np.float32),
-            stored_descriptors(mean_descriptors(views, found)),
-            starts,
-            seen,
-            sigma,
-            words,
+            found.points.astype(np.float32), stored_descriptors(looks), starts, seen, sigma, words, rate
         )
         ctx.fact("landmarks", len(landmarks))
         values = {
             "number": len(landmarks),
             "sightings": len(seen) / max(1, len(landmarks)),
             "sigma_deg": float(np.degrees(sigma)),
+            "found_rate": rate,
         }
         metrics = Metrics({"landmarks": values}, QUANTITIES)
         return self.Out(map=replace(map, landmarks=landmarks), metrics=metrics)
+
+
+def _candidates(words: VisualWords) -> list[npt.NDArray[np.int64]]:
+    samples = samples_of(len(words))
+    rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), samples)
+    return [other_references(int(reference), row) for reference, row in zip(samples, rows, strict=True)]
 
 
 def _views_of_references(

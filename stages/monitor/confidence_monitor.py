@@ -16,6 +16,7 @@ from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
+from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -41,12 +42,20 @@ KIDNAPPING_PROBABILITY = 0.02
 """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
 or found itself again."""
 
+FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.8, 0.05
+"""Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
+FOUND_BY_CHANCE = 0.002
+"""Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
+MAX_AGAINST = 4.0
+"""Log odds that images without landmarks speak against an estimate, at most: light may have changed."""
+
 
 class ConfidenceMonitorState(State):
     """Where the robot would be now if each of the last images had been taken where its best match was: `places` (M, 3),
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
-    `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share."""
+    `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
+    `geometry`: log odds of right by landmarks."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
@@ -54,12 +63,13 @@ class ConfidenceMonitorState(State):
     estimates: Array = field(default_factory=lambda: np.zeros((0, 3)))
     contradictions: Array = field(default_factory=lambda: np.zeros(0))
     contradicted: float = 0.0
+    geometry: float = 0.0
 
     def forget(self) -> None:
         """Begin anew: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
-        self.contradicted = 0.0
+        self.contradicted, self.geometry = 0.0, 0.0
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
@@ -91,6 +101,10 @@ class ConfidenceMonitor(Stage):
     estimate, and fully if it is the first to do so, since it then repeats none before it. A way without images
     raises the probability that the robot was carried elsewhere, as images do.
 
+    Landmarks say more than any similarity: a pose that many of them agree on outweighs all appearance, for or against
+    the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
+    robot may be nowhere on the map.
+
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
 
@@ -118,6 +132,7 @@ class ConfidenceMonitor(Stage):
         when_wrong: WrongPoseAgreement,
         similarities: Similarities | None = None,
         likelihood: Likelihood | None = None,
+        fix: LandmarkFix | None = None,
         motion: Motion | None = None,
         conflicts: Conflicts | None = None,
         restart: Restart | None = None,
@@ -148,10 +163,38 @@ class ConfidenceMonitor(Stage):
             recent.weights * agreeing, disagreeing, recent.novelties,
             when_wrong.share, STRENGTH, KIDNAPPING_PROBABILITY,
         )  # fmt: skip
+        if map.landmarks is not None:
+            novelty = float(recent.novelties[-1]) if len(recent.novelties) else 1.0
+            recent.geometry, sure = by_landmarks(
+                recent.geometry, fix, map.landmarks.found_rate, pose, (gate, radians), novelty
+            )
+            odds = (1.0 - sure) * odds + recent.geometry
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
             probability *= self.right_in_conflict
         return self.Out(confidence=PoseConfidence(probability))
+
+
+def by_landmarks(
+    before: float, fix: LandmarkFix | None, found_rate: float, pose: Array, gate: tuple[float, float], novelty: float
+) -> tuple[float, float]:
+    """Log odds that an estimate (3,) is right by landmarks, after those `before`, and how sure this image's are.
+
+    `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
+    how new the image is. Of a pose that is sure with probability p, p agrees with the estimate or not, and the rest is
+    even; it takes the place of what was known before by as much.
+    """
+    probability = 1.0 / (1.0 + math.exp(-before))
+    probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
+    kept = math.log(probability / (1.0 - probability))
+    if fix is None:
+        found = FOUND_OF_LEFT_OUT * found_rate
+        against = min(0.0, math.log((1.0 - found) / (1.0 - FOUND_ELSEWHERE)))
+        return max(kept + novelty * against, -MAX_AGAINST), 0.0
+    sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
+    agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
+    right = min(max(agreeing + 0.5 * (1.0 - sure), FOUND_BY_CHANCE), 1.0 - FOUND_BY_CHANCE)
+    return math.log(right / (1.0 - right)) + (1.0 - sure) * kept, sure
 
 
 def share_counted(lead: float) -> float:

@@ -7,14 +7,31 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import pose_row
+from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
 
 Array = npt.NDArray[np.float64]
+
+
+DRIFT_M = (0.1, 0.05)
+"""Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""
+MAX_SQUARES = 16.0
+"""Squared Mahalanobis distance within which a pose by landmarks is the estimate: 99.9 % of right ones."""
+AGREES = 0.9
+"""Probability from which on a pose by landmarks is taken for one."""
+
+
+class WidenCovarianceState(State):
+    """Metres driven since landmarks gave the pose that was estimated."""
+
+    driven_m: float = math.inf
 
 
 class WidenCovariance(Stage):
@@ -24,7 +41,9 @@ class WidenCovariance(Stage):
     that is off by a share of the appearance length scale, which no particle shows. So that share of the map's length
     scale, squared, is added to both variances of the position. While the estimate is more probably wrong than right,
     the robot may be anywhere in the map: the covariance is that of the map's references about the estimate, and of any
-    heading. How well it holds, and where the share is from: docs/experiments/confidence.md.
+    heading. Where landmarks have given the pose, the filter's covariance is theirs, and right; the longer ago, the more
+    of the share is added, up to the drift of odometry. How well it holds, and where the share is from:
+    docs/experiments/confidence.md.
     """
 
     floor: Annotated[float, Bounds(ge=0)] = 0.6
@@ -41,19 +60,35 @@ class WidenCovariance(Stage):
     def step(
         self,
         ctx: Context,
+        state: WidenCovarianceState,
         estimate: PoseEstimate,
         confidence: PoseConfidence,
         length_scale: LengthScale,
         map: ReferenceGraph,
+        fix: LandmarkFix | None = None,
+        motion: Motion | None = None,
     ) -> Out:
         """One estimate."""
-        variance = (self.floor * length_scale.metres) ** 2
+        state.driven_m = math.inf if ctx.tick.first_of_log else state.driven_m
+        state.driven_m += 0.0 if motion is None else math.hypot(motion.x, motion.y)
+        if fix is not None and gives(fix, estimate):
+            state.driven_m = 0.0
+        drift = DRIFT_M[0] ** 2 * state.driven_m + (DRIFT_M[1] * state.driven_m) ** 2
+        variance = min((self.floor * length_scale.metres) ** 2, drift)
         covariance = estimate.covariance.copy()
         covariance[0, 0] += variance
         covariance[1, 1] += variance
         if confidence.probability < self.min_confidence:
             covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))
+
+
+def gives(fix: LandmarkFix, estimate: PoseEstimate) -> bool:
+    """Tests whether an estimate is, within their covariances, a pose that landmarks are sure of."""
+    away = fix.poses[0] - np.array(pose_row(estimate.pose))
+    away[2] = wrap_angle(float(away[2]))
+    squares = away @ np.linalg.solve(fix.covariances[0] + estimate.covariance, away)
+    return bool(fix.probabilities[0] >= AGREES and squares <= MAX_SQUARES)
 
 
 def map_covariance(pose: Array, map: ReferenceGraph) -> Array:

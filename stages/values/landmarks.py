@@ -27,6 +27,7 @@ class Landmarks(Value):
     uint8: the mean of each point's descriptors as `stored_descriptors` makes them. Of reference r the points that it
     sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a bearing, as the map's
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
+    `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -35,6 +36,7 @@ class Landmarks(Value):
     seen: Annotated[npt.NDArray[np.int32], Shape("S"), RowsOf("L")]
     sigma_rad: Annotated[float, Bounds(ge=1e-6, le=1)]
     words: Annotated[VisualWords, Shape("R")]
+    found_rate: Annotated[float, Bounds(ge=0, le=1)]
 
     def __len__(self) -> int:
         return len(self.points)

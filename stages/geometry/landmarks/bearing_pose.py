@@ -8,10 +8,13 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.appearance.feature_matching import Pairs, mutual_nearest
+from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.small_systems import rotated_by, solve
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
 
 FACES = 6
 """Virtual pinhole cameras that share the circle: poselib's solver takes pixels, and a pinhole no full circle."""
@@ -28,6 +31,14 @@ MAX_TILT = math.radians(30.0)
 """Tilt above which a pose is none of a robot on a floor (rad): the mirror image of a wall is seen from upside down."""
 START_DECIMALS = 4
 """Decimals of the refinement's start, m and of a quaternion."""
+RATIO = 0.85
+"""Largest ratio of a match's distance to that of the second nearest landmark."""
+TOLERANCE = math.radians(0.6)
+"""Angle to its landmark within which a bearing agrees with a pose (rad)."""
+ELSEWHERE = (0.5, math.radians(10.0))
+"""Distance (m) and turn (rad) from the best pose beyond which another one is a rival."""
+MAX_POSES = 2
+"""Poses that an image may have: the best one, and its rival."""
 STEPS = 10
 """Gauss-Newton steps of the refinement."""
 
@@ -69,6 +80,37 @@ def pose_of_bearings(
     if inliers.sum() < min_inliers:
         return None
     return BearingPose(pose, covariance, spread, inliers, tilt)
+
+
+def matched(descriptors: Floats, landmarks: Floats) -> Pairs:
+    """Pairs of features and landmarks, by their descriptors (N, D) and (L, D) of length 1."""
+    squares: Floats = descriptors @ landmarks.T
+    squares *= -2.0
+    squares += 2.0
+    return mutual_nearest(squares, RATIO)
+
+
+def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> list[BearingPose]:
+    """The poses that most bearings (M, 3) agree on, and a rival elsewhere that those left over agree on."""
+    found: list[BearingPose] = []
+    left = np.ones(len(points), np.bool_)
+    for _ in range(MAX_POSES):
+        rows = np.flatnonzero(left)
+        if len(rows) < min_inliers:
+            break
+        pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma, min_inliers)
+        if pose is None or pose.inliers.sum() < min_inliers or (found and not _is_elsewhere(pose, found[0])):
+            break
+        inliers = np.zeros(len(points), np.bool_)
+        inliers[rows] = pose.inliers
+        found.append(pose._replace(inliers=inliers))
+        left &= ~inliers
+    return found
+
+
+def _is_elsewhere(pose: BearingPose, other: BearingPose) -> bool:
+    away = pose.pose - other.pose
+    return math.hypot(away[0], away[1]) > ELSEWHERE[0] or abs(wrap_angle(float(away[2]))) > ELSEWHERE[1]
 
 
 def _faces() -> tuple[Array, list[Any]]:

@@ -18,9 +18,9 @@ Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
-APART_M = (0.1, 2.0)
-"""Least and largest distance of two references that are matched, m: nearer ones say nothing of depths, and farther ones
-see little that is the same."""
+APART = (0.2, 4.0)
+"""Least and largest distance of two references that are matched, in length scales of the map: nearer ones say nothing
+of depths, and farther ones see little that is the same."""
 NEIGHBOURS = 10
 """References that each is matched with, those that share most visual words."""
 RATIO = 0.8
@@ -81,20 +81,20 @@ def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> Loc
     return LocalViews(starts, np.concatenate([np.empty((0, 3)), *bearings]), together)
 
 
-def neighbouring_pairs(poses: Array, similarity: Iterable[Floats]) -> Ints:
-    """Pairs (P, 2) of references to match, each once: the most alike ones among those at a distance of `APART_M`.
+def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale: float) -> Ints:
+    """Pairs (P, 2) of references to match, each once: the most similar ones among those at a distance of `APART`.
 
-    `similarity`: row r is the similarity (R,) of reference r to all.
+    `similarity`: row r is the similarity (R,) of reference r to all. `length_scale`: of the map, m.
     """
     from scipy.spatial import KDTree  # slow to import, and not needed without landmarks
 
     tree = KDTree(poses[:, :2])
     pairs: set[tuple[int, int]] = set()
     for reference, (near, similarities) in enumerate(
-        zip(tree.query_ball_point(poses[:, :2], APART_M[1]), similarity, strict=True)
+        zip(tree.query_ball_point(poses[:, :2], APART[1] * length_scale), similarity, strict=True)
     ):
         others = np.sort(np.array(near, np.int64))
-        others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > APART_M[0]]
+        others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > APART[0] * length_scale]
         best = others[np.argsort(-similarities[others], kind="stable")[:NEIGHBOURS]]
         pairs.update((min(reference, other), max(reference, other)) for other in best.tolist())
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)
@@ -179,10 +179,12 @@ def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Int
     return np.concatenate([[0], np.cumsum(counts)]), sightings.landmarks[order].astype(np.int32)
 
 
-def similarity_rows(starts: Ints, words: npt.NDArray[np.int32], weights: Floats, size: int) -> Iterator[Floats]:
-    """Similarities (R,) of each of R references to all by their visual words, one row after the other."""
+def similarity_rows(
+    starts: Ints, words: npt.NDArray[np.int32], weights: Floats, size: int, references: Ints
+) -> Iterator[Floats]:
+    """Similarities (R,) of each of some references to all R by their visual words, one row after the other."""
     from scipy.sparse import csr_matrix  # slow to import, and not needed without landmarks
 
     rows = csr_matrix((weights, words, starts), shape=(len(starts) - 1, size))
-    for reference in range(len(starts) - 1):
+    for reference in references.tolist():
         yield np.asarray((rows @ rows[reference].toarray().T)[:, 0], np.float32)

@@ -90,8 +90,10 @@ def _mode_and_mean(
     means: Array,
     covariance: Array,
 ) -> float:
-    start = _heaviest_cell(poses, weights, radius / 2, max(1, round(2 * np.pi / angle)))
+    start, heaviest, least = _heaviest_cell(poses, weights, radius / 2, max(1, round(2 * np.pi / angle)))
     members = _climb(poses, weights, sines, cosines, start, radius, angle)
+    if weights[members].sum() < least:  # the heaviest cell of the neighbourhood lies beyond the kernel
+        members = _climb(poses, weights, sines, cosines, heaviest, radius, angle)
     means[0], mass = _mean(poses, weights, sines, cosines, members)
     covariance[:] = _covariance(poses, weights, means[0], members)
     members[:] = True
@@ -114,9 +116,9 @@ def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Memb
 
 
 @compiled(nogil=True)
-def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> Array:
-    # The centre of the cell that is heaviest together with its neighbours. Only cells with a particle are kept, in a
-    # table with open addresses that is never more than half full.
+def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> tuple[Array, Array, float]:
+    # The centre of the cell that is heaviest together with its neighbours, that of the heaviest of these, and its mass.
+    # Only cells with a particle are kept, in a table with open addresses that is never more than half full.
     left, low, high = np.inf, np.inf, -np.inf
     for n in range(len(poses)):
         left, low, high = min(left, poses[n, 0]), min(low, poses[n, 1]), max(high, poses[n, 1])
@@ -137,10 +139,10 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> 
             slots[slot], cells[count] = count, number
             count += 1
         mass[slots[slot]] += weights[n]
-    best, most = 0, -1.0
+    best, most, densest = 0, -1.0, 0
     # A mode lighter than 64 others is not the heaviest.
     for candidate in np.argsort(-mass[:count], kind="mergesort")[:64]:
-        number, around = cells[candidate], 0.0
+        number, around, heaviest = cells[candidate], 0.0, candidate
         for k in range(NEIGHBOUR_STEPS.shape[1]):
             column, row = number // headings // width, number // headings % width
             cell_beside = (column + NEIGHBOUR_STEPS[0, k]) * width + row + NEIGHBOUR_STEPS[1, k]
@@ -148,11 +150,16 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> 
                 _slot(slots, cells, cell_beside * headings + (number % headings + NEIGHBOUR_STEPS[2, k]) % headings)
             ]
             around += mass[beside] if beside >= 0 else 0.0
+            heaviest = beside if beside >= 0 and mass[beside] > mass[heaviest] else heaviest
         if around > most:
-            best, most = number, around
-    heading = (best % headings + 0.5) * turn
-    x, y = best // headings // width + left + 0.5, best // headings % width + low + 0.5
-    return np.array([x * cell, y * cell, heading - 2 * np.pi * (heading > np.pi)])
+            best, most, densest = number, around, heaviest
+    centres = np.empty((2, 3))
+    for n, number in enumerate((best, cells[densest])):
+        heading = (number % headings + 0.5) * turn
+        centres[n, 0] = (number // headings // width + left + 0.5) * cell
+        centres[n, 1] = (number // headings % width + low + 0.5) * cell
+        centres[n, 2] = heading - 2 * np.pi * (heading > np.pi)
+    return centres[0], centres[1], mass[densest]
 
 
 @compiled(nogil=True)
