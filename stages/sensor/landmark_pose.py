@@ -25,7 +25,7 @@ BELIEF_SAMPLES = 5
 """Particles, drawn evenly by weight, around which references are candidates too."""
 NEAR_EACH = 2
 """References that are candidates around each of them."""
-COVARIANCE_FACTOR = 4.0
+COVARIANCE_FACTOR = 2.5
 """Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
 ODDS_PER_INLIER, EVEN_INLIERS, MAX_LOG_ODDS = 0.25, 20.0, 8.0
 """Log odds (nats) that a pose is right, by how many landmarks agree: of images of another building with the same walls

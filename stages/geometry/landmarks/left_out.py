@@ -25,8 +25,8 @@ def found_rate(
 ) -> float:
     """The share of sample references whose pose the landmarks of other references give, in [0, 1].
 
-    `descriptors` (L, D): of the landmarks; `poses` (R, 3): of the references; `sigma` (rad): of a bearing; `candidates`:
-    of each of the `samples_of` references, the others to look at.
+    `descriptors` (L, D): of the landmarks; `poses` (R, 3): of the references; `sigma` (rad): of a bearing;
+    `candidates`: of each of the `samples_of` references, the others to look at.
     """
     starts, seen = sightings_by_reference(views, sightings)
     samples = samples_of(len(views))
@@ -50,4 +50,4 @@ def samples_of(references: int) -> Ints:
 def other_references(reference: int, similarities: Floats) -> Ints:
     """The references (C,) that are most similar to one by their words (R,), without itself."""
     order = np.argsort(-similarities, kind="stable")[: CANDIDATES + 1]
-    return order[order != reference][:CANDIDATES]
+    return np.asarray(order[order != reference][:CANDIDATES], np.int64)
