@@ -132,10 +132,10 @@ class ConfidenceMonitor(Stage):
         when_wrong: WrongPoseAgreement,
         similarities: Similarities | None = None,
         likelihood: Likelihood | None = None,
-        fix: LandmarkFix | None = None,
         motion: Motion | None = None,
         conflicts: Conflicts | None = None,
         restart: Restart | None = None,
+        fix: LandmarkFix | None = None,
     ) -> Out:
         """One image, or a tick without one. `likelihood`: of the same image, for its novelty."""
         if ctx.tick.first_of_log or restart is not None:

@@ -60,11 +60,11 @@ class WidenCovariance(Stage):
     def step(
         self,
         ctx: Context,
-        state: WidenCovarianceState,
         estimate: PoseEstimate,
         confidence: PoseConfidence,
         length_scale: LengthScale,
         map: ReferenceGraph,
+        state: WidenCovarianceState,
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
     ) -> Out:

@@ -10,7 +10,7 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.features.rotation_reduced_sift import BLUR_PX, EDGE_RATIO, RotationReducedSift
+from omninav.stages.features.rotation_reduced_sift import EDGE_RATIO, RotationReducedSift
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -106,7 +106,9 @@ def test_a_picture_of_nothing_has_no_features_and_one_without_a_camera_is_refuse
 def test_descriptors_of_own_orientation_are_those_of_their_points() -> None:
     picture = look("mirror", 0.4)
     own = found(picture, orientation="own", max_features=100, contrast=0.01, max_pixels=10**6)
-    sift = cv2.SIFT.create(contrastThreshold=0.01, edgeThreshold=EDGE_RATIO, sigma=BLUR_PX, enable_precise_upscale=True)
+    sift = cv2.SIFT.create(
+        contrastThreshold=0.01, edgeThreshold=EDGE_RATIO, sigma=RotationReducedSift.blur_px, enable_precise_upscale=True
+    )
     points, descriptors = sift.detectAndCompute(cv2.cvtColor(picture.pixels, cv2.COLOR_BGR2GRAY), None)
     known = {(*each.pt, row.astype(np.uint8).tobytes()) for each, row in zip(points, descriptors, strict=True)}
     assert len(own) == 100

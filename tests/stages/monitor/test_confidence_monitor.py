@@ -10,12 +10,14 @@ from omninav.stages.monitor.confidence_monitor import (
     ConfidenceMonitor,
     ConfidenceMonitorState,
     best_place,
+    by_landmarks,
     mass_within,
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
+from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -249,3 +251,24 @@ def test_matches_agree_within_the_wider_of_tolerance_and_length_scale(metres: fl
 
     assert sure(metres, scale) == pytest.approx(sure(2.0, 2.0))
     assert sure(0.5, 0.5) < sure(metres, scale) - 0.1
+
+
+def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_pose():
+    here, gate = np.zeros(3), (0.5, math.radians(10.0))
+
+    def fix(x: float, probability: float) -> LandmarkFix:
+        return LandmarkFix(np.array([[x, 0.0, 0.0]]), np.eye(3)[None], np.array([50]), np.array([probability]), 60)
+
+    agreeing, sure = by_landmarks(0.0, fix(0.0, 0.99), 1.0, here, gate, 1.0)
+    assert agreeing > 5.0
+    assert sure == pytest.approx(0.99)
+    assert by_landmarks(4.0, fix(8.0, 0.99), 1.0, here, gate, 1.0)[0] < -5.0  # at once, whatever was known before
+    few = by_landmarks(0.0, fix(0.0, 0.1), 1.0, here, gate, 1.0)[0]
+    assert 0.0 < few < 0.5
+    odds = 4.0
+    for _ in range(8):
+        odds, sure = by_landmarks(odds, None, 1.0, here, gate, 1.0)
+    assert odds < -3.0
+    assert sure == 0.0
+    assert by_landmarks(0.0, None, 0.0, here, gate, 1.0)[0] == 0.0  # of a map without landmarks nothing follows
+    assert by_landmarks(4.0, None, 1.0, here, gate, 0.0)[0] == pytest.approx(4.0)  # nor from the same image again

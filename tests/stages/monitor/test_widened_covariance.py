@@ -7,12 +7,13 @@ import pytest
 
 import omninav
 from omninav.pipeline import Context
-from omninav.stages.monitor.widened_covariance import WidenCovariance
+from omninav.stages.monitor.widened_covariance import WidenCovariance, WidenCovarianceState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Motion, Pose
 
 MAP = ReferenceGraph(
     np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]),
@@ -28,7 +29,8 @@ POSE = Pose(10.0, 0.0, 0.0)
 def widened(confidence: float, length_scale: float = 0.5, floor: float = 0.4) -> PoseEstimate:
     estimate = PoseEstimate(POSE, OWN, 0.9, POSE)
     told = PoseConfidence(confidence)
-    return WidenCovariance(floor=floor).step(Context("wide"), estimate, told, LengthScale(length_scale), MAP).estimate
+    stage, state = WidenCovariance(floor=floor), WidenCovarianceState()
+    return stage.step(Context("wide"), estimate, told, LengthScale(length_scale), MAP, state).estimate
 
 
 def test_a_share_of_the_length_scale_is_added_to_the_position_alone():
@@ -63,3 +65,24 @@ def test_what_is_published_drawn_and_measured_is_the_widened_estimate(variant):
     assert own - {"conflicts"} == {"estimate", "monitor"}
     taken = {node for node, ports in wires.items() if "'estimate.estimate'" in str(ports)}
     assert {"publish", "shown", "drive"} <= taken
+
+
+def test_a_pose_by_landmarks_keeps_its_own_covariance_until_odometry_has_drifted():
+    stage, state, told = WidenCovariance(floor=0.6), WidenCovarianceState(), PoseConfidence(0.9)
+    estimate = PoseEstimate(POSE, 1e-4 * np.eye(3), 0.9, POSE)
+    there, away = np.array([[POSE.x, POSE.y, POSE.heading]]), np.array([[POSE.x + 1.0, POSE.y, POSE.heading]])
+
+    def variance(poses: np.ndarray | None, probability: float, metres: float) -> float:
+        fix = None
+        if poses is not None:
+            fix = LandmarkFix(poses, 1e-4 * np.eye(3)[None], np.array([50]), np.array([probability]), 60)
+        ctx = Context("wide")
+        out = stage.step(ctx, estimate, told, LengthScale(0.5), MAP, state, fix, Motion(metres, 0.0, 0.0))
+        return float(out.estimate.covariance[0, 0])
+
+    assert variance(None, 0.0, 0.2) == pytest.approx(1e-4 + 0.09)  # no landmarks yet: the whole share
+    assert variance(away, 0.99, 0.2) == pytest.approx(1e-4 + 0.09)  # landmarks that say another pose
+    assert variance(there, 0.5, 0.2) == pytest.approx(1e-4 + 0.09)  # too few to be sure of
+    assert variance(there, 0.99, 0.2) == pytest.approx(1e-4)
+    assert variance(None, 0.0, 1.0) == pytest.approx(1e-4 + 0.01 + 0.0025)
+    assert variance(None, 0.0, 50.0) == pytest.approx(1e-4 + 0.09)

@@ -38,7 +38,7 @@ def features(world):
 def pairs(world):
     seen = np.zeros((len(world.poses), len(world.points)), np.float32)
     seen[world.references, world.landmarks] = 1.0
-    return neighbouring_pairs(world.poses, iter(seen @ seen.T))
+    return neighbouring_pairs(world.poses, iter(seen @ seen.T), 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_neighbours_are_the_most_similar_ones_within_reach_each_pair_once() -> N
     poses[:, 0] = np.arange(30) * 0.15
     poses[29] = poses[28] + [0.05, 0.0, 0.0]  # too near to say anything of depths
     similarity = np.random.default_rng(0).random((30, 30)).astype(np.float32)
-    pairs = neighbouring_pairs(poses, iter(similarity))
+    pairs = neighbouring_pairs(poses, iter(similarity), 0.5)
     gaps = np.abs(np.diff(poses[pairs, 0], axis=1))
     assert gaps.min() > 0.1
     assert gaps.max() <= 2.0
@@ -125,7 +125,7 @@ def test_neighbours_are_the_most_similar_ones_within_reach_each_pair_once() -> N
 def test_similarities_by_words_are_cosines() -> None:
     starts, words = np.array([0, 2, 3, 3]), np.array([0, 2, 2], np.int32)
     weights = np.array([0.6, 0.8, 1.0], np.float32)
-    rows = np.array(list(similarity_rows(starts, words, weights, 4)))
+    rows = np.array(list(similarity_rows(starts, words, weights, 4, np.arange(3))))
     assert rows == pytest.approx(np.array([[1.0, 0.8, 0.0], [0.8, 1.0, 0.0], [0.0, 0.0, 0.0]]))
 
 
