@@ -50,6 +50,7 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         seen,
         math.sqrt(float(np.average(variances, weights=[len(each) + 1 for each in given]))),
         _joined_words([each.words for each in parts]) or _words_of_landmarks(given, descriptors, ends, seen),
+        min(each.found_rate for each in given),
     )
 
 

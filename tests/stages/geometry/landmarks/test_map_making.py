@@ -137,4 +137,4 @@ def test_references_without_features_have_no_landmarks() -> None:
     assert mean_descriptors(views, found).shape == (0, 128)
     assert sightings_by_reference(views, found)[0].tolist() == [0, 0, 0]
     assert bearing_sigma(views, found, poses) > 0.0
-    assert neighbouring_pairs(np.empty((0, 3)), iter(())).shape == (0, 2)
+    assert neighbouring_pairs(np.empty((0, 3)), iter(()), 0.5).shape == (0, 2)
