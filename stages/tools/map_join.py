@@ -1,6 +1,6 @@
 """Joins saved maps."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from omninav.stages.map_files.aligned import aligned
 from omninav.stages.map_files.places import joined_places
 from omninav.stages.map_files.references import joined_references
 from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target, write_saved
+from omninav.stages.values.landmarks import Landmarks
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import TopologicalMap
@@ -46,6 +47,19 @@ class JoinMaps(Tool):
         write_saved(path, map, sources, "join")
         what = "references" if isinstance(map, ReferenceGraph) else "places"
         print(f"{path}: {len(map)} {what} of {len(sources)} maps ({' + '.join(str(len(one.map)) for one in sources)})")
+        if isinstance(map, ReferenceGraph) and map.landmarks is not None:
+            print(f"landmarks: {', '.join(_of_landmarks(sources, map.landmarks))}")
+
+
+def _of_landmarks(sources: Sequence[SavedMap], landmarks: Landmarks) -> Iterator[str]:
+    """How many there are, and what became of their words; and which maps have none."""
+    yield f"{len(landmarks)}"
+    graphs = [(source.path, source.map) for source in sources if isinstance(source.map, ReferenceGraph)]
+    given = [map.landmarks for _, map in graphs if map.landmarks is not None]
+    if not all(np.array_equal(each.words.centres, landmarks.words.centres) for each in given):
+        yield "with visual words learned anew from all of them"
+    if without := [str(path) for path, map in graphs if map.landmarks is None]:
+        yield f"none from {' and '.join(without)}, where images are compared as a whole"
 
 
 def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:

@@ -89,6 +89,25 @@ def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.Captur
     assert (with_landmarks < 200).sum() > 1.3 * (without < 200).sum()
 
 
+def test_a_joined_map_says_what_became_of_landmarks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    map = mapped_room()
+    write_artifact(tmp_path / "a.omap", map)
+    write_artifact(tmp_path / "b.omap", replace(map, landmarks=None))
+    other = replace(map.landmarks.words, centres=map.landmarks.words.centres[::-1].copy())
+    write_artifact(tmp_path / "c.omap", replace(map, landmarks=replace(map.landmarks, words=other)))
+    number = len(map.landmarks)
+    for maps, said in (
+        (["a", "a"], f"landmarks: {2 * number}\n"),
+        (["a", "b"], f"landmarks: {number}, none from b.omap, where images are compared as a whole\n"),
+        (["c", "a"], f"landmarks: {2 * number}, with visual words learned anew from all of them\n"),
+    ):
+        assert main(["map", "join", *(f"{name}.omap" for name in maps)]) == 0
+        assert said in capsys.readouterr().out
+
+
 def test_maps_that_do_not_join_are_refused_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
