@@ -16,6 +16,7 @@ from omninav.stages.geometry.landmarks.map_making import (
     local_views,
     matched_pairs,
     mean_descriptors,
+    most_seen,
     neighbouring_pairs,
     sightings_by_reference,
     similarity_rows,
@@ -63,7 +64,7 @@ class LearnLandmarks(Stage):
         rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
         unit = length_scale(map.poses, map.features, map.kind) or DEFAULT_M
         tracks = matched_pairs(views, neighbouring_pairs(map.poses, rows, unit), map.poses)
-        found = triangulated(views, tracks, map.poses)
+        found = most_seen(views, triangulated(views, tracks, map.poses))
         starts, seen = sightings_by_reference(views, found)
         sigma = bearing_sigma(views, found, map.poses)
         looks = mean_descriptors(views, found)

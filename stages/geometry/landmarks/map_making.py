@@ -35,6 +35,9 @@ MIN_PARALLAX = math.radians(1.5)
 """Angle between two bearings of a landmark, below which its depth is not known (rad)."""
 AT_ONCE = 10_000
 """Landmarks whose descriptors are averaged at once: those of all sightings take gigabytes."""
+MAX_SEEN = 200
+"""Landmarks of a reference, those that most references see, beyond which none is kept for its sake: more make a map
+larger and a pose slower, and no better."""
 MAX_DISTANCE_M = 30.0
 """Distance beyond which a landmark is not kept, m."""
 
@@ -137,6 +140,19 @@ def triangulated(views: LocalViews, tracks: Tracks, poses: Array) -> Sightings:
     there = np.isfinite(made.points[:, 0])
     number = np.cumsum(there) - 1
     return Sightings(made.points[there], number[tracks.owners[made.kept]], tracks.features[made.kept])
+
+
+def most_seen(views: LocalViews, sightings: Sightings) -> Sightings:
+    """The landmarks that are among the `MAX_SEEN` of any reference that most references see, with all sightings."""
+    counts = np.bincount(sightings.landmarks, minlength=len(sightings.points))
+    owners = views.owners[sightings.features]
+    order = np.lexsort((sightings.landmarks, -counts[sightings.landmarks], owners))
+    first = np.searchsorted(owners[order], np.arange(len(views)))
+    rank = np.arange(len(order)) - first[owners[order]]
+    kept = np.zeros(len(counts), np.bool_)
+    kept[sightings.landmarks[order[rank < MAX_SEEN]]] = True
+    seen, number = kept[sightings.landmarks], np.cumsum(kept) - 1
+    return Sightings(sightings.points[kept], number[sightings.landmarks[seen]], sightings.features[seen])
 
 
 def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:

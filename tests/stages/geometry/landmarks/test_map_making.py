@@ -9,6 +9,7 @@ from omninav.stages.geometry.landmarks.map_making import (
     local_views,
     matched_pairs,
     mean_descriptors,
+    most_seen,
     neighbouring_pairs,
     sightings_by_reference,
     similarity_rows,
@@ -93,6 +94,26 @@ def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None
     assert np.median(alike) > 0.97
 
 
+def test_of_each_reference_the_landmarks_stay_that_most_references_see(features, found, monkeypatch) -> None:
+    views, _ = features
+    monkeypatch.setattr(map_making, "MAX_SEEN", 10)
+    few = most_seen(views, found)
+    owners, counts = views.owners[found.features], np.bincount(found.landmarks)
+    expected = set()
+    for reference in range(len(views)):
+        own = found.landmarks[owners == reference]
+        expected |= set(sorted(own.tolist(), key=lambda each: (-counts[each], each))[:10])
+    assert few.points.tolist() == found.points[sorted(expected)].tolist()
+    assert np.bincount(few.landmarks).tolist() == counts[sorted(expected)].tolist()
+    assert (found.points[found.landmarks[np.isin(found.features, few.features)]] == few.points[few.landmarks]).all()
+
+
+def test_a_map_of_few_landmarks_keeps_them_all(features, found) -> None:
+    kept = most_seen(features[0], found)
+    assert kept.points.tolist() == found.points.tolist()
+    assert kept.features.tolist() == found.features.tolist()
+
+
 def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(features, found, monkeypatch) -> None:
     whole = mean_descriptors(features[0], found)
     monkeypatch.setattr(map_making, "AT_ONCE", 7)
@@ -135,6 +156,7 @@ def test_references_without_features_have_no_landmarks() -> None:
     found = triangulated(views, matched_pairs(views, np.array([[0, 1]]), poses), poses)
     assert found.points.shape == (0, 3)
     assert mean_descriptors(views, found).shape == (0, 128)
+    assert most_seen(views, found).points.shape == (0, 3)
     assert sightings_by_reference(views, found)[0].tolist() == [0, 0, 0]
     assert bearing_sigma(views, found, poses) > 0.0
     assert neighbouring_pairs(np.empty((0, 3)), iter(()), 0.5).shape == (0, 2)
