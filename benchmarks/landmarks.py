@@ -22,10 +22,13 @@ sys.path.insert(0, str(ROOT))
 
 from omninav.pipeline import Context  # noqa: E402
 from omninav.pipeline.engine.artifact import artifact_bytes  # noqa: E402
+from omninav.stages.geometry.appearance.visual_words import root_descriptors  # noqa: E402
+from omninav.stages.geometry.landmarks.bearing_pose import matched, poses_of  # noqa: E402
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks  # noqa: E402
 from omninav.stages.mapping.learned_words import LearnVisualWords  # noqa: E402
-from omninav.stages.sensor.landmark_pose import LandmarkPose, matched, poses_of  # noqa: E402
+from omninav.stages.sensor.landmark_pose import LandmarkPose  # noqa: E402
 from omninav.stages.values.belief import Particles  # noqa: E402
+from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks  # noqa: E402
 from omninav.stages.values.local_features import LocalFeatures  # noqa: E402
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph  # noqa: E402
 
@@ -133,7 +136,7 @@ def pose_times(hall: Hall, map: ReferenceGraph) -> None:
         out, whole = timed(stage.step, ctx, image, map, belief)
         _, words = timed(landmarks.words.similarities, image.descriptors)
         rows, candidates = timed(landmarks.seen_by, stage._candidates(image, landmarks.words, map, belief))
-        pairs, matching = timed(matched, image, landmarks, rows)
+        pairs, matching = timed(_matched, image, landmarks, rows)
         points = landmarks.points[rows[pairs.second]].astype(np.float64)
         bearings = np.ascontiguousarray(image.bearings[pairs.first])
         _, consensus = timed(poses_of, bearings, points, landmarks.sigma_rad, stage.min_inliers)
@@ -143,6 +146,11 @@ def pose_times(hall: Hall, map: ReferenceGraph) -> None:
         errors.append(math.inf if out.fix is None else float(np.hypot(*(out.fix.poses[0] - pose)[:2])))
     found = ", ".join(f"{name} {1000 * median(values[5:]):.2f}" for name, values in parts.items())
     print(f"        a pose (ms): {found}; {median(rows_seen):.0f} landmarks compared, error {median(errors):.4f} m")
+
+
+def _matched(image: LocalFeatures, landmarks: Landmarks, rows: Any) -> Any:
+    theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
+    return matched(root_descriptors(image.descriptors), theirs)
 
 
 def main() -> None:
