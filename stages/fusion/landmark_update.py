@@ -8,16 +8,17 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import are_within, systematic, weighted_moments
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
-from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
 
 LOCAL = (1.0, math.radians(30.0))
 """Distance (m) and turn (rad) from a pose within which the belief is taken for one Gaussian."""
+PLACES_ALIKE = 20.0
+"""Places among which a wrong pose falls: not anywhere, but where the map looks like the image, and where the belief has
+its doubts too."""
 OUTLIER_SHARE = 1e-3
 """Probability that a pose of sure landmarks is wrong all the same: they may stand elsewhere today."""
 
@@ -25,12 +26,12 @@ OUTLIER_SHARE = 1e-3
 class LandmarkUpdate(Stage):
     """Updates a belief by the poses from which an image may have been taken.
 
-    The likelihood of a pose is that of the Gaussians of the fix, each with its probability, and even over the map with
-    the rest: the image may say nothing. Around each Gaussian the belief is a Gaussian too, so that the product is one
-    (a Kalman update), from which particles are drawn: a particle filter alone, with particles decimetres apart, could
-    not take in millimetres. With `kidnapping_probability` the robot may be anywhere, so that a fix where the belief is
-    not draws particles too; they are its recovery particles until further images agree. Without a fix the belief stays
-    as it is.
+    Each Gaussian of the fix is right with its probability, and then the belief's mass around it counts as far as both
+    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is a Gaussian too,
+    so that the product is one (a Kalman update), from which particles are drawn: a particle filter alone, with particles
+    decimetres apart, could not take in millimetres. With `kidnapping_probability` the robot may be anywhere, so that a
+    fix where the belief is not draws particles too; they are its recovery particles until further images agree. Without
+    a fix the belief stays as it is.
     """
 
     particles: Annotated[int, Bounds(ge=10)] = 200
@@ -43,15 +44,13 @@ class LandmarkUpdate(Stage):
 
         belief: Particles
 
-    def step(self, ctx: Context, belief: Particles, map: ReferenceGraph, fix: LandmarkFix | None = None) -> Out:
+    def step(self, ctx: Context, belief: Particles, fix: LandmarkFix | None = None) -> Out:
         """Fuse belief and fix."""
         if fix is None or not len(fix):
             return self.Out(belief=belief)
-        area = max(1.0, float(np.prod(np.ptp(map.poses[:, :2], axis=0) + 2.0 * LOCAL[0])))
-        anywhere = 1.0 / (2.0 * math.pi * area)
         sure = np.minimum(fix.probabilities, 1.0 - OUTLIER_SHARE)
         doubt = 1.0 - min(float(sure.sum()), 1.0 - OUTLIER_SHARE)
-        poses, weights, recovery = [belief.poses], [belief.weights * doubt * anywhere], []
+        poses, weights, recovery = [belief.poses], [belief.weights * doubt / PLACES_ALIKE], []
         for mean, covariance, probability in zip(fix.poses, fix.covariances, sure.tolist(), strict=True):
             near = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL)
             share = float(np.add.reduce(belief.weights[near]))
@@ -60,12 +59,12 @@ class LandmarkUpdate(Stage):
                 away = there - mean
                 away[2] = wrap(away[2])
                 both = spread + covariance
-                evidence = share * probability * density_at(away, both)
+                evidence = share * probability * math.exp(-0.5 * float(away @ np.linalg.solve(both, away)))
                 gain = covariance @ np.linalg.inv(both)
                 centre, product = mean + gain @ away, covariance - gain @ covariance
                 poses.append(self._drawn(ctx, centre, product))
                 weights.append(np.full(self.particles, evidence / self.particles))
-            new = self.kidnapping_probability * probability * anywhere
+            new = self.kidnapping_probability * probability
             recovery.append((self._drawn(ctx, mean, covariance), np.full(self.particles, new / self.particles)))
         return self.Out(belief=self._resampled(ctx, poses, weights, recovery))
 
@@ -88,7 +87,3 @@ class LandmarkUpdate(Stage):
         number = sum(len(p) for p, _ in recovery)
         return Particles(np.concatenate(parts), np.concatenate(shares) / sum(s.sum() for s in shares), number)
 
-
-def density_at(away: Array, covariance: Array) -> float:
-    """Density of a Gaussian at a distance (3,) from its mean."""
-    return float(density(away[None], np.zeros((1, 3)), covariance[None], np.ones(1))[0])
