@@ -27,11 +27,11 @@ class LandmarkUpdate(Stage):
     """Updates a belief by the poses from which an image may have been taken.
 
     Each Gaussian of the fix is right with its probability, and then the belief's mass around it counts as far as both
-    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is a Gaussian too,
-    so that the product is one (a Kalman update), from which particles are drawn: a particle filter alone, with particles
+    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is one too, so
+    that the product is one (a Kalman update), from which particles are drawn: a particle filter alone, with particles
     decimetres apart, could not take in millimetres. With `kidnapping_probability` the robot may be anywhere, so that a
-    fix where the belief is not draws particles too; they are its recovery particles until further images agree. Without
-    a fix the belief stays as it is.
+    fix where the belief is not draws particles too; they are its recovery particles until further images agree.
+    Without a fix the belief stays as it is.
     """
 
     particles: Annotated[int, Bounds(ge=10)] = 200
@@ -86,4 +86,3 @@ class LandmarkUpdate(Stage):
         shares = [np.full(kept, old / kept), *(w / total for w in weights[1:]), *(w / total for _, w in recovery)]
         number = sum(len(p) for p, _ in recovery)
         return Particles(np.concatenate(parts), np.concatenate(shares) / sum(s.sum() for s in shares), number)
-

@@ -2,14 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from landmark_tour import graph_of, tour_poses
 
 from omninav.pipeline import Context
 from omninav.stages.fusion.landmark_update import LandmarkUpdate
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 
-MAP = graph_of(tour_poses())
 HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
 SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
 
@@ -29,7 +27,7 @@ def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> La
 def updated(now: Particles, *fixes: LandmarkFix | None, seed: int = 0) -> Particles:
     stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed))
     for fix in fixes:
-        now = stage.step(ctx, now, MAP, fix).belief
+        now = stage.step(ctx, now, fix).belief
     return now
 
 
@@ -38,7 +36,7 @@ def share_at(now: Particles, pose: np.ndarray, within: float = 0.3) -> float:
 
 
 def test_a_belief_of_decimetres_takes_in_millimetres() -> None:
-    found = updated(belief(HERE), fix_at(HERE + np.array([0.08, -0.05, 0.02]))).estimate()
+    found = updated(belief(HERE), fix_at(HERE + np.array([0.08, -0.05, 0.02]), probabilities=(0.9997,))).estimate()
     assert np.hypot(found.pose.x - HERE[0] - 0.08, found.pose.y - HERE[1] + 0.05) < 0.002
     assert found.pose.heading == pytest.approx(HERE[2] + 0.02, abs=math.radians(0.05))
     assert np.sqrt(np.diag(found.covariance))[:2] == pytest.approx(0.005, rel=0.3)
@@ -88,6 +86,13 @@ def test_without_a_fix_the_belief_stays_as_it_is() -> None:
 def test_a_fix_that_is_probably_wrong_changes_little() -> None:
     found = updated(belief(HERE), fix_at(THERE, probabilities=(1e-6,)))
     assert share_at(found, HERE, 1.5) > 0.99
+
+
+def test_a_few_landmarks_where_the_map_looks_alike_do_not_move_a_belief_that_knows_its_place() -> None:
+    poses = np.concatenate([belief(HERE, 0.02).poses, belief(THERE, 0.02).poses])
+    doubts = Particles(poses, np.repeat([(1.0 - 1e-4) / 500, 1e-4 / 500], 500))
+    few = fix_at(THERE, probabilities=(0.15,))
+    assert share_at(updated(doubts, few, few, few), HERE) > 0.9
 
 
 @pytest.mark.parametrize("where", [HERE, THERE])
