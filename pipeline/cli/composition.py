@@ -160,7 +160,7 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
     given: Any = OmegaConf.to_container(config, resolve=False)
     own: Any = OmegaConf.to_container(other, resolve=False)
     for key in (key for key in given if key not in OF_THE_VARIANT):
-        if key not in own or given[key] != own[key]:  # to set a whole world takes long, and it is the same
+        if key not in own or given[key] != own[key]:  # to set a large block takes long, and it is the same
             other[key] = given[key]
     for key, value in spec.set.items():
         if key not in other or key in OF_THE_VARIANT:

@@ -46,7 +46,9 @@ FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.8, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 FOUND_BY_CHANCE = 0.002
 """Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
-MAX_AGAINST = 4.0
+NEW_WITHOUT = 0.5
+"""Share of an image without a pose that is new evidence: it is dark or blurred where the one before was."""
+MAX_AGAINST = 3.0
 """Log odds that images without landmarks speak against an estimate, at most: light may have changed."""
 
 
@@ -190,7 +192,7 @@ def by_landmarks(
     if fix is None:
         found = FOUND_OF_LEFT_OUT * found_rate
         against = min(0.0, math.log((1.0 - found) / (1.0 - FOUND_ELSEWHERE)))
-        return max(kept + novelty * against, -MAX_AGAINST), 0.0
+        return max(kept + NEW_WITHOUT * novelty * against, -MAX_AGAINST), 0.0
     sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
     right = min(max(agreeing + 0.5 * (1.0 - sure), FOUND_BY_CHANCE), 1.0 - FOUND_BY_CHANCE)
