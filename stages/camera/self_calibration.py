@@ -48,3 +48,12 @@ def corrected(camera: Model, sigmas: Mapping[str, float], corrections: Array) ->
         name: getattr(camera, name) + float(by) for name, by in zip(sigmas, corrections, strict=True)
     }
     return replace(camera, **changed)
+
+
+def observed(camera: Camera, poses_given: bool) -> dict[str, float]:
+    """The fields that a drive on a floor shows, for `adjustable`: where the axis meets the image, and the yaw too where
+    poses are given. None of a camera without a ring, whose centre is hardly told from its heading."""
+    numbers = {each.name for each in fields(camera) if type(getattr(camera, each.name)) is float}
+    if camera.ring is None or not camera.elevations_known or not numbers >= set(AXIS):
+        return {}
+    return {**AXIS, **({"yaw": math.inf} if poses_given else {})}

@@ -1,25 +1,29 @@
 """Learns the landmarks of a map from the local features of its references."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.landmarks.left_out import found_rate, other_references, samples_of
+from omninav.stages.geometry.landmarks.map_adjustment import AdjustedMap, adjusted_drive, adjusted_to_given
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
     bearing_sigma,
+    fitting_matches,
     local_views,
-    matched_pairs,
     mean_descriptors,
     most_seen,
     neighbouring_pairs,
+    pair_matches,
     sightings_by_reference,
     similarity_rows,
+    tracks_of,
     triangulated,
 )
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
@@ -28,20 +32,29 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
 
+from .camera_check import CAMERA_QUANTITIES, CameraCheck
+
 QUANTITIES = {
     "landmarks.number": Quantity(title="Landmarks", context=True),
     "landmarks.sightings": Quantity(title="References that see a landmark, mean", context=True),
     "landmarks.sigma_deg": Quantity(title="Standard deviation of a bearing", unit="deg", context=True),
     "landmarks.found_rate": Quantity(title="Map's own images found by landmarks", unit="%", context=True),
+    "landmarks.moved_median_m": Quantity(title="References moved by, median", context=True),
+    "landmarks.moved_max_m": Quantity(title="References moved by, largest", context=True),
+    **CAMERA_QUANTITIES,
 }
 
 
 class LearnLandmarks(Stage):
-    """Triangulates the points that several references of a map see.
+    """Triangulates the points that several references of a map see, and adjusts the references' poses to them.
 
     Neighbouring references that share visual words are matched by their local features; matches that fit the motion
-    between both join to tracks, and tracks become points with a mean descriptor (RootSIFT). There are none where images
-    are too small for local features, and the map is used without them.
+    between both join to tracks, and tracks become points with a mean descriptor (RootSIFT). Poses, points and, with
+    `camera` wired, the camera's axis are adjusted together: given poses may be exact or off by decimetres and degrees;
+    those of odometry alone are straightened first by the places that the tour came back to, and scaled by the camera's
+    height over the floor, which then replaces what was straightened by appearance. Where too little is seen the poses
+    stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and kept with the landmarks.
+    There are none where images are too small for local features, and the map is used without them.
     """
 
     class Out(Outputs):
@@ -57,30 +70,55 @@ class LearnLandmarks(Stage):
         events: Sequence[ReferenceEvent | None],
         map: ReferenceGraph,
         words: VisualWords,
+        as_driven: ReferenceGraph | None = None,
+        camera: Camera | None = None,
     ) -> Out:
-        """The whole tour at once; `events`: which of its images became references."""
+        """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
+        straightened."""
         ctx.doing("triangulating landmarks")
-        views = _views_of_references(features, events)
-        rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
+        found = [each for each, event in zip(features, events, strict=True) if event is not None]
+        views, given = _views(found), map.pose_source == "truth"
         unit = length_scale(map.poses, map.features, map.kind) or DEFAULT_M
-        tracks = matched_pairs(views, neighbouring_pairs(map.poses, rows, unit), map.poses)
-        found = most_seen(views, triangulated(views, tracks, map.poses))
-        starts, seen = sightings_by_reference(views, found)
-        sigma = bearing_sigma(views, found, map.poses)
-        looks = mean_descriptors(views, found)
-        rate = found_rate(views, found, looks, map.poses, sigma, _candidates(words))
+        check = CameraCheck.of(camera, found, views.bearings, given)
+        if given:
+            matches = pair_matches(views, neighbouring_pairs(map.poses, _rows(words), unit))
+            adjusted = adjusted_to_given(views, matches, map.poses, check.seen)
+            poses = adjusted.poses
+        else:
+            driven = map if as_driven is None else as_driven
+            height = None if camera is None else camera.height
+            adjusted = adjusted_drive(views, _rows(words), driven.poses, check.seen, height, ctx.rng)
+            poses = map.poses if adjusted.problem else adjusted.poses
+            matches = pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
+        tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
+        sightings = most_seen(views, triangulated(views, tracks, poses))
+        starts, seen = sightings_by_reference(views, sightings)
+        sigma = bearing_sigma(views, sightings, poses)
+        looks = mean_descriptors(views, sightings)
+        rate = found_rate(views, sightings, looks, poses, sigma, _candidates(words))
         landmarks = Landmarks(
-            found.points.astype(np.float32), stored_descriptors(looks), starts, seen, sigma, words, rate
+            sightings.points.astype(np.float32),
+            stored_descriptors(looks),
+            starts,
+            seen,
+            sigma,
+            words,
+            rate,
+            check.told(ctx, adjusted.camera),
         )
         ctx.fact("landmarks", len(landmarks))
+        moved = np.hypot(*(poses - map.poses)[:, :2].T)
+        ctx.fact("map_adjusted", _words(adjusted, float(moved.max(initial=0.0)), given))
         values = {
             "number": len(landmarks),
             "sightings": len(seen) / max(1, len(landmarks)),
             "sigma_deg": float(np.degrees(sigma)),
             "found_rate": rate,
         }
-        metrics = Metrics({"landmarks": values}, QUANTITIES)
-        return self.Out(map=replace(map, landmarks=landmarks), metrics=metrics)
+        if not adjusted.problem:
+            values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}
+        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera)}, QUANTITIES)
+        return self.Out(map=replace(map, poses=poses, landmarks=landmarks), metrics=metrics)
 
 
 def _candidates(words: VisualWords) -> list[npt.NDArray[np.int64]]:
@@ -89,10 +127,22 @@ def _candidates(words: VisualWords) -> list[npt.NDArray[np.int64]]:
     return [other_references(int(reference), row) for reference, row in zip(samples, rows, strict=True)]
 
 
-def _views_of_references(
-    features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None]
-) -> LocalViews:
-    found = [each for each, event in zip(features, events, strict=True) if event is not None]
+def _views(found: Sequence[LocalFeatures | None]) -> LocalViews:
     bearings = [np.empty((0, 3)) if each is None else each.bearings for each in found]
     nothing = np.empty((0, 128), np.float32)
     return local_views(bearings, (nothing if each is None else root_descriptors(each.descriptors) for each in found))
+
+
+def _rows(words: VisualWords) -> Iterator[npt.NDArray[np.float32]]:
+    return similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
+
+
+def _words(adjusted: AdjustedMap, moved: float, given: bool) -> str:
+    if adjusted.problem:
+        return f"no: {adjusted.problem}"
+    if given:
+        return f"poses and landmarks together, by {moved:.3f} m at most"
+    scale = "odometry's scale, as the camera's height over the floor is not known or the floor not seen"
+    if adjusted.scale is not None:
+        scale = f"odometry's lengths times {adjusted.scale:.3f} by the camera's height over the floor"
+    return f"by landmarks, with {adjusted.closures} pairs of images of one place, {moved:.2f} m at most; {scale}"

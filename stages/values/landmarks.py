@@ -28,6 +28,7 @@ class Landmarks(Value):
     sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a bearing, as the map's
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
     `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
+    `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -37,6 +38,7 @@ class Landmarks(Value):
     sigma_rad: Annotated[float, Bounds(ge=1e-6, le=1)]
     words: Annotated[VisualWords, Shape("R")]
     found_rate: Annotated[float, Bounds(ge=0, le=1)]
+    camera: str = ""
 
     def __len__(self) -> int:
         return len(self.points)

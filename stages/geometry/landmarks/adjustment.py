@@ -75,6 +75,7 @@ def adjusted(
     pose_sigmas: Array | None = None,
     motions: Motions | None = None,
     max_steps: int = 100,
+    given: Array | None = None,
 ) -> Adjusted:
     """Adjust poses and landmarks, and a camera's parameters, to all bearings at once, of which some are wrong.
 
@@ -82,9 +83,9 @@ def adjusted(
     about z by the heading, then about y by the pitch, then about x by the roll. `points` (L, 3): m, with z = 0 at the
     height of the projection centre. `references`, `landmarks` (O,): of each sighting; `bearings` (O, 3): unit vectors
     in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
-    (R, 3 or 5): standard deviations of the poses as they are given, 0 for one that stays and infinite for one that is
-    free; None: the first stays, and all others are free. Bearings alone say nothing of the scale: it is that of
-    `motions`, or of poses of finite sigma.
+    (R, 3 or 5): standard deviations of the poses as they are `given`, 0 for one that stays and infinite for one that is
+    free; None: the first stays, and all others are free. `given` (R, 3 or 5): None for `poses`, where it begins.
+    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma.
 
     Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
     dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale
@@ -105,7 +106,7 @@ def adjusted(
     if pose_sigmas is None:
         pose_sigmas = np.full(poses.shape, math.inf)
         pose_sigmas[0] = 0.0
-    problem = _Problem(visibility, lens, used, sigma, poses, pose_sigmas, motions)
+    problem = _Problem(visibility, lens, used, sigma, poses if given is None else given, pose_sigmas, motions)
     state = problem.solved(_State(poses, points[seen], np.zeros(len(lens.sigmas))), max_steps)
     squares = problem.squares(state)
     agreeing = squares < INLIER_SIGMAS**2

@@ -17,6 +17,7 @@ from .triangulation import triangulated_tracks
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 APART = (0.2, 4.0)
 """Least and largest distance of two references that are matched, in length scales of the map: nearer ones say nothing
@@ -58,9 +59,26 @@ class LocalViews(NamedTuple):
         """The reference (F,) of each feature."""
         return np.repeat(np.arange(len(self)), np.diff(self.starts))
 
+    def looking_along(self, bearings: Array) -> "LocalViews":
+        """The same features, with other bearings (F, 3)."""
+        return LocalViews(self.starts, bearings, self.descriptors)
+
     def rows(self, reference: int) -> slice:
         """The features of a reference."""
         return slice(int(self.starts[reference]), int(self.starts[reference + 1]))
+
+
+class PairMatches(NamedTuple):
+    """Matched features of pairs (P, 2) of references: of pair p the rows `starts[p]` to `starts[p + 1]`.
+
+    `first`, `second` (M,): rows among all features; `ratio` (M,): the clearer, the smaller.
+    """
+
+    pairs: Ints
+    starts: Ints
+    first: Ints
+    second: Ints
+    ratio: Array
 
 
 class Sightings(NamedTuple):
@@ -103,21 +121,40 @@ def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale:
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)
 
 
-def matched_pairs(views: LocalViews, pairs: Ints, poses: Array) -> Tracks:
-    """Tracks of features that neighbours share, of matches that fit the motion between them."""
-    found = [np.empty((3, 0))]
+def pair_matches(views: LocalViews, pairs: Ints) -> PairMatches:
+    """Features that pairs (P, 2) of references share by their descriptors alone, of which some are wrong."""
+    found, starts = [np.empty((3, 0))], [0]
     for one, other in pairs.tolist():
         a, b = views.rows(one), views.rows(other)
         matches = mutual_nearest(2.0 - 2.0 * (views.descriptors[a] @ views.descriptors[b].T), RATIO)
-        if len(matches.first) < MIN_MATCHES:
-            continue
-        motion = between(poses[one], poses[other])
-        fits = fit_motion(views.bearings[a][matches.first], views.bearings[b][matches.second], motion, OFF_PLANE)
-        kept = matches.chosen(fits)
-        found.append(np.stack([kept.first + a.start, kept.second + b.start, kept.ratio]))
+        if len(matches.first) >= MIN_MATCHES:
+            found.append(np.stack([matches.first + a.start, matches.second + b.start, matches.ratio]))
+        starts.append(starts[-1] + (len(matches.first) if len(matches.first) >= MIN_MATCHES else 0))
     first, second, ratio = np.concatenate(found, axis=1)
-    order = np.argsort(ratio, kind="stable")
-    return joined_matches(first[order].astype(np.int64), second[order].astype(np.int64), views.owners)
+    return PairMatches(pairs, np.array(starts), first.astype(np.int64), second.astype(np.int64), ratio)
+
+
+def fitting_matches(views: LocalViews, matches: PairMatches, poses: Array, off_plane: float = OFF_PLANE) -> Bools:
+    """Which matches (M,) fit the motion between their references to within `off_plane` (rad)."""
+    fits = np.zeros(len(matches.first), np.bool_)
+    for n, (one, other) in enumerate(matches.pairs.tolist()):
+        rows = slice(int(matches.starts[n]), int(matches.starts[n + 1]))
+        a, b = views.bearings[matches.first[rows]], views.bearings[matches.second[rows]]
+        fits[rows] = fit_motion(a, b, between(poses[one], poses[other]), off_plane)
+    return fits
+
+
+def tracks_of(views: LocalViews, matches: PairMatches, fits: Bools) -> Tracks:
+    """Tracks of features that some of the matches (M,) join."""
+    order = np.flatnonzero(fits)
+    order = order[np.argsort(matches.ratio[order], kind="stable")]
+    return joined_matches(matches.first[order], matches.second[order], views.owners)
+
+
+def matched_pairs(views: LocalViews, pairs: Ints, poses: Array) -> Tracks:
+    """Tracks of features that neighbours share, of matches that fit the motion between them."""
+    matches = pair_matches(views, pairs)
+    return tracks_of(views, matches, fitting_matches(views, matches, poses))
 
 
 def in_map_frame(views: LocalViews, poses: Array) -> tuple[Array, Array]:

@@ -6,7 +6,12 @@ from landmark_tour import HEIGHT_M, graph_of, mapped_room, room, seen_from, tour
 from made_words import NOTHING
 from scipy.spatial import KDTree
 
+from omninav.pipeline import Context
+from omninav.stages.geometry.plane.se2 import between, chain, compose
+from omninav.stages.mapping.learned_landmarks import LearnLandmarks
+from omninav.stages.mapping.learned_words import LearnVisualWords
 from omninav.stages.values.landmarks import DESCRIPTOR_SCALE
+from omninav.stages.values.maps import ReferenceEvent
 
 
 def test_points_of_the_room_are_found_to_a_millimetre_and_known_by_their_looks() -> None:
@@ -68,3 +73,44 @@ def test_one_reference_or_none_sees_no_landmark() -> None:
         poses = tour_poses()[:number]
         landmarks = with_landmarks(graph_of(poses), [seen_from(room(), pose) for pose in poses]).landmarks
         assert (len(landmarks), landmarks.references) == (0, number)
+
+
+def learned(poses: np.ndarray, source: str, features: list, **more):
+    events = [ReferenceEvent(n, "far") for n in range(len(poses))]
+    words = LearnVisualWords(words=300).step(Context("words"), features, events).words
+    ctx = Context("landmarks")
+    map = replace(graph_of(poses), pose_source=source)
+    return ctx, LearnLandmarks().step(ctx, features, events, map, words, **more)
+
+
+def test_references_of_wrong_poses_come_to_where_they_were_with_their_landmarks() -> None:
+    poses = tour_poses()
+    wrong = poses + np.random.default_rng(0).normal(size=poses.shape) * [0.1, 0.1, np.radians(2.0)]
+    ctx, out = learned(wrong, "truth", [seen_from(room(), pose) for pose in poses])
+    assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.06
+    gap, _ = KDTree(room().where - (0.0, 0.0, HEIGHT_M)).query(out.map.landmarks.points)
+    assert np.median(gap) < 0.06
+    assert ctx.facts["map_adjusted"].startswith("poses and landmarks together, by 0.")
+    assert out.metrics.values["landmarks"]["moved_median_m"] > 0.05
+
+
+def test_a_tour_by_odometry_is_straightened_from_how_it_was_driven() -> None:
+    poses = tour_poses()
+    motions = between(poses[:-1], poses[1:])
+    motions[:, 2] += 0.01
+    odometry = compose(poses[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+    elsewhere = odometry + np.array([5.0, 0.0, 0.0])  # what appearance made of it
+    features = [seen_from(room(), pose) for pose in poses]
+    ctx, out = learned(elsewhere, "odometry", features, as_driven=replace(graph_of(odometry), pose_source="odometry"))
+    assert np.hypot(*(odometry - poses)[:, :2].T).max() > 1.0
+    assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.1
+    assert out.map.poses[0] == pytest.approx(poses[0], abs=1e-5)
+    assert "odometry's scale" in ctx.facts["map_adjusted"]
+
+
+def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
+    poses = tour_poses()[:6]
+    for source in ("truth", "odometry"):
+        ctx, out = learned(poses, source, [NOTHING] * len(poses))
+        assert (out.map.poses == poses).all()
+        assert ctx.facts["map_adjusted"].startswith("no: ")

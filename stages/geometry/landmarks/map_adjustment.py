@@ -1,0 +1,179 @@
+"""Poses of a map's references, its landmarks and the camera, brought into agreement with what all images show."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
+from omninav.stages.geometry.plane.se2 import between, wrap
+
+from .adjustment import Lens, Motions, adjusted
+from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
+from .floor import floor_depth
+from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
+from .tracks import Tracks, joined_matches
+from .triangulation import triangulated_tracks
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+Seen = Callable[[Ints], Lens]
+"""The lens through which features (O,), rows among all, are seen."""
+
+SIGMA = math.radians(0.1)
+"""Standard deviation of a bearing (rad)."""
+MISSES = (math.radians(10.0), math.radians(1.0))
+"""Angle between a bearing and its landmark above which it is left out (rad): while poses are wrong, and then."""
+OFF_PLANES = (math.radians(4.0), math.radians(0.35))
+"""Angle of a bearing to the plane through both cameras and the other bearing, above which a match is wrong (rad): while
+poses are wrong, and then."""
+MIN_FIT = 0.4
+"""Part of the matches that must fit poses as they are given. In a house 0.95 fit exact ones, 0.76 those that are off by
+10 cm and 2 degrees, and 0.25 the exact ones where the camera is taken for a mirrored one."""
+GIVEN_SIGMAS = (0.1, 0.1, math.radians(2.0))
+"""Standard deviations of poses that are given (m, m, rad), before it is known how good they are."""
+LEAST_SIGMAS = (0.001, 0.001, math.radians(0.02))
+"""The same at least, once it is."""
+MIN_SIGHTINGS, MIN_SHARE = 20, 0.5
+"""Landmarks that a reference must see to tell where it is, and the part of all references that must see as many."""
+MIN_CLOSURES = 3
+"""Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
+NORMAL_MEDIAN = 0.6745
+"""Median of the absolute value of a normal variable of standard deviation 1."""
+
+
+class AdjustedMap(NamedTuple):
+    """Poses (R, 3) of references that agree with what their images show, and what the camera is corrected by (K,).
+
+    `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
+    `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
+    """
+
+    poses: Array
+    camera: Array
+    problem: str = ""
+    closures: int = 0
+    scale: float | None = None
+
+
+def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, seen: Seen) -> AdjustedMap:
+    """Adjust poses (R, 3) that are given, and may be exact or wrong by decimetres and degrees.
+
+    How wrong they are is not known before: once the images were asked, each pose is held by as much as the median was
+    moved, or by as much as it was itself, where that is more.
+    """
+    sigmas, found = np.tile(GIVEN_SIGMAS, (len(poses), 1)), _Found(poses, None)
+    for miss, off_plane in zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), strict=True):
+        fits = fitting_matches(_looking(views, seen, found.camera), matches, found.poses, off_plane)
+        if found.camera is None and len(fits) and fits.mean() < MIN_FIT:
+            return AdjustedMap(
+                poses, np.empty(0), "what the images show contradicts the poses: check both and the camera"
+            )
+        again = _bundled(views, tracks_of(views, matches, fits), found, seen, miss, sigmas, None, poses)
+        if again is None:
+            return AdjustedMap(poses, np.empty(0), "too few landmarks are seen")
+        moved = again.poses - poses
+        moved[:, 2] = wrap(moved[:, 2])
+        found = again._replace(poses=poses + moved)
+        moved[:, :2] = np.hypot(moved[:, 0], moved[:, 1])[:, None] / math.sqrt(2.0)
+        moved = np.abs(moved)
+        sigmas = np.maximum(np.maximum(np.median(moved, axis=0) / NORMAL_MEDIAN, LEAST_SIGMAS), moved)
+    assert found.camera is not None
+    return AdjustedMap(_wrapped(found.poses), found.camera)
+
+
+def adjusted_drive(
+    views: LocalViews,
+    similarity: Iterable[Floats],
+    odometry: Array,
+    seen: Seen,
+    height: float | None,
+    rng: np.random.Generator,
+) -> AdjustedMap:
+    """Adjust the poses (R, 3) of a drive that odometry alone has measured.
+
+    Loops are closed by words and geometry, and odometry is one more measurement beside all bearings. `similarity`: row
+    r is that of reference r to all (R,); `height`: of the camera over the floor (m), which gives the true scale where
+    landmarks show the floor. The first reference stays. Draws from `rng`.
+    """
+    steps = between(odometry[:-1], odometry[1:])
+    driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    pairs = candidate_pairs(similarity, driven)
+    verified = verified_pairs(views.starts, views.bearings, views.descriptors, pairs, rng)
+    closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())
+    if closures < MIN_CLOSURES:
+        return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")
+    order = np.argsort(verified.ratio, kind="stable")
+    tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
+    along = np.arange(len(odometry))
+    motions = Motions(np.column_stack([along[:-1], along[1:]]), steps, odometry_sigmas(steps))
+    found = _Found(straightened_drive(odometry, verified), None)
+    for miss in MISSES:
+        again = _bundled(views, tracks, found, seen, miss, None, motions, None)
+        if again is None:
+            return AdjustedMap(odometry, np.empty(0), "too few landmarks are seen")
+        found = again
+    assert found.camera is not None
+    depth = None
+    if height:
+        depth = floor_depth(found.points, found.poses, found.references, found.landmarks, height)
+    scale = height / depth if height and depth is not None else None
+    poses = found.poses.copy()
+    poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])
+    return AdjustedMap(_wrapped(poses), found.camera, closures=closures, scale=scale)
+
+
+class _Found(NamedTuple):
+    # Poses and what the camera is corrected by; the landmarks, and of each sighting its reference and its landmark.
+    poses: Array
+    camera: Array | None
+    points: Array = np.empty((0, 3))
+    references: Ints = np.empty(0, np.int64)
+    landmarks: Ints = np.empty(0, np.int64)
+
+
+def _bundled(
+    views: LocalViews,
+    tracks: Tracks,
+    before: _Found,
+    seen: Seen,
+    miss: float,
+    sigmas: Array | None,
+    motions: Motions | None,
+    given: Array | None,
+) -> _Found | None:
+    # None where too few references see enough of the landmarks.
+    centres, bearings = in_map_frame(_looking(views, seen, before.camera), before.poses)
+    made = triangulated_tracks(
+        tracks.starts, centres[tracks.features], bearings[tracks.features], miss, MIN_PARALLAX, MAX_DISTANCE_M
+    )
+    there = np.isfinite(made.points[:, 0])
+    kept = there[tracks.owners]  # a bearing that misses now may agree in the end
+    features, landmarks = tracks.features[kept], (np.cumsum(there) - 1)[tracks.owners[kept]]
+    references, lens = views.owners[features], seen(features)
+    start = np.zeros(len(lens.sigmas)) if before.camera is None else before.camera
+    onwards = Lens(lambda corrections: lens.bearings(start + corrections), lens.sigmas)
+    out = adjusted(
+        before.poses, made.points[there], references, landmarks, onwards, SIGMA, sigmas, motions, given=given
+    )
+    references, landmarks = references[out.inliers], landmarks[out.inliers]
+    enough = np.bincount(references, minlength=len(before.poses)) >= MIN_SIGHTINGS
+    if not enough.any() or enough.mean() < MIN_SHARE:
+        return None
+    return _Found(out.poses, start + out.camera, out.points, references, landmarks)
+
+
+def _looking(views: LocalViews, seen: Seen, camera: Array | None) -> LocalViews:
+    if camera is None or not len(camera):
+        return views
+    return views.looking_along(seen(np.arange(len(views.bearings))).bearings(camera))
+
+
+def _wrapped(poses: Array) -> Array:
+    beyond = np.abs(poses[:, 2]) > math.pi
+    poses[beyond, 2] = wrap(poses[beyond, 2])
+    return poses

@@ -1,0 +1,101 @@
+"""What the images of a mapping run say of the camera that took them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Quantity
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed
+from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.values.local_features import LocalFeatures
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+CAMERA_QUANTITIES = {
+    "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),
+    "camera.yaw_beside_deg": Quantity(title="Camera turned against its description", unit="deg", context=True),
+}
+MAX_AXIS = math.radians(0.2)
+"""Angle by which an axis that lies beside moves a bearing, the median, above which it is said (rad)."""
+MAX_YAW = math.radians(1.0)
+"""Angle by which the camera is turned, above which it is said (rad): one of true headings alone would be as large."""
+SAME_RAY = 1e-6
+"""Difference of unit vectors up to which a bearing is that of its pixel."""
+
+
+class CameraCheck(NamedTuple):
+    """A camera whose fields are adjusted with a map. `camera`: None where nothing of it can be, as of bearings that are
+    not those of its pixels (images that were unwarped before, logs of several cameras)."""
+
+    camera: Camera | None
+    fields: dict[str, float]
+    pixels: Array
+    bearings: Array
+
+    @classmethod
+    def of(
+        cls, camera: Camera | None, found: Sequence[LocalFeatures | None], bearings: Array, poses_given: bool
+    ) -> "CameraCheck":
+        """The check of a map's features with these bearings (F, 3) of all references in order."""
+        pixels = np.concatenate([np.empty((0, 2)), *(each.points for each in found if each is not None)])
+        names = {} if camera is None else observed(camera, poses_given)
+        if camera is None or not names or not len(pixels):
+            return cls(None, {}, pixels, bearings)
+        rays = adjustable(camera, pixels, names).bearings(np.zeros(len(names)))
+        same = np.abs(rays - bearings).max() < SAME_RAY
+        return cls(camera if same else None, names if same else {}, pixels, bearings)
+
+    def seen(self, features: Ints) -> Lens:
+        """The lens of the adjustment."""
+        if self.camera is None:
+            bearings = self.bearings[features]
+            return Lens(lambda _: bearings, np.empty(0))
+        return adjustable(self.camera, self.pixels[features], self.fields)
+
+    def metrics(self, corrections: Array) -> dict[str, Any]:
+        """How far the camera is from its description."""
+        if self.camera is None or not len(corrections):
+            return {}
+        by = dict(zip(self.fields, corrections.tolist(), strict=True))
+        values = {"axis_beside_px": math.hypot(by["centre_x"], by["centre_y"])}
+        if "yaw" in by:
+            values["yaw_beside_deg"] = abs(math.degrees(by["yaw"]))
+        return {"camera": values}
+
+    def told(self, ctx: Context, corrections: Array) -> str:
+        """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is."""
+        if self.camera is None or not len(corrections):
+            return ""
+        by = dict(zip(self.fields, corrections.tolist(), strict=True))
+        right = self.camera
+        parts = []
+        moved = corrected(right, AXIS, np.array([by[name] for name in AXIS]))
+        if self._turned(moved) > MAX_AXIS:
+            right = moved
+            beside = math.hypot(by["centre_x"], by["centre_y"])
+            at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
+            parts.append(f"its axis lies {beside:.1f} px beside, at {at}")
+        if abs(by.get("yaw", 0.0)) > MAX_YAW:
+            right = replace(right, yaw=right.yaw + by["yaw"])
+            parts.append(f"it is turned by {math.degrees(by['yaw']):.1f} degrees more, yaw {right.yaw:.3f}")
+        if not parts:
+            return ""
+        found = "; ".join(parts)
+        ctx.fact("camera_found", found)
+        ctx.warn(
+            f"the tour's images show that the camera is not as it is described: {found}. The map is less exact by it; "
+            "the run's folder has the right description: type camera=FOLDER/camera.yaml"
+        )
+        return write_camera(right)
+
+    def _turned(self, other: Camera) -> float:
+        rays, looks = other.unproject(self.pixels)
+        cos = np.einsum("ij,ij->i", rays[looks], self.bearings[looks])
+        return float(np.median(np.arccos(np.clip(cos, -1.0, 1.0)))) if looks.any() else 0.0

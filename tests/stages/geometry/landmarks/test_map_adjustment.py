@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+from landmark_world import displaced, driven, house, misplaced
+
+from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive, adjusted_to_given
+from omninav.stages.geometry.landmarks.map_making import LocalViews, neighbouring_pairs, pair_matches
+
+
+@pytest.fixture(scope="module")
+def world():
+    return house(np.random.default_rng(0), landmarks=4000)
+
+
+@pytest.fixture(scope="module")
+def views(world):
+    """Features by reference; a descriptor varies a little."""
+    rng = np.random.default_rng(1)
+    order = np.argsort(world.references, kind="stable")
+    own = rng.normal(size=(len(world.points), 32))[world.landmarks[order]]
+    starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
+    descriptors = (own + rng.normal(0.0, 0.2, own.shape)).astype(np.float32)
+    descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
+    return LocalViews(starts, world.bearings[order], descriptors)
+
+
+def rows(world):
+    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
+    seen[world.references, world.landmarks] = 1.0
+    return iter(seen @ seen.T)
+
+
+def seen_in(views):
+    return lambda features: Lens(lambda _: views.bearings[features], np.empty(0))
+
+
+def to_given(world, views, poses):
+    matches = pair_matches(views, neighbouring_pairs(poses, rows(world), 0.5))
+    return adjusted_to_given(views, matches, poses, seen_in(views))
+
+
+def test_exact_poses_stay_exact(world, views):
+    found = to_given(world, views, world.poses)
+    assert not found.problem
+    assert misplaced(found.poses, world.poses)[0] < 0.002
+
+
+def test_poses_that_are_wrong_by_10_cm_and_2_degrees_are_mended(world, views):
+    wrong = displaced(world.poses, np.random.default_rng(2))
+    found = to_given(world, views, wrong)
+    assert misplaced(wrong, world.poses)[0] > 0.12
+    assert misplaced(found.poses, world.poses)[0] < 0.03
+    assert np.abs((found.poses - wrong)[:, :2].mean(axis=0)).max() < 0.005  # the frame is that of all poses
+
+
+def test_a_single_wrong_pose_among_exact_ones_is_mended_and_the_others_stay(world, views):
+    wrong = world.poses.copy()
+    wrong[40] += [0.3, -0.2, 0.1]
+    found = to_given(world, views, wrong)
+    assert np.abs(found.poses - world.poses)[40] == pytest.approx(0.0, abs=0.01)
+    assert misplaced(found.poses, world.poses)[0] < 0.003
+
+
+def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, views):
+    _, odometry = driven(world.poses)
+    found = adjusted_drive(views, rows(world), odometry, seen_in(views), None, np.random.default_rng(3))
+    assert misplaced(odometry, world.poses)[0] > 0.4
+    assert misplaced(found.poses, world.poses)[0] < 0.05
+    assert found.poses[0] == pytest.approx(odometry[0])
+    assert found.closures > 10
+    assert found.scale is None
+
+
+def test_a_drive_that_comes_back_to_no_place_stays_as_it_is(world, views):
+    some = slice(0, 5)
+    few = LocalViews(views.starts[:6], views.bearings[: views.starts[5]], views.descriptors[: views.starts[5]])
+    similarity = (row[some] for row in list(rows(world))[some])
+    found = adjusted_drive(few, similarity, world.poses[some], seen_in(few), None, np.random.default_rng(0))
+    assert "came back to" in found.problem
+    assert (found.poses == world.poses[some]).all()
+
+
+def test_images_of_a_mirrored_camera_leave_the_poses(world, views):
+    mirrored = views.looking_along(views.bearings * [1.0, -1.0, 1.0])
+    found = to_given(world, mirrored, world.poses)
+    assert "contradicts the poses" in found.problem
+    assert (found.poses == world.poses).all()
+
+
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_images_without_features_leave_the_poses(number):
+    poses = np.random.default_rng(0).normal(size=(number, 3))
+    nothing = LocalViews(np.zeros(number + 1, np.int64), np.empty((0, 3)), np.empty((0, 32), np.float32))
+    alike = [np.zeros(number, np.float32)] * number
+    matches = pair_matches(nothing, neighbouring_pairs(poses, alike, 0.5))
+    assert adjusted_to_given(nothing, matches, poses, seen_in(nothing)).problem
+    assert adjusted_drive(nothing, alike, poses, seen_in(nothing), None, np.random.default_rng(0)).problem

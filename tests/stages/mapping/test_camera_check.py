@@ -1,0 +1,81 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from landmark_world import NOISE, house
+
+from omninav.pipeline import Context
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.self_calibration import adjustable
+from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.geometry.landmarks.adjustment import adjusted
+from omninav.stages.mapping.camera_check import CameraCheck
+from omninav.stages.recordings.camera_yaml import parse_camera
+
+TRUE = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
+BESIDE = replace(TRUE, centre_x=321.8, centre_y=237.6)  # by 3 pixels
+
+
+def check_of(camera, pixels):
+    rays = adjustable(camera, pixels).bearings(np.zeros(2)) if camera.ring else camera.unproject(pixels)[0]
+    features = replace(
+        none_found(),
+        bearings=rays,
+        points=pixels,
+        descriptors=np.zeros((len(pixels), 128), np.uint8),
+        colours=np.zeros((len(pixels), 3), np.float32),
+        sizes=np.ones(len(pixels), np.float32),
+    )
+    return CameraCheck.of(camera, [None, features], rays, poses_given=True)
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Pixels of a house's points, and the world."""
+    world = house(np.random.default_rng(0))
+    return TRUE.project(world.bearings)[0], world
+
+
+def corrections(check, world):
+    held = np.zeros((len(world.poses), 3))
+    lens = check.seen(np.arange(len(world.bearings)))
+    return adjusted(world.poses, world.points, world.references, world.landmarks, lens, NOISE, held).camera
+
+
+def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
+    pixels, world = seen
+    ctx, check = Context("landmarks"), check_of(BESIDE, pixels)
+    found = corrections(check, world)
+    right = parse_camera(check.told(ctx, found), "camera.yaml")
+    assert (right.centre_x, right.centre_y) == pytest.approx((319.5, 239.5), abs=0.05)
+    assert (right.yaw, right.height) == (0.3, 0.9)
+    assert "its axis lies 3.0 px beside, at 319.5, 239.5" in ctx.warnings[0]
+    assert check.metrics(found)["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
+
+
+def test_a_camera_that_is_turned_is_said(seen):
+    pixels, world = seen
+    ctx, check = Context("landmarks"), check_of(replace(TRUE, yaw=0.2), pixels)
+    right = parse_camera(check.told(ctx, corrections(check, world)), "camera.yaml")
+    assert right.yaw == pytest.approx(0.3, abs=0.001)
+    assert (right.centre_x, right.centre_y) == (319.5, 239.5)
+    assert "turned by 5.7 degrees more" in ctx.warnings[0]
+
+
+def test_of_a_camera_as_it_is_described_nothing_is_said(seen):
+    pixels, world = seen
+    ctx, check = Context("landmarks"), check_of(TRUE, pixels)
+    assert check.told(ctx, corrections(check, world)) == ""
+    assert not ctx.warnings
+
+
+def test_bearings_of_other_pixels_and_cameras_without_an_axis_are_not_checked(seen):
+    pixels, _ = seen
+    check = check_of(TRUE, pixels)
+    other = CameraCheck.of(BESIDE, [None], check.bearings, poses_given=True)
+    sphere = check_of(Equirectangular(1024, 512, 512.0), np.full((5, 2), 100.0))
+    for each in (other, sphere, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
+        assert each.camera is None
+        assert each.metrics(np.empty(0)) == {}
+        assert each.seen(np.arange(0)).sigmas.shape == (0,)
