@@ -18,13 +18,13 @@ from omninav.stages.geometry.landmarks.map_making import (
     fitting_matches,
     local_views,
     mean_descriptors,
-    most_seen,
     neighbouring_pairs,
     pair_matches,
     sightings_by_reference,
     similarity_rows,
     tracks_of,
     triangulated,
+    widely_seen,
 )
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
 from omninav.stages.values.length_scale import DEFAULT_M
@@ -91,7 +91,7 @@ class LearnLandmarks(Stage):
             poses = map.poses if adjusted.problem else adjusted.poses
             matches = pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
-        sightings = most_seen(views, triangulated(views, tracks, poses))
+        sightings = widely_seen(views, triangulated(views, tracks, poses))
         starts, seen = sightings_by_reference(views, sightings)
         sigma = bearing_sigma(views, sightings, poses)
         looks = mean_descriptors(views, sightings)

@@ -179,7 +179,7 @@ def triangulated(views: LocalViews, tracks: Tracks, poses: Array) -> Sightings:
     return Sightings(made.points[there], number[tracks.owners[made.kept]], tracks.features[made.kept])
 
 
-def most_seen(views: LocalViews, sightings: Sightings) -> Sightings:
+def widely_seen(views: LocalViews, sightings: Sightings) -> Sightings:
     """The landmarks that are among the `MAX_SEEN` of any reference that most references see, with all sightings."""
     counts = np.bincount(sightings.landmarks, minlength=len(sightings.points))
     owners = views.owners[sightings.features]

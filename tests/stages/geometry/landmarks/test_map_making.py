@@ -9,11 +9,11 @@ from omninav.stages.geometry.landmarks.map_making import (
     local_views,
     matched_pairs,
     mean_descriptors,
-    most_seen,
     neighbouring_pairs,
     sightings_by_reference,
     similarity_rows,
     triangulated,
+    widely_seen,
 )
 
 
@@ -97,7 +97,7 @@ def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None
 def test_of_each_reference_the_landmarks_stay_that_most_references_see(features, found, monkeypatch) -> None:
     views, _ = features
     monkeypatch.setattr(map_making, "MAX_SEEN", 10)
-    few = most_seen(views, found)
+    few = widely_seen(views, found)
     owners, counts = views.owners[found.features], np.bincount(found.landmarks)
     expected = set()
     for reference in range(len(views)):
@@ -109,7 +109,7 @@ def test_of_each_reference_the_landmarks_stay_that_most_references_see(features,
 
 
 def test_a_map_of_few_landmarks_keeps_them_all(features, found) -> None:
-    kept = most_seen(features[0], found)
+    kept = widely_seen(features[0], found)
     assert kept.points.tolist() == found.points.tolist()
     assert kept.features.tolist() == found.features.tolist()
 
@@ -156,7 +156,7 @@ def test_references_without_features_have_no_landmarks() -> None:
     found = triangulated(views, matched_pairs(views, np.array([[0, 1]]), poses), poses)
     assert found.points.shape == (0, 3)
     assert mean_descriptors(views, found).shape == (0, 128)
-    assert most_seen(views, found).points.shape == (0, 3)
+    assert widely_seen(views, found).points.shape == (0, 3)
     assert sightings_by_reference(views, found)[0].tolist() == [0, 0, 0]
     assert bearing_sigma(views, found, poses) > 0.0
     assert neighbouring_pairs(np.empty((0, 3)), iter(()), 0.5).shape == (0, 2)
