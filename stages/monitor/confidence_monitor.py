@@ -42,13 +42,13 @@ KIDNAPPING_PROBABILITY = 0.02
 """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
 or found itself again."""
 
-FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.8, 0.05
+FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 FOUND_BY_CHANCE = 0.002
 """Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
 NEW_WITHOUT = 0.5
 """Share of an image without a pose that is new evidence: it is dark or blurred where the one before was."""
-MAX_AGAINST = 3.0
+MAX_AGAINST = 2.0
 """Log odds that images without landmarks speak against an estimate, at most: light may have changed."""
 
 

@@ -71,7 +71,7 @@ class WidenCovariance(Stage):
         """One estimate."""
         state.driven_m = math.inf if ctx.tick.first_of_log else state.driven_m
         state.driven_m += 0.0 if motion is None else math.hypot(motion.x, motion.y)
-        if fix is not None and gives(fix, estimate):
+        if fix is not None and is_the_estimate(fix, estimate):
             state.driven_m = 0.0
         drift = DRIFT_M[0] ** 2 * state.driven_m + (DRIFT_M[1] * state.driven_m) ** 2
         variance = min((self.floor * length_scale.metres) ** 2, drift)
@@ -83,7 +83,7 @@ class WidenCovariance(Stage):
         return self.Out(estimate=replace(estimate, covariance=covariance))
 
 
-def gives(fix: LandmarkFix, estimate: PoseEstimate) -> bool:
+def is_the_estimate(fix: LandmarkFix, estimate: PoseEstimate) -> bool:
     """Tests whether an estimate is, within their covariances, a pose that landmarks are sure of."""
     away = fix.poses[0] - np.array(pose_row(estimate.pose))
     away[2] = wrap_angle(float(away[2]))

@@ -27,7 +27,7 @@ NEAR_EACH = 2
 """References that are candidates around each of them."""
 COVARIANCE_FACTOR = 2.5
 """Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
-ODDS_PER_INLIER, EVEN_INLIERS, MAX_LOG_ODDS = 0.25, 20.0, 8.0
+ODDS_PER_INLIER, EVEN_INLIERS, MAX_LOG_ODDS = 0.3, 24.0, 8.0
 """Log odds (nats) that a pose is right, by how many landmarks agree: of images of another building with the same walls
 and ceilings 12 to 26 agree, of a changed shop's own 98 % have 10 and more (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.001, 0.001, math.radians(0.01))
