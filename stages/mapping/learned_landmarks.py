@@ -140,6 +140,8 @@ def _rows(words: VisualWords) -> Iterator[npt.NDArray[np.float32]]:
 def _words(adjusted: AdjustedMap, moved: float, given: bool) -> str:
     if adjusted.problem:
         return f"no: {adjusted.problem}"
+    if given and moved == 0.0:
+        return "no: the images confirm the poses that were given"
     if given:
         return f"poses and landmarks together, by {moved:.3f} m at most"
     scale = "odometry's scale, as the camera's height over the floor is not known or the floor not seen"

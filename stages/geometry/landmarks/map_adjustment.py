@@ -38,6 +38,8 @@ GIVEN_SIGMAS = (0.1, 0.1, math.radians(2.0))
 """Standard deviations of poses that are given (m, m, rad), before it is known how good they are."""
 LEAST_SIGMAS = (0.001, 0.001, math.radians(0.02))
 """The same at least, once it is."""
+CONFIRMED_M, OUTLYING_M = 0.005, 0.02
+"""Median distance by which images move poses that are exact, at most, and the distance of one that is not (m)."""
 MIN_SIGHTINGS, MIN_SHARE = 20, 0.5
 """Landmarks that a reference must see to tell where it is, and the part of all references that must see as many."""
 MIN_CLOSURES = 3
@@ -64,7 +66,8 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     """Adjust poses (R, 3) that are given, and may be exact or wrong by decimetres and degrees.
 
     How wrong they are is not known before: once the images were asked, each pose is held by as much as the median was
-    moved, or by as much as it was itself, where that is more.
+    moved, or by as much as it was itself, where that is more. Poses that images confirm as well as they can are kept
+    as they were given, but for single ones that are off.
     """
     sigmas, found = np.tile(GIVEN_SIGMAS, (len(poses), 1)), _Found(poses, None)
     for miss, off_plane in zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), strict=True):
@@ -83,7 +86,9 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
         moved = np.abs(moved)
         sigmas = np.maximum(np.maximum(np.median(moved, axis=0) / NORMAL_MEDIAN, LEAST_SIGMAS), moved)
     assert found.camera is not None
-    return AdjustedMap(_wrapped(found.poses), found.camera)
+    away = np.hypot(*(found.poses - poses)[:, :2].T)
+    exact = (away < OUTLYING_M) & (np.median(away) < CONFIRMED_M)
+    return AdjustedMap(_wrapped(np.where(exact[:, None], poses, found.poses)), found.camera)
 
 
 def adjusted_drive(
