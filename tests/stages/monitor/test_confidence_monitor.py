@@ -266,9 +266,9 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     few = by_landmarks(0.0, fix(0.0, 0.1), 1.0, here, gate, 1.0)[0]
     assert 0.0 < few < 0.5
     odds = 4.0
-    for _ in range(12):
+    for _ in range(30):
         odds, sure = by_landmarks(odds, None, 1.0, here, gate, 1.0)
-    assert odds < -1.8
+    assert odds < -1.5  # a map of which half the images and more have a pose, and thirty without
     assert sure == 0.0
     assert by_landmarks(0.0, None, 0.0, here, gate, 1.0)[0] == 0.0  # of a map without landmarks nothing follows
     assert by_landmarks(4.0, None, 1.0, here, gate, 0.0)[0] == pytest.approx(4.0)  # nor from the same image again
