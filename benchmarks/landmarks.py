@@ -39,7 +39,7 @@ SPACING_M, AISLE_M, LENGTH_M = 0.45, 5.0, 60.0
 POINTS_PER_M = 120
 """Points of a metre of shelf, on either side of an aisle."""
 REACH_M, FEATURES = 4.0, 500
-"""How far a camera sees points, m, and how many it finds at most."""
+"""Range of a camera (m), and the largest number of points that it finds."""
 BEARING_SIGMA, LOOK_SIGMA = math.radians(0.08), 8.0
 """Noise of bearings (rad) and of the numbers of a descriptor."""
 
@@ -70,7 +70,7 @@ class Hall:
         self.looks = np.minimum(self.rng.gamma(0.6, 40.0, (count, 128)), 255).astype(np.uint8)
 
     def seen(self, pose: Array) -> LocalFeatures:
-        """What a robot sees from a pose."""
+        """The features that a robot sees from a pose."""
         rng = self.rng
         near: list[npt.NDArray[np.int64]] = []
         for shelf in {round(pose[1] / AISLE_M), round(pose[1] / AISLE_M) + 1}:
@@ -92,7 +92,7 @@ class Hall:
 
 
 def timed(call: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
-    """What a call gives, and how many seconds of the processor it takes."""
+    """The result of a call, and the processor time that it takes (s)."""
     began = time.process_time()
     return call(*arguments), time.process_time() - began
 

@@ -14,7 +14,7 @@ from .model import Array, Camera
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
-"""Where a mirror's or lens's axis meets the image, nothing known of it: what a robot on a flat floor observes best."""
+"""The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor observes it best."""
 
 
 def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:

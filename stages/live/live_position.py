@@ -1,4 +1,4 @@
-"""Where a live run is: in time, in the odometry's frame, and in what it has seen."""
+"""The position of a live run: in time, in the odometry's frame, and in what it has seen."""
 
 from collections.abc import Callable
 

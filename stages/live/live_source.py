@@ -38,7 +38,7 @@ LIVE, DEVICE = "live", "camera:"
 RECORD = "live.mcap"
 """The record in the run's folder."""
 WATCH_S = 1.0
-"""How often diagnostics and the terminal say how it goes."""
+"""Seconds between two reports to diagnostics and the terminal."""
 PATIENCE_S = 1.0
 """Time for which an image waits for the odometry after it, and for which a topic may be silent, seconds."""
 
@@ -72,9 +72,9 @@ class LiveSource(Source):
     topics: Topics = Topics()
     """Which topics are read. An image topic whose name ends with `compressed` carries compressed images."""
     initial_pose: str | None = "/initialpose"
-    """Where somebody says where the robot is (PoseWithCovarianceStamped): the belief starts again there."""
+    """Topic on which somebody says where the robot is (PoseWithCovarianceStamped): the belief starts again there."""
     goal: str | None = "/goal_pose"
-    """Where somebody says where it is to go (PoseStamped)."""
+    """Topic on which somebody says where it is to go (PoseStamped)."""
     restart: str | None = "/reinitialize_global_localization"
     """Topic (Empty), and service of that name where the transport has services: the belief starts again, uniform."""
     amcl: str | None = None
@@ -82,16 +82,16 @@ class LiveSource(Source):
     camera: str | None = None
     """A camera.yaml, or a projection (`equirectangular`, …); null: the robot's CameraInfo, which is waited for."""
     limits: MotionLimits = MotionLimits()
-    """What the robot can do: odometry and truth beyond it are doubted until they have gone on so for a second."""
+    """Limits of the robot: odometry and truth beyond it are doubted until they have gone on so for a second."""
     diagnostics: str | None = "/diagnostics"
-    """Where the state of the run is published every second (DiagnosticArray)."""
+    """Topic on which the state of the run is published every second (DiagnosticArray)."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
     """Ends after this time by the images' stamps; null: only when it is told to."""
     rest_s: Annotated[float, Bounds(ge=0)] | None = None
     """Ends this long after the planned route has: the robot has arrived, or given up; null: it waits for a new goal."""
 
     class Out(DriveOutputs):
-        """What is known at an image. `reported_odometry`: in the frame that the robot's odometry has now, which begins
+        """Inputs known at an image. `reported_odometry`: in the frame that the robot's odometry has now, which begins
         anew where it is reset; None where motion is guessed."""
 
         reported_odometry: Pose | None = None
@@ -221,7 +221,7 @@ class LiveSource(Source):
         disconnect()
 
     def _why_not(self) -> str:
-        """What was missing, as the terminal said it meanwhile."""
+        """Inputs that were missing, as the terminal said it meanwhile."""
         troubles = sorted(self._transport.status.troubles.values())
         return "; ".join(troubles) or "it was ended before the first image; let it run until the robot has been heard"
 
@@ -319,7 +319,7 @@ class LiveSource(Source):
 
 
 def _recorded(path: Path) -> LiveRecording | None:
-    """What an earlier process of this run has recorded; None where there is nothing."""
+    """The record of an earlier process of this run; None where there is nothing."""
     file = unfinished(path)
     if not file.exists():
         return None

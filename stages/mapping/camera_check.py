@@ -1,4 +1,4 @@
-"""What the images of a mapping run say of the camera that took them."""
+"""Checks the camera of a mapping run by its own images."""
 
 import math
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ class CameraCheck(NamedTuple):
         return adjustable(self.camera, self.pixels[features], self.fields)
 
     def metrics(self, corrections: Array) -> dict[str, Any]:
-        """How far the camera is from its description."""
+        """Deviations of the camera from its description."""
         if self.camera is None or not len(corrections):
             return {}
         by = dict(zip(self.fields, corrections.tolist(), strict=True))

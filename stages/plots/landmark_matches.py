@@ -28,7 +28,7 @@ def drawn_matches(snapshot: EncodedPanorama) -> bytes:
 
 
 def match_facts(snapshot: EncodedPanorama | None) -> list[tuple[str, str]]:
-    """How many of the matched features agree with the pose."""
+    """The number of matched features that agree with the pose, in words."""
     if snapshot is None or snapshot.agree is None:
         return []
     return [("landmarks", f"{int(snapshot.agree.sum())} of {len(snapshot.agree)} matches agree")]

@@ -52,14 +52,14 @@ class Playback(Source, ABC):
     """
 
     limits: MotionLimits = MotionLimits()
-    """What the robot can do: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
+    """Limits of the robot: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
     truth: str | None = None
     """The true poses, where they are not on the log's own topic: a file beside it (TUM, or a CSV with time, x, y and
     heading), a topic, or a frame of a tf topic as /tf:PARENT:CHILD."""
     truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
     """The file's clock minus the log's: an image taken at t is looked up in the file at t + this."""
     truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
-    """How far in time a pose of the file may be from an image."""
+    """Largest time between an image and a pose of the file, seconds."""
     first: Annotated[int, Bounds(ge=0)] = 0
     """The first frame of each log that is used."""
     stop: Annotated[int, Bounds(ge=1)] | None = None
@@ -75,7 +75,7 @@ class Playback(Source, ABC):
     """A longer pause begins another log: several days may lie in one file."""
 
     class Out(DriveOutputs):
-        """What is known at an image."""
+        """Inputs known at an image."""
 
     @abstractmethod
     def recordings(self) -> list[Recording]:
@@ -193,7 +193,7 @@ class Playback(Source, ABC):
         return user_path(self.truth)
 
     def _guesses(self) -> bool:
-        """Whether motion is guessed where none is measured, though positions may be known."""
+        """Tells that motion is guessed where none is measured, though positions may be known."""
         return False
 
     def _open(self) -> None:

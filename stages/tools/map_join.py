@@ -52,7 +52,7 @@ class JoinMaps(Tool):
 
 
 def _of_landmarks(sources: Sequence[SavedMap], landmarks: Landmarks) -> Iterator[str]:
-    """How many there are, and what became of their words; and which maps have none."""
+    """The number of landmarks, what became of their words, and which maps have none, in words."""
     yield f"{len(landmarks)}"
     graphs = [(source.path, source.map) for source in sources if isinstance(source.map, ReferenceGraph)]
     given = [map.landmarks for _, map in graphs if map.landmarks is not None]

@@ -110,7 +110,7 @@ def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
 
 
 def described_landmarks(map: ReferenceGraph) -> str:
-    """How many landmarks a map has, how many of them its references see, and how well."""
+    """The number of landmarks, how many of them references see, and how well, in words."""
     landmarks = map.landmarks
     if landmarks is None:
         return "none; type landmarks=sift where a map is made"

@@ -33,8 +33,8 @@ DIFFERENCE = 1e-5
 
 
 class Motions(NamedTuple):
-    """What odometry measured. `edges` (E, 2): from which reference to which; `measured` (E, 3): the motion between them
-    in the frame of the first (m, m, rad); `sigmas` (E, 3): standard deviations."""
+    """Motions that odometry measured. `edges` (E, 2): from which reference to which; `measured` (E, 3): the motion
+    between them in the frame of the first (m, m, rad); `sigmas` (E, 3): standard deviations."""
 
     edges: Ints
     measured: Array

@@ -1,4 +1,4 @@
-"""How often the landmarks of a map give the poses of its own images."""
+"""The share of a map's own images whose poses its landmarks give."""
 
 import math
 
