@@ -14,7 +14,7 @@ from .model import Array, Camera
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
-"""The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor observes it best."""
+"""The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor shows it best."""
 
 
 def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:
