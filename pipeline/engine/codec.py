@@ -92,7 +92,7 @@ def _describe_all(things: Sequence[Any], arrays: _Arrays) -> Any:
     if not kinds and issubclass(kind, Value):
         columns = [[getattr(thing, name) for thing in things] for name in field_names(kind)]
         return ["values", _name_of(kind), *(_describe_all(column, arrays) for column in columns)]
-    if not kinds and kind is dict and all(thing.keys() == things[0].keys() for thing in things):
+    if not kinds and kind is dict and all(list(thing) == list(things[0]) for thing in things):
         keys = list(things[0])
         columns = [[thing[key] for thing in things] for key in keys]
         return ["dicts", _describe(keys, arrays), *(_describe_all(column, arrays) for column in columns)]

@@ -70,7 +70,7 @@ def used(folder: Path, files: Files) -> Any:
     belief = Particles(np.zeros((50, 3)), np.full(50, 0.02))
     return (
         fix,
-        LandmarkUpdate().step(ctx, belief, map, fix).belief,
+        LandmarkUpdate().step(ctx, belief, fix).belief,
         cut_references(map, np.arange(len(map)) > 0),
         joined_references([map, map], map.pose_source),
         map.moved(map.poses + 1.0),
