@@ -10,27 +10,23 @@ import resource
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from omninav.pipeline import Context  # noqa: E402
-from omninav.pipeline.engine.artifact import artifact_bytes  # noqa: E402
-from omninav.stages.geometry.appearance.visual_words import root_descriptors  # noqa: E402
-from omninav.stages.geometry.landmarks.bearing_pose import matched, poses_of  # noqa: E402
-from omninav.stages.mapping.learned_landmarks import LearnLandmarks  # noqa: E402
-from omninav.stages.mapping.learned_words import LearnVisualWords  # noqa: E402
-from omninav.stages.sensor.landmark_pose import LandmarkPose  # noqa: E402
-from omninav.stages.values.belief import Particles  # noqa: E402
-from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks  # noqa: E402
-from omninav.stages.values.local_features import LocalFeatures  # noqa: E402
-from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph  # noqa: E402
+from omninav.pipeline import Context
+from omninav.pipeline.engine.artifact import artifact_bytes
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.landmarks.bearing_pose import matched, poses_of
+from omninav.stages.mapping.learned_landmarks import LearnLandmarks
+from omninav.stages.mapping.learned_words import LearnVisualWords
+from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 
 Array = npt.NDArray[np.float64]
 

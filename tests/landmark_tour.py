@@ -15,7 +15,7 @@ from omninav.stages.values.pose import Pose
 
 SIZE = (12.0, 6.0)
 REACH_M = 3.0
-"""How far the robot of this room sees: less than the room, so that its ends look different."""
+"""Range of the robot's camera (m): less than the room, so that its ends look different."""
 HEIGHT_M = 0.9
 """The camera's height over the floor, where the points' z is 0."""
 FEW = np.empty((0, 2), np.int64)

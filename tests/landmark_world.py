@@ -66,7 +66,7 @@ def turn(angles, axis):
 
 
 def triangulated(house, poses, bearings=None):
-    """Where the bearings of each landmark come closest to each other, wrong ones too; NaN for one that is seen once."""
+    """Points where the bearings of each landmark come closest to each other, wrong ones too; NaN of one seen once."""
     rays = np.einsum("oij,oj->oi", rotations(poses)[house.references], house.bearings if bearings is None else bearings)
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     centres = np.column_stack([poses[:, :2], np.zeros(len(poses))])[house.references]

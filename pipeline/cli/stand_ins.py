@@ -46,7 +46,8 @@ def decisive_settings() -> set[str]:
 
 def _node(config: Any, group: str) -> dict[str, Any]:
     node = (config.get("nodes") or {}).get(group)
-    return {} if node is None else dict(OmegaConf.to_container(node, resolve=False))  # type: ignore[arg-type]
+    plain: Any = {} if node is None else OmegaConf.to_container(node, resolve=False)
+    return dict(plain)
 
 
 def _stand_in(group: str, rule: Mapping[str, str]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from nbclient import NotebookClient
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
 SHORTER = {"nodes.source.seconds=25": "nodes.source.seconds=8", "range(3)": "range(2)", "n_trials=5": "n_trials=2"}
-"""How long a reader's robot drives in real time and how many runs a study has, and what does for a test."""
+"""Seconds of real time and numbers of runs that a reader is shown, and the smaller ones of a test."""
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)

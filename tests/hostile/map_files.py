@@ -80,7 +80,7 @@ def used(folder: Path, files: Files) -> Any:
 
 @functools.cache
 def _image() -> LocalFeatures:
-    """What the robot sees beside the first references of the map."""
+    """Features that the robot sees beside the first references of the map."""
     seen = seen_from(room(), np.array([1.2, 2.4, 0.3]))
     return dataclasses.replace(seen, descriptors=seen.descriptors[:, :8].copy())
 

@@ -3,6 +3,7 @@
 import io
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import made_logs
 import made_values
@@ -60,10 +61,10 @@ def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path
     assert str(refused.value).startswith(str(tmp_path / MAP))
 
 
-def landmarks_like(**fields: object) -> bytes:
+def landmarks_like(**fields: Any) -> bytes:
     """A map whose landmarks have these fields, its sums right."""
     map = made_values.with_few_landmarks()
-    return artifact_bytes(replace(map, landmarks=replace(map.landmarks, **fields)))  # type: ignore[arg-type]
+    return artifact_bytes(replace(map, landmarks=replace(map.landmarks, **fields)))
 
 
 FEW = made_values.with_few_landmarks().landmarks

@@ -80,6 +80,14 @@ def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
     return Pairs(first[order], second[order], distance[order], unclear[order])
 
 
+def mutual_nearest_units(one: Floats, other: Floats, ratio: float) -> Pairs:
+    """`mutual_nearest` of descriptors (N, D) and (M, D) of length 1."""
+    squares: Floats = one @ other.T
+    squares *= -2.0
+    squares += 2.0
+    return mutual_nearest(squares, ratio)
+
+
 @compiled(nogil=True)
 def _mutual_of_each(
     squares: Floats, starts: Ints, ratio: float, first: Ints, second: Ints, unclear: Array, found: Ints

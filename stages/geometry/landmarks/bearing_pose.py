@@ -8,7 +8,7 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.appearance.feature_matching import Pairs, mutual_nearest
+from omninav.stages.geometry.appearance.feature_matching import Pairs, mutual_nearest_units
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.small_systems import rotated_by, solve
 
@@ -84,10 +84,7 @@ def pose_of_bearings(
 
 def matched(descriptors: Floats, landmarks: Floats) -> Pairs:
     """Pairs of features and landmarks, by their descriptors (N, D) and (L, D) of length 1."""
-    squares: Floats = descriptors @ landmarks.T
-    squares *= -2.0
-    squares += 2.0
-    return mutual_nearest(squares, RATIO)
+    return mutual_nearest_units(descriptors, landmarks, RATIO)
 
 
 def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> list[BearingPose]:

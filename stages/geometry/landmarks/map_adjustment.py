@@ -36,7 +36,7 @@ MIN_FIT = 0.4
 10 cm and 2 degrees, and 0.25 the exact ones where the camera is taken for a mirrored one."""
 GIVEN_SIGMAS = (0.1, 0.1, math.radians(2.0))
 """Standard deviations of poses that are given (m, m, rad), before it is known how good they are."""
-LEAST_SIGMAS = (0.001, 0.001, math.radians(0.02))
+MIN_SIGMAS = (0.001, 0.001, math.radians(0.02))
 """The same at least, once it is."""
 CONFIRMED_M, OUTLYING_M = 0.005, 0.02
 """Median distance by which images move poses that are exact, at most, and the distance of one that is not (m)."""
@@ -84,7 +84,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
         found = again._replace(poses=poses + moved)
         moved[:, :2] = np.hypot(moved[:, 0], moved[:, 1])[:, None] / math.sqrt(2.0)
         moved = np.abs(moved)
-        sigmas = np.maximum(np.maximum(np.median(moved, axis=0) / NORMAL_MEDIAN, LEAST_SIGMAS), moved)
+        sigmas = np.maximum(np.maximum(np.median(moved, axis=0) / NORMAL_MEDIAN, MIN_SIGMAS), moved)
     assert found.camera is not None
     away = np.hypot(*(found.poses - poses)[:, :2].T)
     exact = (away < OUTLYING_M) & (np.median(away) < CONFIRMED_M)

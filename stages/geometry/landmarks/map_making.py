@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
 from omninav.stages.geometry.plane.se2 import between
 
 from .pair_check import fit_motion
@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-APART = (0.2, 4.0)
+NEIGHBOUR_DISTANCES = (0.2, 4.0)
 """Least and largest distance of two references that are matched, in length scales of the map: nearer ones say nothing
 of depths, and farther ones see little that is the same."""
 NEIGHBOURS = 10
@@ -34,7 +34,7 @@ MISS = math.radians(0.7)
 """Angle between a bearing and its landmark above which it is left out (rad)."""
 MIN_PARALLAX = math.radians(1.5)
 """Angle between two bearings of a landmark, below which its depth is not known (rad)."""
-AT_ONCE = 10_000
+BLOCK = 10_000
 """Landmarks whose descriptors are averaged at once: those of all sightings take gigabytes."""
 MAX_SEEN = 200
 """Landmarks of a reference, those that most references see, beyond which none is kept for its sake: more make a map
@@ -103,7 +103,7 @@ def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> Loc
 
 
 def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale: float) -> Ints:
-    """Pairs (P, 2) of references to match, each once: the most similar ones among those at a distance of `APART`.
+    """Pairs (P, 2) of references to match, each once: the most similar ones at one of the `NEIGHBOUR_DISTANCES`.
 
     `similarity`: row r is the similarity (R,) of reference r to all. `length_scale`: of the map, m.
     """
@@ -112,10 +112,10 @@ def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale:
     tree = KDTree(poses[:, :2])
     pairs: set[tuple[int, int]] = set()
     for reference, (near, similarities) in enumerate(
-        zip(tree.query_ball_point(poses[:, :2], APART[1] * length_scale), similarity, strict=True)
+        zip(tree.query_ball_point(poses[:, :2], NEIGHBOUR_DISTANCES[1] * length_scale), similarity, strict=True)
     ):
         others = np.sort(np.array(near, np.int64))
-        others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > APART[0] * length_scale]
+        others = others[np.hypot(*(poses[others, :2] - poses[reference, :2]).T) > NEIGHBOUR_DISTANCES[0] * length_scale]
         best = others[np.argsort(-similarities[others], kind="stable")[:NEIGHBOURS]]
         pairs.update((min(reference, other), max(reference, other)) for other in best.tolist())
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)
@@ -126,10 +126,11 @@ def pair_matches(views: LocalViews, pairs: Ints) -> PairMatches:
     found, starts = [np.empty((3, 0))], [0]
     for one, other in pairs.tolist():
         a, b = views.rows(one), views.rows(other)
-        matches = mutual_nearest(2.0 - 2.0 * (views.descriptors[a] @ views.descriptors[b].T), RATIO)
-        if len(matches.first) >= MIN_MATCHES:
-            found.append(np.stack([matches.first + a.start, matches.second + b.start, matches.ratio]))
-        starts.append(starts[-1] + (len(matches.first) if len(matches.first) >= MIN_MATCHES else 0))
+        matches = mutual_nearest_units(views.descriptors[a], views.descriptors[b], RATIO)
+        if len(matches.first) < MIN_MATCHES:
+            matches = NO_PAIRS
+        found.append(np.stack([matches.first + a.start, matches.second + b.start, matches.ratio]))
+        starts.append(starts[-1] + len(matches.first))
     first, second, ratio = np.concatenate(found, axis=1)
     return PairMatches(pairs, np.array(starts), first.astype(np.int64), second.astype(np.int64), ratio)
 
@@ -149,12 +150,6 @@ def tracks_of(views: LocalViews, matches: PairMatches, fits: Bools) -> Tracks:
     order = np.flatnonzero(fits)
     order = order[np.argsort(matches.ratio[order], kind="stable")]
     return joined_matches(matches.first[order], matches.second[order], views.owners)
-
-
-def matched_pairs(views: LocalViews, pairs: Ints, poses: Array) -> Tracks:
-    """Tracks of features that neighbours share, of matches that fit the motion between them."""
-    matches = pair_matches(views, pairs)
-    return tracks_of(views, matches, fitting_matches(views, matches, poses))
 
 
 def in_map_frame(views: LocalViews, poses: Array) -> tuple[Array, Array]:
@@ -196,8 +191,8 @@ def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:
     """The mean (L, D) float32 of each landmark's descriptors, at length 1."""
     starts = np.searchsorted(sightings.landmarks, np.arange(len(sightings.points) + 1))
     means = np.empty((len(sightings.points), views.descriptors.shape[1]), np.float32)
-    for low in range(0, len(means), AT_ONCE):
-        high = min(low + AT_ONCE, len(means))
+    for low in range(0, len(means), BLOCK):
+        high = min(low + BLOCK, len(means))
         features = sightings.features[starts[low] : starts[high]]
         total = np.add.reduceat(views.descriptors[features], starts[low:high] - starts[low], axis=0)
         means[low:high] = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)

@@ -63,7 +63,7 @@ def sentence_of_leap(
     turn: float = 0.0,
     side: float = 0.0,
 ) -> str:
-    """What is said of an image so long after the last, of a robot that drove on and is so far `off` its way."""
+    """The warning at an image so long after the last, of a robot that drove on and is so far `off` its way."""
     before = watched(number, step, seconds=usual_s)
     recent = InputConflictsState(rows=before.rows, stamp=int(before.times[-1] * 1e9))
     tick = Tick(9, recent.stamp + int(after_s * 1e9), 0, 9, False)

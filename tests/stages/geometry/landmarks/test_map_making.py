@@ -6,15 +6,22 @@ from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
     bearing_sigma,
+    fitting_matches,
     local_views,
-    matched_pairs,
     mean_descriptors,
     neighbouring_pairs,
+    pair_matches,
     sightings_by_reference,
     similarity_rows,
+    tracks_of,
     triangulated,
     widely_seen,
 )
+
+
+def tracks_between(views, pairs, poses):
+    matches = pair_matches(views, pairs)
+    return tracks_of(views, matches, fitting_matches(views, matches, poses))
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +52,7 @@ def pairs(world):
 @pytest.fixture(scope="module")
 def found(world, features, pairs):
     views, _ = features
-    return triangulated(views, matched_pairs(views, pairs, world.poses), world.poses)
+    return triangulated(views, tracks_between(views, pairs, world.poses), world.poses)
 
 
 def test_landmarks_lie_where_the_points_of_the_world_are(world, features, found) -> None:
@@ -69,7 +76,7 @@ def test_sightings_of_a_landmark_are_of_one_point_from_different_references(feat
 def test_a_mirrored_camera_gives_next_to_no_landmarks(world, features, pairs, found, flip) -> None:
     starts, bearings, descriptors = features[0]
     views = LocalViews(starts, bearings * flip, descriptors)
-    mirrored = triangulated(views, matched_pairs(views, pairs, world.poses), world.poses)
+    mirrored = triangulated(views, tracks_between(views, pairs, world.poses), world.poses)
     assert len(mirrored.points) < 0.15 * len(found.points)
 
 
@@ -116,7 +123,7 @@ def test_a_map_of_few_landmarks_keeps_them_all(features, found) -> None:
 
 def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(features, found, monkeypatch) -> None:
     whole = mean_descriptors(features[0], found)
-    monkeypatch.setattr(map_making, "AT_ONCE", 7)
+    monkeypatch.setattr(map_making, "BLOCK", 7)
     assert mean_descriptors(features[0], found).tobytes() == whole.tobytes()
 
 
@@ -153,7 +160,7 @@ def test_similarities_by_words_are_cosines() -> None:
 def test_references_without_features_have_no_landmarks() -> None:
     views = local_views([np.empty((0, 3))] * 2, [np.empty((0, 128), np.float32)] * 2)
     poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    found = triangulated(views, matched_pairs(views, np.array([[0, 1]]), poses), poses)
+    found = triangulated(views, tracks_between(views, np.array([[0, 1]]), poses), poses)
     assert found.points.shape == (0, 3)
     assert mean_descriptors(views, found).shape == (0, 128)
     assert widely_seen(views, found).points.shape == (0, 3)
