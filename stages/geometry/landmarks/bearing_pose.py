@@ -39,6 +39,8 @@ ELSEWHERE = (0.5, math.radians(10.0))
 """Distance (m) and turn (rad) from the best pose beyond which another one is a rival."""
 MAX_POSES = 2
 """Poses that an image may have: the best one, and its rival."""
+RIVAL_SHARE = 0.5
+"""Share of the best pose's inliers that a rival must have: with fewer it is some thousand times less probable."""
 STEPS = 10
 """Gauss-Newton steps of the refinement."""
 
@@ -93,15 +95,14 @@ def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> 
     left = np.ones(len(points), np.bool_)
     for _ in range(MAX_POSES):
         rows = np.flatnonzero(left)
-        if len(rows) < min_inliers:
-            break
         pose = pose_of_bearings(bearings[rows], points[rows], TOLERANCE, sigma, min_inliers)
-        if pose is None or pose.inliers.sum() < min_inliers or (found and not _is_elsewhere(pose, found[0])):
+        if pose is None or (found and not _is_elsewhere(pose, found[0])):
             break
         inliers = np.zeros(len(points), np.bool_)
         inliers[rows] = pose.inliers
         found.append(pose._replace(inliers=inliers))
         left &= ~inliers
+        min_inliers = max(min_inliers, math.ceil(RIVAL_SHARE * inliers.sum()))
     return found
 
 

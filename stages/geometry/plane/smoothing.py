@@ -12,9 +12,7 @@ from .se2 import between, chain, compose
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-CORRELATED = 10.0
-"""Estimates of a filter that say what one would: each holds the images before it too."""
-MIN_SIGMAS = np.array([0.05, 0.05, np.radians(2.0)])
+MIN_SIGMAS = np.array([0.001, 0.001, np.radians(0.02)])
 """Smallest standard deviation of an estimate (m, m, rad)."""
 MAX_SIGMAS = np.array([1.0, 1.0, np.radians(30.0)])
 """Largest standard deviation of an estimate with a stated trust (m, m, rad), the radii of a mode: beyond them the trust
@@ -76,7 +74,7 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
     number = len(estimates)
     if number == 1:
         return estimates.copy()
-    variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2)) * CORRELATED
+    variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2))
     largest = np.where(trust[:, None] < 1.0, MAX_SIGMAS, np.inf)
     spread = np.clip(np.sqrt(variances), MIN_SIGMAS, largest) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
     drift = STEP_SIGMAS + odometry_sigma(estimates, trust, motions) * np.hypot(motions[:, 0], motions[:, 1])[:, None]
