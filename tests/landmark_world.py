@@ -53,6 +53,13 @@ def house(rng, references=120, landmarks=2000, wrong=0.05, tilts=None):
     return House(poses, points, reference, landmark, bearings, mistaken)
 
 
+def looks(house, order, length=128):
+    """Descriptors of the sightings in this order: each landmark has its own, which varies a little."""
+    rng = np.random.default_rng(1)
+    own = rng.gamma(0.5, 40.0, (len(house.points), length))[house.landmarks[order]]
+    return np.clip(np.rint(own * rng.normal(1.0, 0.2, own.shape)), 0, 255).astype(np.uint8)
+
+
 def rotations(poses, tilts=None):
     roll, pitch = np.zeros((2, len(poses))) if tilts is None else tilts.T
     return turn(poses[:, 2], 2) @ turn(pitch, 1) @ turn(roll, 0)

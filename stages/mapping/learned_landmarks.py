@@ -9,7 +9,6 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.landmarks.left_out import found_rate, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import AdjustedMap, adjusted_drive, adjusted_to_given
 from omninav.stages.geometry.landmarks.map_making import (
@@ -129,8 +128,7 @@ def _candidates(words: VisualWords) -> list[npt.NDArray[np.int64]]:
 
 def _views(found: Sequence[LocalFeatures | None]) -> LocalViews:
     bearings = [np.empty((0, 3)) if each is None else each.bearings for each in found]
-    nothing = np.empty((0, 128), np.float32)
-    return local_views(bearings, (nothing if each is None else root_descriptors(each.descriptors) for each in found))
+    return local_views(bearings, [each.descriptors for each in found if each is not None])
 
 
 def _rows(words: VisualWords) -> Iterator[npt.NDArray[np.float32]]:

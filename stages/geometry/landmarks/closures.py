@@ -13,6 +13,8 @@ from omninav.stages.geometry.plane.pose_graph import optimised_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
+from .map_making import LocalViews
+
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
@@ -72,22 +74,19 @@ def candidate_pairs(similarities: Iterable[Floats], driven: Array) -> Ints:
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)
 
 
-def verified_pairs(
-    starts: Ints, bearings: Array, descriptors: Floats, pairs: Ints, rng: np.random.Generator
-) -> VerifiedPairs:
+def verified_pairs(views: LocalViews, pairs: Ints, rng: np.random.Generator) -> VerifiedPairs:
     """Those of the pairs (P, 2) of which enough local features agree on one motion of a robot on a floor.
 
-    Of reference r the features `starts[r]` to `starts[r + 1]` of `bearings` (F, 3), unit vectors in the robot's frame,
-    and of `descriptors` (F, D). Draws from `rng`.
+    Draws from `rng`.
     """
     kept, turns, directions = [], [], []
     matches = [np.empty((3, 0))]
     for one, other in pairs.tolist():
-        a, b = slice(starts[one], starts[one + 1]), slice(starts[other], starts[other + 1])
-        found = mutual_nearest(squared_distances(descriptors[a], descriptors[b]), RATIO)
+        a, b = views.rows(one), views.rows(other)
+        found = mutual_nearest(squared_distances(views.compared(a), views.compared(b)), RATIO)
         if len(found.first) < MIN_INLIERS:
             continue
-        first, second = bearings[a][found.first], bearings[b][found.second]
+        first, second = views.bearings[a][found.first], views.bearings[b][found.second]
         pose = relative_pose(first, second, rng, threshold=TOLERANCE, max_samples=MAX_SAMPLES)
         if pose is None or np.count_nonzero(pose.inliers) < MIN_INLIERS:
             continue

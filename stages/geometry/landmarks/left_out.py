@@ -34,7 +34,7 @@ def found_rate(
     for reference, others in zip(samples.tolist(), candidates, strict=True):
         rows = [seen[starts[other] : starts[other + 1]] for other in others.tolist()]
         landmarks = np.unique(np.concatenate([np.empty(0, np.int32), *rows]))
-        pairs = matched(views.descriptors[views.rows(reference)], descriptors[landmarks])
+        pairs = matched(views.compared(views.rows(reference)), descriptors[landmarks])
         bearings = np.ascontiguousarray(views.bearings[views.rows(reference)][pairs.first])
         made = poses_of(bearings, sightings.points[landmarks[pairs.second]], sigma, MIN_INLIERS)
         away = made[0].pose - poses[reference] if made else np.full(3, np.inf)

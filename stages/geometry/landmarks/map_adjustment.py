@@ -108,7 +108,7 @@ def adjusted_drive(
     steps = between(odometry[:-1], odometry[1:])
     driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     pairs = candidate_pairs(similarity, driven)
-    verified = verified_pairs(views.starts, views.bearings, views.descriptors, pairs, rng)
+    verified = verified_pairs(views, pairs, rng)
     closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())
     if closures < MIN_CLOSURES:
         return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")

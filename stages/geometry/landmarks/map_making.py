@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.plane.se2 import between
 
 from .pair_check import fit_motion
@@ -36,6 +38,8 @@ MIN_PARALLAX = math.radians(1.5)
 """Angle between two bearings of a landmark, below which its depth is not known (rad)."""
 BLOCK = 10_000
 """Landmarks whose descriptors are averaged at once: those of all sightings take gigabytes."""
+RECENT = 64
+"""References whose descriptors are kept as they are compared: those of all take gigabytes."""
 MAX_SEEN = 200
 """Landmarks of a reference, those that most references see, beyond which none is kept for its sake: more make a map
 larger and a pose slower, and no better."""
@@ -45,11 +49,11 @@ MAX_DISTANCE_M = 30.0
 
 class LocalViews(NamedTuple):
     """Local features of references, in one list. Of reference r the rows `starts[r]` to `starts[r + 1]` of `bearings`
-    (F, 3), unit vectors in the robot's frame, and of `descriptors` (F, D) float32, of length 1."""
+    (F, 3), unit vectors in the robot's frame, and of `descriptors` (F, D) uint8."""
 
     starts: Ints
     bearings: Array
-    descriptors: Floats
+    descriptors: npt.NDArray[np.uint8]
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -66,6 +70,10 @@ class LocalViews(NamedTuple):
     def rows(self, reference: int) -> slice:
         """The features of a reference."""
         return slice(int(self.starts[reference]), int(self.starts[reference + 1]))
+
+    def compared(self, rows: slice | Ints) -> Floats:
+        """Descriptors (N, D) of some features as they are compared: of length 1, four times the memory."""
+        return root_descriptors(self.descriptors[rows])
 
 
 class PairMatches(NamedTuple):
@@ -90,16 +98,11 @@ class Sightings(NamedTuple):
     features: Ints
 
 
-def local_views(bearings: Sequence[Array], descriptors: Iterable[Floats]) -> LocalViews:
-    """One list of the features of all references; `descriptors` may be made one after the other, as they are large."""
+def local_views(bearings: Sequence[Array], descriptors: Sequence[npt.NDArray[np.uint8]]) -> LocalViews:
+    """One list of the features of all references, each with bearings (N, 3) and descriptors (N, D)."""
     starts = np.cumsum([0, *(len(each) for each in bearings)], dtype=np.int64)
-    together = np.empty((0, 128), np.float32)
-    for start, each in zip(starts, descriptors, strict=False):
-        if len(each):
-            if not len(together):
-                together = np.empty((starts[-1], each.shape[1]), np.float32)
-            together[start : start + len(each)] = each
-    return LocalViews(starts, np.concatenate([np.empty((0, 3)), *bearings]), together)
+    rows = [each for each in descriptors if len(each)] or [np.empty((0, 128), np.uint8)]
+    return LocalViews(starts, np.concatenate([np.empty((0, 3)), *bearings]), np.concatenate(rows))
 
 
 def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale: float) -> Ints:
@@ -123,13 +126,13 @@ def neighbouring_pairs(poses: Array, similarity: Iterable[Floats], length_scale:
 
 def pair_matches(views: LocalViews, pairs: Ints) -> PairMatches:
     """Features that pairs (P, 2) of references share by their descriptors alone, of which some are wrong."""
+    compared = lru_cache(RECENT)(lambda reference: views.compared(views.rows(reference)))
     found, starts = [np.empty((3, 0))], [0]
     for one, other in pairs.tolist():
-        a, b = views.rows(one), views.rows(other)
-        matches = mutual_nearest_units(views.descriptors[a], views.descriptors[b], RATIO)
+        matches = mutual_nearest_units(compared(one), compared(other), RATIO)
         if len(matches.first) < MIN_MATCHES:
             matches = NO_PAIRS
-        found.append(np.stack([matches.first + a.start, matches.second + b.start, matches.ratio]))
+        found.append(np.stack([matches.first + views.starts[one], matches.second + views.starts[other], matches.ratio]))
         starts.append(starts[-1] + len(matches.first))
     first, second, ratio = np.concatenate(found, axis=1)
     return PairMatches(pairs, np.array(starts), first.astype(np.int64), second.astype(np.int64), ratio)
@@ -194,7 +197,7 @@ def mean_descriptors(views: LocalViews, sightings: Sightings) -> Floats:
     for low in range(0, len(means), BLOCK):
         high = min(low + BLOCK, len(means))
         features = sightings.features[starts[low] : starts[high]]
-        total = np.add.reduceat(views.descriptors[features], starts[low:high] - starts[low], axis=0)
+        total = np.add.reduceat(views.compared(features), starts[low:high] - starts[low], axis=0)
         means[low:high] = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
     return means
 

@@ -2,9 +2,10 @@ import math
 
 import numpy as np
 import pytest
-from landmark_world import driven, house, misplaced
+from landmark_world import driven, house, looks, misplaced
 
 from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
+from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
 from omninav.stages.geometry.plane.se2 import between, wrap
 
 
@@ -15,13 +16,10 @@ def world():
 
 @pytest.fixture(scope="module")
 def features(world):
-    """Features by reference: starts, bearings, descriptors, and the landmark of each; a descriptor varies a little."""
-    rng = np.random.default_rng(1)
+    """Features by reference, and the landmark of each."""
     order = np.argsort(world.references, kind="stable")
-    own = rng.normal(size=(len(world.points), 32))[world.landmarks[order]]
     starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
-    descriptors = (own + rng.normal(0.0, 0.2, own.shape)).astype(np.float32)
-    return starts, world.bearings[order], descriptors, world.landmarks[order]
+    return LocalViews(starts, world.bearings[order], looks(world, order, 32)), world.landmarks[order]
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +29,7 @@ def verified(world, features):
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(world.poses[:, :2], axis=0).T))])
     pairs = candidate_pairs(iter(seen @ seen.T), way)
     apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
-    return verified_pairs(*features[:3], np.concatenate([pairs, apart]), np.random.default_rng(2))
+    return verified_pairs(features[0], np.concatenate([pairs, apart]), np.random.default_rng(2))
 
 
 def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
@@ -46,7 +44,7 @@ def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
 
 
 def test_matches_that_agree_are_of_one_landmark(features, verified):
-    landmarks = features[3]
+    landmarks = features[1]
     assert (landmarks[verified.first] == landmarks[verified.second]).mean() > 0.97
     assert len(verified.first) == len(verified.second) == len(verified.ratio) > 12 * len(verified.pairs)
 
@@ -64,18 +62,15 @@ def test_a_drive_that_odometry_has_bent_is_straightened(world, verified):
 
 
 def test_without_a_pair_odometry_stays(world, features):
-    nothing = verified_pairs(*features[:3], np.zeros((0, 2), np.int64), np.random.default_rng(0))
+    nothing = verified_pairs(features[0], np.zeros((0, 2), np.int64), np.random.default_rng(0))
     _, odometry = driven(world.poses)
     assert straightened_drive(odometry, nothing) == pytest.approx(odometry, abs=1e-6)
 
 
 def test_a_reference_without_features_has_no_pairs(features):
-    starts, bearings, descriptors, _ = features
-    emptied = starts.copy()
-    emptied[1:] -= starts[1]  # the first has none
-    found = verified_pairs(
-        emptied, bearings[starts[1] :], descriptors[starts[1] :], np.array([[0, 1], [1, 2]]), np.random.default_rng(0)
-    )
+    starts, bearings, descriptors = features[0]
+    emptied = LocalViews(np.maximum(starts - starts[1], 0), bearings[starts[1] :], descriptors[starts[1] :])
+    found = verified_pairs(emptied, np.array([[0, 1], [1, 2]]), np.random.default_rng(0))
     assert found.pairs.tolist() == [[1, 2]]
 
 
@@ -91,8 +86,7 @@ def test_candidates_are_predecessors_the_most_similar_and_the_most_similar_far_a
 def test_where_a_pair_lies_is_measured_across_its_direction():
     odometry = np.column_stack([np.arange(4.0), np.zeros((4, 2))])
     verified = verified_pairs(
-        np.zeros(5, np.int64), np.zeros((0, 3)), np.zeros((0, 32), np.float32), np.zeros((0, 2), np.int64),
-        np.random.default_rng(0),
+        local_views([np.zeros((0, 3))] * 4, []), np.zeros((0, 2), np.int64), np.random.default_rng(0)
     )._replace(pairs=np.array([[0, 3]]), turns=np.array([math.radians(3.0)]), directions=np.zeros(1))  # fmt: skip
     straight = straightened_drive(odometry, verified)
     assert straight[3, 0] == pytest.approx(3.0, abs=0.1)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from landmark_world import displaced, driven, house, misplaced
+from landmark_world import displaced, driven, house, looks, misplaced
 
 from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive, adjusted_to_given
@@ -15,13 +15,9 @@ def world():
 @pytest.fixture(scope="module")
 def views(world):
     """Features by reference; a descriptor varies a little."""
-    rng = np.random.default_rng(1)
     order = np.argsort(world.references, kind="stable")
-    own = rng.normal(size=(len(world.points), 32))[world.landmarks[order]]
     starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
-    descriptors = (own + rng.normal(0.0, 0.2, own.shape)).astype(np.float32)
-    descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
-    return LocalViews(starts, world.bearings[order], descriptors)
+    return LocalViews(starts, world.bearings[order], looks(world, order, 32))
 
 
 def rows(world):
@@ -90,7 +86,7 @@ def test_images_of_a_mirrored_camera_leave_the_poses(world, views):
 @pytest.mark.parametrize("number", [0, 1, 3])
 def test_images_without_features_leave_the_poses(number):
     poses = np.random.default_rng(0).normal(size=(number, 3))
-    nothing = LocalViews(np.zeros(number + 1, np.int64), np.empty((0, 3)), np.empty((0, 32), np.float32))
+    nothing = LocalViews(np.zeros(number + 1, np.int64), np.empty((0, 3)), np.empty((0, 32), np.uint8))
     alike = [np.zeros(number, np.float32)] * number
     matches = pair_matches(nothing, neighbouring_pairs(poses, alike, 0.5))
     assert adjusted_to_given(nothing, matches, poses, seen_in(nothing)).problem

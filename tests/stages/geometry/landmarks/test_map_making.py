@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from landmark_world import NOISE, house
+from landmark_world import NOISE, house, looks
 
 from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.map_making import (
@@ -32,13 +32,9 @@ def world():
 @pytest.fixture(scope="module")
 def features(world):
     """Features of each reference, and the landmark of each; a descriptor varies a little."""
-    rng = np.random.default_rng(1)
     order = np.argsort(world.references, kind="stable")
-    looks = rng.normal(size=(len(world.points), 128))[world.landmarks[order]]
-    looks = looks + rng.normal(0.0, 0.2, looks.shape)
-    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
     cuts = np.searchsorted(world.references[order], np.arange(1, len(world.poses)))
-    views = local_views(np.split(world.bearings[order], cuts), np.split(looks.astype(np.float32), cuts))
+    views = local_views(np.split(world.bearings[order], cuts), np.split(looks(world, order), cuts))
     return views, world.landmarks[order]
 
 
@@ -95,9 +91,9 @@ def test_each_reference_has_the_landmarks_that_it_sees(features, found) -> None:
 
 def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None:
     views, _ = features
-    looks = mean_descriptors(views, found)
-    assert np.linalg.norm(looks, axis=1) == pytest.approx(1.0, abs=1e-5)
-    alike = np.einsum("od,od->o", looks[found.landmarks], views.descriptors[found.features])
+    means = mean_descriptors(views, found)
+    assert np.linalg.norm(means, axis=1) == pytest.approx(1.0, abs=1e-5)
+    alike = np.einsum("od,od->o", means[found.landmarks], views.compared(found.features))
     assert np.median(alike) > 0.97
 
 
@@ -128,9 +124,9 @@ def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(features, foun
 
 
 def test_features_of_any_length_are_put_together_also_with_images_without_any() -> None:
-    looks = [np.empty((0, 128), np.float32), np.full((2, 64), 0.1, np.float32), np.full((1, 64), 0.2, np.float32)]
-    views = local_views([np.empty((0, 3)), np.eye(3)[:2], np.eye(3)[2:]], iter(looks))
-    assert views.descriptors.tolist() == np.concatenate(looks[1:]).tolist()
+    given = [np.empty((0, 128), np.uint8), np.full((2, 64), 1, np.uint8), np.full((1, 64), 2, np.uint8)]
+    views = local_views([np.empty((0, 3)), np.eye(3)[:2], np.eye(3)[2:]], given)
+    assert views.descriptors.tolist() == np.concatenate(given[1:]).tolist()
     assert views.owners.tolist() == [1, 1, 2]
 
 
@@ -158,7 +154,7 @@ def test_similarities_by_words_are_cosines() -> None:
 
 
 def test_references_without_features_have_no_landmarks() -> None:
-    views = local_views([np.empty((0, 3))] * 2, [np.empty((0, 128), np.float32)] * 2)
+    views = local_views([np.empty((0, 3))] * 2, [np.empty((0, 128), np.uint8)] * 2)
     poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     found = triangulated(views, tracks_between(views, np.array([[0, 1]]), poses), poses)
     assert found.points.shape == (0, 3)
