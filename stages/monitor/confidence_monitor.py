@@ -18,6 +18,7 @@ from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.requests import Restart
@@ -46,10 +47,18 @@ FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 FOUND_BY_CHANCE = 0.002
 """Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
-NEW_WITHOUT = 0.5
-"""Share of an image without a pose that is new evidence: it is dark or blurred where the one before was."""
-MAX_AGAINST = 2.0
-"""Log odds that images without landmarks speak against an estimate, at most: light may have changed."""
+NEW_WITHOUT = 0.2
+"""Share of an image without a pose that is new evidence: it is blurred, or shows what has changed, where the one before
+was."""
+SURE = 0.9
+"""Probability of a pose by landmarks from which on the robot is known to be on the map."""
+MIN_FEATURES = 100
+"""Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
+MAX_AGAINST = (1.0, 6.0)
+"""Log odds that images without landmarks speak against an estimate, at most: on the map, where some of it has changed;
+and before any was found, in what may be another building."""
+FOUND_AT_FIRST = 0.95
+"""Share of drives that are found by landmarks at once, in a map whose own images all are."""
 
 
 class ConfidenceMonitorState(State):
@@ -57,7 +66,7 @@ class ConfidenceMonitorState(State):
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
-    `geometry`: log odds of right by landmarks."""
+    `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
@@ -66,12 +75,13 @@ class ConfidenceMonitorState(State):
     contradictions: Array = field(default_factory=lambda: np.zeros(0))
     contradicted: float = 0.0
     geometry: float = 0.0
+    found: bool = False
 
     def forget(self) -> None:
         """Begin anew: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
-        self.contradicted, self.geometry = 0.0, 0.0
+        self.contradicted, self.geometry, self.found = 0.0, 0.0, False
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
@@ -105,7 +115,8 @@ class ConfidenceMonitor(Stage):
 
     Landmarks say more than any similarity: a pose that many of them agree on outweighs all appearance, for or against
     the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
-    robot may be nowhere on the map.
+    robot may be nowhere on the map. So until one is found, in images that have features, appearance is not believed
+    either: it agrees with itself in another building too.
 
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
@@ -138,8 +149,10 @@ class ConfidenceMonitor(Stage):
         conflicts: Conflicts | None = None,
         restart: Restart | None = None,
         fix: LandmarkFix | None = None,
+        features: LocalFeatures | None = None,
     ) -> Out:
-        """One image, or a tick without one. `likelihood`: of the same image, for its novelty."""
+        """One image, or a tick without one. `likelihood`: of the same image, for its novelty; `features`: in which
+        landmarks were looked for."""
         if ctx.tick.first_of_log or restart is not None:
             recent.forget()
         elif motion is not None:
@@ -166,10 +179,17 @@ class ConfidenceMonitor(Stage):
             when_wrong.share, STRENGTH, KIDNAPPING_PROBABILITY,
         )  # fmt: skip
         if map.landmarks is not None:
-            novelty = float(recent.novelties[-1]) if len(recent.novelties) else 1.0
-            recent.geometry, sure = by_landmarks(
-                recent.geometry, fix, map.landmarks.found_rate, pose, (gate, radians), novelty
-            )
+            few = features is not None and len(features) < MIN_FEATURES
+            looked_for, sure = 0.0 if few else map.landmarks.found_rate, 0.0
+            if features is not None:
+                novelty = float(recent.novelties[-1]) if len(recent.novelties) else 1.0
+                most = MAX_AGAINST[0 if recent.found else 1]
+                recent.geometry, sure = by_landmarks(
+                    recent.geometry, fix, looked_for, pose, (gate, radians), novelty, most
+                )
+                recent.found |= sure >= SURE
+            if not recent.found:
+                odds = min(odds, (1.0 - looked_for) * odds) + math.log(1.0 - FOUND_AT_FIRST * looked_for)
             odds = (1.0 - sure) * odds + recent.geometry
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
@@ -178,13 +198,20 @@ class ConfidenceMonitor(Stage):
 
 
 def by_landmarks(
-    before: float, fix: LandmarkFix | None, found_rate: float, pose: Array, gate: tuple[float, float], novelty: float
+    before: float,
+    fix: LandmarkFix | None,
+    found_rate: float,
+    pose: Array,
+    gate: tuple[float, float],
+    novelty: float,
+    max_against: float,
 ) -> tuple[float, float]:
     """Log odds that an estimate (3,) is right by landmarks, after those `before`, and how sure this image's are.
 
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
-    how new the image is. Of a pose that is sure with probability p, p agrees with the estimate or not, and the rest is
-    even; it takes the place of what was known before by as much.
+    how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. Of a pose that
+    is sure with probability p, p agrees with the estimate or not, and the rest is even; it takes the place of what was
+    known before by as much.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
     probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
@@ -192,7 +219,7 @@ def by_landmarks(
     if fix is None:
         found = FOUND_OF_LEFT_OUT * found_rate
         against = min(0.0, math.log((1.0 - found) / (1.0 - FOUND_ELSEWHERE)))
-        return max(kept + NEW_WITHOUT * novelty * against, -MAX_AGAINST), 0.0
+        return max(kept + NEW_WITHOUT * novelty * against, -max_against), 0.0
     sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
     right = min(max(agreeing + 0.5 * (1.0 - sure), FOUND_BY_CHANCE), 1.0 - FOUND_BY_CHANCE)

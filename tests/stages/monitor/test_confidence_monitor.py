@@ -1,6 +1,8 @@
 """Images that agree with the estimate speak for it, others against it."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,11 +19,13 @@ from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
-from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.landmarks import LandmarkFix, Landmarks
 from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.visual_words import words_of
 
 SCALE = LengthScale(0.3)
 LINE = ReferenceGraph(
@@ -41,6 +45,9 @@ def drive(
     novelty: float = 1.0,
     elsewhere: float = 0.0,
     every: int = 2,
+    map: ReferenceGraph = LINE,
+    features: LocalFeatures | None = None,
+    fixes: Sequence[LandmarkFix | None] = (),
 ) -> list[float]:
     """Confidences along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
     all references or of every so-many-th, and the estimate follows odometry."""
@@ -58,7 +65,11 @@ def drive(
         likelihood = None if match is None else Likelihood(np.ones(500), novelty=novelty if n else 1.0)
         motion = Motion(step, 0.0, 0.0) if n else None
         wrong = WrongPoseAgreement(0.02)
-        out = monitor.step(ctx, recent, belief, belief.estimate(), LINE, SCALE, wrong, seen, likelihood, motion)
+        fix = fixes[n] if n < len(fixes) else None
+        out = monitor.step(
+            ctx, recent, belief, belief.estimate(), map, SCALE, wrong, seen, likelihood, motion,
+            features=features, fix=fix,
+        )  # fmt: skip
         told.append(out.confidence.probability)
     return told
 
@@ -253,22 +264,47 @@ def test_matches_agree_within_the_wider_of_tolerance_and_length_scale(metres: fl
     assert sure(0.5, 0.5) < sure(metres, scale) - 0.1
 
 
+def fix(x: float, probability: float) -> LandmarkFix:
+    return LandmarkFix(np.array([[x, 0.0, 0.0]]), np.eye(3)[None], np.array([50]), np.array([probability]), 60)
+
+
+def features(number: int) -> LocalFeatures:
+    rows = [np.ones((number, width), np.float32) for width in (3, 2, 3)]
+    return LocalFeatures(
+        rows[0].astype(np.float64), rows[1].astype(np.float64), np.ones((number, 128), np.uint8), rows[2],
+        np.ones(number, np.float32),
+    )  # fmt: skip
+
+
+def test_until_landmarks_are_found_matches_that_agree_are_not_believed():
+    """Images of another building agree with each other too, and have as many features."""
+    words = words_of([np.full((1, 128), 1, np.uint8)], np.ones((1, 128), np.float32))
+    landmarks = Landmarks(
+        np.zeros((1, 3), np.float32), np.zeros((1, 128), np.uint8), np.zeros(41, np.int64), np.zeros(0, np.int32),
+        0.001, words, 1.0, "",
+    )  # fmt: skip
+    map = replace(LINE, landmarks=landmarks)
+    way = list(range(20))
+    assert max(drive(way, map=map, features=features(200))) < 0.05
+    assert drive(way, map=map, features=features(10))[-1] > 0.9  # dark images show no landmarks on the map either
+    told = drive(way, map=map, features=features(200), fixes=[None, None, fix(2.0, 0.99)])
+    assert told[1] < 0.05
+    assert min(told[2:12]) > 0.9  # once found, some images without a pose change little
+
+
 def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_pose():
     here, gate = np.zeros(3), (0.5, math.radians(10.0))
 
-    def fix(x: float, probability: float) -> LandmarkFix:
-        return LandmarkFix(np.array([[x, 0.0, 0.0]]), np.eye(3)[None], np.array([50]), np.array([probability]), 60)
-
-    agreeing, sure = by_landmarks(0.0, fix(0.0, 0.99), 1.0, here, gate, 1.0)
+    agreeing, sure = by_landmarks(0.0, fix(0.0, 0.99), 1.0, here, gate, 1.0, 2.0)
     assert agreeing > 5.0
     assert sure == pytest.approx(0.99)
-    assert by_landmarks(4.0, fix(8.0, 0.99), 1.0, here, gate, 1.0)[0] < -5.0  # at once, whatever was known before
-    few = by_landmarks(0.0, fix(0.0, 0.1), 1.0, here, gate, 1.0)[0]
+    assert by_landmarks(4.0, fix(8.0, 0.99), 1.0, here, gate, 1.0, 2.0)[0] < -5.0  # at once, whatever was known before
+    few = by_landmarks(0.0, fix(0.0, 0.1), 1.0, here, gate, 1.0, 2.0)[0]
     assert 0.0 < few < 0.5
     odds = 4.0
-    for _ in range(30):
-        odds, sure = by_landmarks(odds, None, 1.0, here, gate, 1.0)
-    assert odds < -1.5  # a map of which half the images and more have a pose, and thirty without
+    for _ in range(60):
+        odds, sure = by_landmarks(odds, None, 1.0, here, gate, 1.0, 2.0)
+    assert odds < -1.5  # a map of which half the images and more have a pose, and sixty without
     assert sure == 0.0
-    assert by_landmarks(0.0, None, 0.0, here, gate, 1.0)[0] == 0.0  # of a map without landmarks nothing follows
-    assert by_landmarks(4.0, None, 1.0, here, gate, 0.0)[0] == pytest.approx(4.0)  # nor from the same image again
+    assert by_landmarks(0.0, None, 0.0, here, gate, 1.0, 2.0)[0] == 0.0  # of a map without landmarks nothing follows
+    assert by_landmarks(4.0, None, 1.0, here, gate, 0.0, 2.0)[0] == pytest.approx(4.0)  # nor from the same image again
