@@ -66,7 +66,8 @@ class ConfidenceMonitorState(State):
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
-    `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map."""
+    `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
+    then, how surely the images so far would have shown some there, 0 to 1."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
@@ -76,12 +77,13 @@ class ConfidenceMonitorState(State):
     contradicted: float = 0.0
     geometry: float = 0.0
     found: bool = False
+    missed: float = 0.0
 
     def forget(self) -> None:
         """Begin anew: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
-        self.contradicted, self.geometry, self.found = 0.0, 0.0, False
+        self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
@@ -158,17 +160,18 @@ class ConfidenceMonitor(Stage):
         elif motion is not None:
             recent.move(motion)
         pose = np.array(pose_row(estimate.pose))
-        gate, radians = max(self.within_m, length_scale.metres), math.radians(self.within_deg)
+        gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
         if similarities is not None and similarities.values.size:
             novelty = 1.0 if likelihood is None else likelihood.novelty
             distinct = share_counted(lead_of_best(similarities, map, ELSEWHERE * gate))
             against = share_counted(lead_over_pose(similarities, map, pose, ELSEWHERE * gate))
             repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
-            first = 1.0 if against > 0.5 and not repeated else novelty
+            new = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
-            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against)
+            recent.add(best_place(similarities, map), pose, new, novelty * distinct, new * against)
         elif motion is not None and (blind := math.hypot(motion.x, motion.y) / length_scale.metres) > 0.0:
-            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0)
+            new = min(1.0, blind)
+            recent.add(pose, pose, new, 0.0, 0.0)
         agreeing = consistency(recent.places, pose, gate, radians)
         disagreeing = np.maximum(
             recent.weights * (1.0 - agreeing),
@@ -179,17 +182,12 @@ class ConfidenceMonitor(Stage):
             when_wrong.share, STRENGTH, KIDNAPPING_PROBABILITY,
         )  # fmt: skip
         if map.landmarks is not None:
-            few = features is not None and len(features) < MIN_FEATURES
-            looked_for, sure = 0.0 if few else map.landmarks.found_rate, 0.0
-            if features is not None:
-                novelty = float(recent.novelties[-1]) if len(recent.novelties) else 1.0
-                most = MAX_AGAINST[0 if recent.found else 1]
-                recent.geometry, sure = by_landmarks(
-                    recent.geometry, fix, looked_for, pose, (gate, radians), novelty, most
-                )
-                recent.found |= sure >= SURE
-            if not recent.found:
-                odds = min(odds, (1.0 - looked_for) * odds) + math.log(1.0 - FOUND_AT_FIRST * looked_for)
+            few = features is None or len(features) < MIN_FEATURES
+            looked_for, most = 0.0 if few else map.landmarks.found_rate, MAX_AGAINST[0 if recent.found else 1]
+            recent.geometry, sure = by_landmarks(recent.geometry, fix, looked_for, pose, (gate, radians), new, most)
+            recent.found |= sure >= SURE
+            recent.missed = 0.0 if recent.found else max(recent.missed, looked_for)
+            odds = min(odds, (1.0 - recent.missed) * odds) + math.log(1.0 - FOUND_AT_FIRST * recent.missed)
             odds = (1.0 - sure) * odds + recent.geometry
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:

@@ -68,7 +68,7 @@ def drive(
         fix = fixes[n] if n < len(fixes) else None
         out = monitor.step(
             ctx, recent, belief, belief.estimate(), map, SCALE, wrong, seen, likelihood, motion,
-            features=features, fix=fix,
+            features=None if match is None else features, fix=fix,
         )  # fmt: skip
         told.append(out.confidence.probability)
     return told
@@ -287,6 +287,8 @@ def test_until_landmarks_are_found_matches_that_agree_are_not_believed():
     way = list(range(20))
     assert max(drive(way, map=map, features=features(200))) < 0.05
     assert drive(way, map=map, features=features(10))[-1] > 0.9  # dark images show no landmarks on the map either
+    blind = drive([*way, None, None, None], map=map, features=features(200))
+    assert max(blind) < 0.05  # nor by driving on without images
     told = drive(way, map=map, features=features(200), fixes=[None, None, fix(2.0, 0.99)])
     assert told[1] < 0.05
     assert min(told[2:12]) > 0.9  # once found, some images without a pose change little
