@@ -29,22 +29,31 @@ STOP_DISTANCE_M = 0.15
 """Free distance straight ahead at which the robot stops, metres."""
 BLOCKED_AFTER_S = 2.0
 """Time for which the robot waits for a free direction, or goes on towards a lost target, seconds."""
+DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
+"""Time for which the robot drives towards a doubtful target, seconds, and the share of its speed with which it does."""
 
 
 class FollowHomingState(State):
-    """Since when (ns) the target has been lost, and since when no direction has been free; None: not now."""
+    """Since when (ns) the target has been lost or doubtful, and since when no direction has been free; None: not now.
+
+    `searched` (ns): time for which the target with the number `target` has not been found, up to `stamp` (ns).
+    """
 
     lost_since: int | None = None
     blocked_since: int | None = None
+    target: int = -1
+    searched: int = 0
+    stamp: int = 0
 
 
 class FollowHoming(Stage):
     """Turns towards the homing vector and drives around obstacles; docks at the last view.
 
     Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
-    for a while where its distance in metres is known. Then the robot stands and is `lost`, or drives by the `wander`
-    command, if that is wired, until it sees where to go. It is `blocked` where no direction is free, or where `stalled`
-    says so. `status` gives the reason.
+    for a while where its distance in metres is known, and a doubtful one slowly, since more of it is seen from closer
+    by. Then the robot stands and is `lost`, or searches, if `wander` is wired: it drives by that command, and again for
+    a while towards what may be its target, until it is sure; after `search_s` it stands. It is `blocked` where no
+    direction is free, or where `stalled` says so. `status` gives the reason.
     """
 
     max_speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -57,6 +66,8 @@ class FollowHoming(Stage):
     """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
     wander_after_s: Annotated[float, Bounds(gt=0)] = 5.0
     """Time after which a robot whose target is lost wanders."""
+    search_s: Annotated[float, Bounds(gt=0)] = 60.0
+    """Time in all for which a target may be lost or doubtful; then the robot stands, until it has another."""
 
     class Out(Outputs):
         command: Command
@@ -78,8 +89,12 @@ class FollowHoming(Stage):
             return self._stand("arrived", "")
         if vector is None:
             return self._stand("waiting", "there is no target")
-        state.lost_since, lost_s = _since(state.lost_since, vector.state == "lost", tick)
-        if vector.state == "lost" and (lost_s >= BLOCKED_AFTER_S or vector.metres is None):
+        state.lost_since, lost_s = _since(state.lost_since, not vector.is_found, tick)
+        self._remember(state, vector, tick)
+        if not vector.is_found and state.searched >= self.search_s * 1e9:
+            ctx.count("gave_up")
+            return self._stand("lost", f"the target was not seen in {self.search_s:g} s: {vector.why}")
+        if not self._approaches(vector, lost_s):
             if wander is not None and lost_s >= self.wander_after_s:
                 ctx.count("wandered_lost")
                 return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
@@ -100,7 +115,7 @@ class FollowHoming(Stage):
             return self._stand("blocked", f"nothing is free for {LOOKAHEAD_M:g} m towards the target")
         if abs(direction) > math.radians(TURN_IN_PLACE_DEG):
             return self.Out(command=Command(0.0, self._turn(direction)), status=DrivingStatus("driving"))
-        speed *= math.cos(direction)
+        speed *= math.cos(direction) * (DOUBTFUL_SPEED if vector.state == "doubtful" else 1.0)
         if progress is None or progress.last:
             known = vector.metres is not None
             slowed = APPROACH_GAIN * left if known else self.max_speed * vector.ratio / SLOW_RATIO
@@ -110,6 +125,18 @@ class FollowHoming(Stage):
             if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(STOP_DISTANCE_M, left):
                 speed = 0.0
         return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
+
+    def _remember(self, state: FollowHomingState, vector: HomingVector, tick: Tick) -> None:
+        if vector.number != state.target:
+            state.target, state.searched, state.stamp = vector.number, 0, tick.stamp
+        state.searched += 0 if vector.is_found else tick.stamp - state.stamp
+        state.stamp = tick.stamp
+
+    def _approaches(self, vector: HomingVector, lost_s: float) -> bool:
+        """Whether the robot drives towards its target; to a doubtful one for a while, and then again as it wanders."""
+        if vector.state == "doubtful":
+            return lost_s % (self.wander_after_s + DOUBTFUL_S) < DOUBTFUL_S
+        return vector.is_found or (lost_s < BLOCKED_AFTER_S and vector.metres is not None)
 
     def _free_direction(self, vector: HomingVector, scan: Scan | None, left: float) -> tuple[float | None, float]:
         """Direction to drive (rad), None where nothing is free, and the largest speed."""

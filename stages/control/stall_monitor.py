@@ -71,7 +71,7 @@ class StallMonitor(Stage):
             state.target, state.closest = vector.number, math.inf
         if vector.ratio < CLOSER * state.closest:
             state.closest, state.stalled, state.detour, state.blocked = vector.ratio, 0, 0, 0
-        elif vector.state != "lost":
+        elif vector.is_found:
             state.stalled += elapsed
             state.detour += elapsed if self._obstructed(vector, scan) else 0
         why = ""

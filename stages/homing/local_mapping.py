@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
+from omninav.stages.geometry.two_views.epipolar import yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
 from omninav.stages.geometry.two_views.triangulation import parallax, triangulate
 from omninav.stages.values.correspondences import Correspondences
@@ -38,6 +40,14 @@ MIN_INLIERS = 6
 MIN_REBUILD_DISTANCE = 0.1
 """Distance to the target, over the features' typical distance, below which the baseline is too short for a new map."""
 
+MIN_VERIFIED_INLIERS = 14
+"""Features that must agree in each of two images before the robot relies on a target: of images of another place 13 and
+fewer do (docs/experiments/topological_nav_homing_vectors.md)."""
+MAX_DOUBTFUL_M = 0.6
+"""Way after which a doubtful map that no image has shown again is forgotten, metres."""
+MAX_HEADING_DIFFERENCE_DEG = 5.0
+"""Largest difference of the target's headings by both, degrees."""
+
 
 class Matches(NamedTuple):
     """Features that were matched with the target view: bearings and pixels here, bearings and rows there."""
@@ -52,10 +62,18 @@ NO_MATCHES = Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.ze
 
 
 class LocalMappingState(State):
-    """The local map of the tick before, and how many were made."""
+    """The local map of the tick before, and how many were made.
+
+    `heading`: by odometry, rad. Of the target with the number `target`: `doubtful`, the last such map, moved on by
+    odometry; `witness`, its heading by the last relative pose that enough features agreed with. None: there was none.
+    """
 
     map: LocalMap | None = None
     made: int = 0
+    heading: float = 0.0
+    target: int = -1
+    doubtful: LocalMap | None = None
+    witness: float | None = None
 
 
 class LocalMapping(Stage):
@@ -69,6 +87,9 @@ class LocalMapping(Stage):
     With fewer than `MIN_INLIERS` the map is rebuilt from the matches of the same tick, with the old map's scale, or the
     target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
     says the target is reached, where the two views still differ, is discarded.
+
+    A relative pose with few inliers may be one of another place that looks alike. Until `MIN_VERIFIED_INLIERS` features
+    have agreed in two images, and both with the same heading of the target, the map is `doubtful`, and is made anew.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, and the unit in
     metres is not known: the camera is the only sensor. Raises BadInput for correspondences of other features.
@@ -85,6 +106,8 @@ class LocalMapping(Stage):
     """Whether poses that samples agree on are brought to their local optimum; the paper keeps the best sample's."""
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
+    verify: bool = True
+    """Whether a second image must bear out a new map, and the target's look an arrival; in the paper none has to."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
@@ -103,18 +126,22 @@ class LocalMapping(Stage):
         motion: Motion | None = None,
     ) -> Out:
         """Locate the robot; `correspondences` are of `features` with those of the target."""
+        state.heading += 0.0 if motion is None else motion.turn
         if target is None:
             state.map = None
             return self.Out()
+        if target.number != state.target:
+            state.target, state.doubtful, state.witness = target.number, None, None
         matches = matches_with(target, features, correspondences)
         before = state.map if state.map is not None and state.map.target == target.number else None
         local_map = LocalMap(-1, target.number, "lost") if before is None else before.moved(motion)
-        state.map = self._located(ctx, state, local_map, tracks, matches)
-        if not len(state.map):
-            return self.Out(map=state.map)
-        return self.Out(map=state.map, tracks=_labelled(state.map, tracks))
+        shown = self._tracked(ctx, state, local_map, tracks, matches)
+        state.map = shown
+        if shown.state == "lost":
+            state.map, shown = self._begun(ctx, state, shown, matches, motion)
+        return self.Out(map=shown, tracks=_labelled(shown, tracks) if len(shown) else None)
 
-    def _located(
+    def _tracked(
         self,
         ctx: Context,
         state: LocalMappingState,
@@ -122,28 +149,45 @@ class LocalMapping(Stage):
         tracks: TrackedFeatures | None,
         matches: Matches,
     ) -> LocalMap:
-        """The map with the robot in it, or a new one."""
-        why = ""
-        if len(local_map):
-            fresh = matches if self.matching == "every_image" else NO_MATCHES
-            local_map = self._resection(ctx, local_map, tracks, fresh)
-            if local_map.state == "tracking":
-                if self._could_be_better(local_map, len(fresh.rows)):
-                    more = round(REBUILD_RATIO * local_map.first_inliers)
-                    new, _ = self._made(ctx, state, local_map, fresh, more)
-                    if new is not None:
-                        return new
-                if not self._contradicted(local_map, fresh):
-                    return local_map
-                ctx.count("false_map")
-                local_map = LocalMap(-1, local_map.target, "lost")
-            else:
-                why = f"{local_map.why}; "
-        new, reason = self._made(ctx, state, local_map, matches, MIN_INLIERS)
+        """The map with the robot in it, or a better one; lost where it is not known."""
+        if not len(local_map):
+            return replace(local_map, why="")
+        fresh = matches if self.matching == "every_image" else NO_MATCHES
+        local_map = self._resection(ctx, local_map, tracks, fresh)
+        if local_map.state != "tracking":
+            return replace(local_map, why=f"{local_map.why}; ")
+        if self._could_be_better(local_map, len(fresh.rows)):
+            more = round(REBUILD_RATIO * local_map.first_inliers)
+            new, _ = self._made(ctx, state, local_map, fresh, more)
+            if new is not None:
+                return new
+        if not self._contradicted(local_map, matches if self.verify else fresh):
+            return local_map
+        ctx.count("false_map")
+        state.witness = None
+        return LocalMap(-1, local_map.target, "lost")
+
+    def _begun(
+        self, ctx: Context, state: LocalMappingState, lost: LocalMap, matches: Matches, motion: Motion | None
+    ) -> tuple[LocalMap, LocalMap]:
+        """The map to go on with, and the one to show: a new one is both; a doubtful one is shown for a short way."""
+        new, reason = self._made(ctx, state, lost, matches, MIN_INLIERS)
+        if new is not None and (not self.verify or self._verified(state, new, motion is not None)):
+            state.doubtful = None
+            return new, new
+        lost = replace(lost, inliers=0, why=lost.why + reason, kinds=np.full(len(lost), LOST))
         if new is not None:
-            return new
-        ctx.count("lost_target")
-        return replace(local_map, state="lost", inliers=0, why=why + reason, kinds=np.full(len(local_map), LOST))
+            ctx.count("doubtful_map")
+            why = f"{new.inliers} of {len(matches.rows)} matches with the target view agree, as another place might"
+            state.doubtful = replace(new, state="doubtful", why=why)
+        elif state.doubtful is not None and motion is not None:
+            state.doubtful = state.doubtful.moved(motion)
+        else:
+            state.doubtful = None
+        if state.doubtful is None or math.hypot(*state.doubtful.odometry[:2]) > MAX_DOUBTFUL_M:
+            ctx.count("lost_target")
+            return lost, lost
+        return lost, state.doubtful
 
     def _resection(
         self, ctx: Context, local_map: LocalMap, tracks: TrackedFeatures | None, matches: Matches
@@ -198,12 +242,24 @@ class LocalMapping(Stage):
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn.
         near = local_map.distance() <= ARRIVAL_DISTANCE * local_map.depth()
-        if not near or local_map.inliers > len(matches.rows) / 3:
+        if not near or (not self.verify and local_map.inliers > len(matches.rows) / 3):
             return False
         turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
         chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0)
         same = np.linalg.norm(turned - matches.first, axis=1) < chord
-        return bool(np.count_nonzero(same) < len(matches.rows) / 2)
+        enough = MIN_VERIFIED_INLIERS if self.verify else 0
+        return bool(np.count_nonzero(same) < max(len(matches.rows) / 2, enough))
+
+    def _verified(self, state: LocalMappingState, new: LocalMap, with_odometry: bool) -> bool:
+        # Whether this image and one before bear each other out; without odometry they may have different headings.
+        if new.inliers < MIN_VERIFIED_INLIERS:
+            return False
+        heading, witness = state.heading + yaw_of(new.goal_rotation), state.witness
+        state.witness = heading
+        if witness is None:
+            return False
+        limit = math.radians(MAX_HEADING_DIFFERENCE_DEG)
+        return not with_odometry or abs(wrap_angle(heading - witness)) < limit
 
     def _made(
         self, ctx: Context, state: LocalMappingState, old: LocalMap, matches: Matches, min_inliers: int

@@ -71,7 +71,7 @@ class WarpingVector(Stage):
         """One homing vector; `vector`: the local map's, `target`: the image to go to."""
         if vector.number != state.target:
             state.target, state.nearness = vector.number, 0.0
-        weak = vector.state == "lost" or (vector.state == "new" and vector.inliers < MIN_FEATURES)
+        weak = not vector.is_found or (vector.state == "new" and vector.inliers < MIN_FEATURES)
         if not weak or target is None:
             return self.Out(vector=vector)
         if self._target is None or self._target[0] is not target:
@@ -81,7 +81,7 @@ class WarpingVector(Stage):
         found = warped(here, self._target[1], noise, HALF_WINDOW, 2, math.radians(self.max_turn_deg))
         if found.columns < MIN_COLUMNS:
             ctx.count("too_few_columns")
-            if vector.state == "lost":
+            if not vector.is_found:
                 why = f"{vector.why}; {found.columns} columns of the image match, {MIN_COLUMNS} are needed"
                 vector = replace(vector, why=why)
             return self.Out(vector=vector)

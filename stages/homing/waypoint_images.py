@@ -36,8 +36,9 @@ class WaypointImages(Stage):
 
     Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it lies behind and less than half of the
     way to it is left. At the last view the robot only turns, until it has the view's heading. A lost target's vector
-    does not count. `vector` is the one of the tick before, by a delayed wire. A path with another number starts again
-    at its first view. Nearness is the distance over that of a typical feature.
+    does not count; a doubtful one says that the robot is not there yet. `vector` is the one of the tick before, by a
+    delayed wire. A path with another number starts again at its first view. Nearness is the distance over that of a
+    typical feature.
     """
 
     class Out(Outputs):
@@ -61,8 +62,10 @@ class WaypointImages(Stage):
         if path.number != state.path:
             state.path, state.reached, state.docking, state.arrived = path.number, 0, False, False
             state.target += 1
-        elif vector is not None and vector.number == state.target and vector.state != "lost":
-            self._go_on(state, vector, len(path.views))
+        elif vector is not None and vector.number == state.target:
+            state.docking = state.docking and vector.state != "doubtful"
+            if vector.is_found:
+                self._go_on(state, vector, len(path.views))
         last = state.reached >= len(path.views) - 1
         progress = PathProgress(
             state.path, state.reached, len(path.views), state.target, last, state.docking, state.arrived

@@ -42,8 +42,8 @@ class HomingErrors(MetricStage):
     target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and `end`, the same as experiments
     that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost;
     `direction_error_deg` (median, p90, max), between the homing vector and the true direction of the target; `inliers`,
-    median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target
-    was not found at first. Gives nothing where there was never a vector, or no truth.
+    median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, doubtful or not, None
+    where the target was lost. Gives nothing where there was never a vector, or no truth.
     """
 
     def step(
@@ -63,11 +63,12 @@ class HomingErrors(MetricStage):
         after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:
             return self.Out()
-        found = {k: vector for k, vector in after.items() if vector.state != "lost"}
+        found = {k: vector for k, vector in after.items() if vector.is_found}
         off = {k: _errors_deg(vector, targets[k]) for k, vector in found.items()}
         far = [off[k][0] for k in off if math.hypot(*targets[k, :2]) > FROM_M]
         arrived = next((k for k, at in enumerate(progress) if at is not None and at.arrived and k > away), None)
         first = min(after)
+        at_first = None if after[first].state == "lost" else _errors_deg(after[first], targets[first])
         values = {
             "start_m": float(math.hypot(*targets[away, :2])),
             "reached": int(arrived is not None and math.hypot(*targets[arrived, :2]) <= WITHIN_M),
@@ -84,8 +85,8 @@ class HomingErrors(MetricStage):
             },
             "inliers": float(np.median([vector.inliers for vector in found.values()])) if found else None,
             "first": {
-                "direction_error_deg": off[first][0] if first in off else None,
-                "turn_error_deg": off[first][1] if first in off else None,
+                "direction_error_deg": None if at_first is None else at_first[0],
+                "turn_error_deg": None if at_first is None else at_first[1],
                 "inliers": after[first].inliers,
             },
         }

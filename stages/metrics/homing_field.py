@@ -72,7 +72,7 @@ class HomingFieldErrors(Stage):
 def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:
     """The field over poses (N, 3) of `rows`, towards the first of all."""
     directions = np.array(
-        [math.nan if vector is None or vector.state == "lost" else vector.direction for vector in vectors]
+        [math.nan if vector is None or not vector.is_found else vector.direction for vector in vectors]
     )
     targets = between(poses[list(rows)], poses[0])
     return HomingField(
@@ -85,7 +85,7 @@ def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector |
 
 
 def _turn_error(poses: Array, row: int, vector: HomingVector | None) -> float:
-    if vector is None or vector.state == "lost":
+    if vector is None or not vector.is_found:
         return math.nan
     return abs(float(wrap(vector.turn - between(poses[row], poses[0])[2])))
 

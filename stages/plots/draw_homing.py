@@ -37,7 +37,7 @@ def draw_robot_view(pixels: Pixels, snapshot: EncodedHomingView) -> Pixels:
     _features(drawn, snapshot.points * scale, snapshot.kinds)
     line = snapshot.floor_line[np.isfinite(snapshot.floor_line).all(axis=1)] * scale
     if snapshot.vector is not None and len(line) > 1 and is_known(snapshot.vector):
-        lost = snapshot.vector.state == "lost"
+        lost = not snapshot.vector.is_found
         colour = BRIGHT[LOST] if lost else VECTOR
         for shade, thick in ((DARK, 6), (colour, 3)):
             polyline(drawn, line, shade, thick)

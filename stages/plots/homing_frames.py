@@ -41,7 +41,7 @@ def draw_vector(layer: Layer, pose: Array, vector: HomingVector | None, goal: Ar
     length = 1.0 if vector.metres is None else max(vector.metres, 0.05)
     towards = pose[2] + vector.direction
     tip = pose[:2] + length * np.array([math.cos(towards), math.sin(towards)])
-    lost = vector.state == "lost"
+    lost = not vector.is_found
     layer.line(np.stack([pose[:2], tip]), "grey" if lost else "orange", 2.2, dashed=lost or vector.metres is None)
 
 
@@ -56,8 +56,8 @@ def facts(
 ) -> list[tuple[str, str]]:
     """Names and texts of the vector, the way along the path and the robot's state."""
     vector, found = snapshot.vector, []
-    if vector is not None and vector.state == "lost":
-        found.append(("homing vector", "the target is lost"))
+    if vector is not None and not vector.is_found:
+        found.append(("homing vector", f"the target is {vector.state}"))
     elif vector is not None:
         left = f"{100 * vector.ratio:.0f} % of the distance left"
         far = left if vector.metres is None else f"{vector.metres:.2f} m"

@@ -49,8 +49,8 @@ class HomingVector(Value):
     towards this target began, the same unless the map was made again. `nearness`: the distance over that of a typical
     feature; small where the two views hardly differ, from the first tick on. `metres`: the distance, where odometry has
     told the unit. `inliers`: features that agree with it. `state`: `new` (from two views), `tracking` (from the local
-    map), or `lost`, and then `why`; what is said of a lost target is what was known last, moved on by odometry where
-    there is any.
+    map), `doubtful` (from two views, and no other image has borne out yet that they show one place), or `lost`; of the
+    last two `why`. What is said of a lost target is what was known last, moved on by odometry where there is any.
     """
 
     number: int
@@ -61,8 +61,13 @@ class HomingVector(Value):
     nearness: Finite
     metres: Annotated[float | None, Bounds(ge=0)]
     inliers: Annotated[int, Bounds(ge=0)]
-    state: Literal["new", "tracking", "lost"]
+    state: Literal["new", "tracking", "doubtful", "lost"]
     why: str = ""
+
+    @property
+    def is_found(self) -> bool:
+        """Whether the target is known well enough to rely on it."""
+        return self.state in ("new", "tracking")
 
 
 LOST, TRACKED, FOUND_AGAIN, MATCHED = range(4)
@@ -92,7 +97,8 @@ class LocalMap(Value):
 
     The frame is the robot's where the map was made, the unit the distance from there to the target. `number`: another
     map has another; `target`: the number of the target it leads to. `state`: `new` (made of two views in this tick),
-    `tracking`, or `lost`, and then `why`; a lost map without features is no map.
+    `tracking`, `doubtful` (as a `HomingVector` is), or `lost`, and of the last two `why`; a lost map without features
+    is no map.
 
     `rows` (N,): the target's points; `places` (N, 3): where they are; `kinds` (N,): as in `TrackedFeatures`, LOST
     where a track contradicts the robot's pose; `points` (N, 2): pixels of MATCHED ones in the image.
@@ -104,7 +110,7 @@ class LocalMap(Value):
 
     number: int
     target: int
-    state: Literal["new", "tracking", "lost"]
+    state: Literal["new", "tracking", "doubtful", "lost"]
     inliers: int = 0
     why: str = ""
     rows: Annotated[Ints, Shape("N"), Bounds(ge=0)] = field(default_factory=lambda: np.zeros(0, np.int64))

@@ -35,9 +35,9 @@ def scan(*blocks: tuple[float, float, float]) -> Scan:
 class Robot:
     """The stages of driving, wired as in the variants, at five ticks a second."""
 
-    def __init__(self, detour_s=10.0, stalled_after_s=30.0, wander_after_s=5.0, wanders=False) -> None:
+    def __init__(self, detour_s=10.0, stalled_after_s=30.0, wander_after_s=5.0, wanders=False, search_s=60.0) -> None:
         self.monitor = StallMonitor(detour_s=detour_s, stalled_after_s=stalled_after_s)
-        self.follow, self.wanders = FollowHoming(wander_after_s=wander_after_s), wanders
+        self.follow, self.wanders = FollowHoming(wander_after_s=wander_after_s, search_s=search_s), wanders
         self.monitored, self.followed, self.wandered = StallMonitorState(), FollowHomingState(), WallAvoiderState()
         self.ticks = 0
 
@@ -153,6 +153,27 @@ def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
     assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
     assert (said[-1].status.state, said[-1].status.why) == ("lost", "it wanders: 2 of 9 matches agree")
     assert robot.drive(vector(), progress(), scan()).status.state == "driving"
+
+
+def test_towards_a_doubtful_target_it_goes_slowly_for_a_while_and_again_as_it_wanders() -> None:
+    robot = Robot(wander_after_s=5.0, wanders=True)
+    doubtful = vector(0.0, state="doubtful", why="8 of 20 matches agree")
+    said = [robot.drive(doubtful, progress(), scan()) for _ in range(60)]
+    assert [out.status.state for out in said] == ["driving"] * 25 + ["lost"] * 25 + ["driving"] * 10
+    assert {out.command.speed for out in said[:25]} == {0.2}
+    assert said[30].status.why == "it wanders: 8 of 20 matches agree"
+
+
+def test_a_search_ends_and_a_target_that_is_seen_then_is_driven_to_all_the_same() -> None:
+    robot = Robot(wander_after_s=1.0, wanders=True, search_s=4.0)
+    lost = vector(state="lost", why="2 of 9 matches agree")
+    said = [robot.drive(lost, progress(), scan()) for _ in range(30)]
+    assert [out.command.speed > 0.0 for out in said] == [False] * 5 + [True] * 15 + [False] * 10
+    assert said[-1].status.why == "the target was not seen in 4 s: 2 of 9 matches agree"
+    assert robot.drive(vector(state="doubtful"), progress(), scan()).command.speed == 0.0
+    assert robot.drive(vector(), progress(), scan()).command.speed == 0.4
+    another = HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, None, 0, "lost")
+    assert "not seen" not in robot.drive(another, progress(), scan()).status.why
 
 
 def test_a_lost_robot_stands_where_no_wander_command_is_wired() -> None:

@@ -19,7 +19,7 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, PATCH_RADIUS_PX, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
-from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
+from omninav.stages.homing.local_mapping import MIN_VERIFIED_INLIERS, LocalMapping, LocalMappingState
 from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
@@ -44,12 +44,12 @@ def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
 
 
 class Homing:
-    """The three stages of homing, wired as in the variants."""
+    """The three stages of homing, wired as in the variants; one image suffices for a map, unless `verify`."""
 
-    def __init__(self, kind: str = "mirror", seed: int = 0, **parameters) -> None:
+    def __init__(self, kind: str = "mirror", seed: int = 0, verify: bool = False, **parameters) -> None:
         self.kind, self.ctx = kind, Context("local_map", np.random.default_rng(seed))
         self.tracker, self.tracked = FeatureTracker(), FeatureTrackerState()
-        self.mapping, self.mapped = LocalMapping(**parameters), LocalMappingState()
+        self.mapping, self.mapped = LocalMapping(verify=verify, **parameters), LocalMappingState()
         self.map: LocalMap | None = None
         self.target = HomingTarget(3, described(kind, TARGET))
 
@@ -164,6 +164,53 @@ def test_a_map_that_says_the_target_is_reached_where_views_differ_is_discarded()
     assert homing.ctx.counts["false_map"] == 1
     assert (vector.state, vector.ratio) == ("new", pytest.approx(1.0))
     assert off_deg(vector, pose)[0] < 3.0
+
+
+def test_a_new_map_is_doubtful_until_a_second_image_bears_it_out() -> None:
+    homing = Homing(verify=True)
+    states = [homing.at(pose, Motion(0.0, 0.0, 0.0)).state for pose in [(4.2, 4.6, 0.4)] * 3]
+    assert states == ["doubtful", "new", "tracking"]
+
+
+def test_too_few_matches_never_bear_each_other_out() -> None:
+    homing = Homing(verify=True)
+    for _ in range(4):
+        vector = homing.at((4.2, 4.6, 0.4), share=0.25)
+        assert (vector.state, 6 <= vector.inliers < MIN_VERIFIED_INLIERS) == ("doubtful", True)
+    assert vector.why.endswith("matches with the target view agree, as another place might")
+
+
+def test_two_images_with_different_headings_of_the_target_do_not_bear_each_other_out() -> None:
+    homing, pose = Homing(verify=True), (4.2, 4.6, 0.4)
+    homing.at(pose)
+    assert homing.at(pose, Motion(0.0, 0.0, math.radians(20.0))).state == "doubtful"  # it has not turned
+    assert homing.at(pose, Motion(0.0, 0.0, 0.0)).state == "new"
+
+
+def test_another_target_has_to_be_borne_out_anew() -> None:
+    homing, pose = Homing(verify=True), (4.2, 4.6, 0.4)
+    assert [homing.at(pose).state for _ in range(2)] == ["doubtful", "new"]
+    homing.target = replace(homing.target, number=4)
+    assert homing.at(pose).state == "doubtful"
+
+
+def test_a_doubtful_target_is_remembered_for_a_short_way() -> None:
+    homing, pose = Homing(verify=True), (4.2, 4.6, 0.4)
+    homing.at(pose)
+    vector = homing.at(pose, Motion(0.5, 0.0, 0.3), matches=False)
+    assert vector.state == "doubtful"
+    assert vector.direction == pytest.approx(homing.at(pose, Motion(0.0, 0.0, 0.0), matches=False).direction)
+    assert off_deg(vector, pose)[0] == pytest.approx(math.degrees(0.3), abs=3.0)  # turned with the robot
+    assert homing.at(pose, Motion(0.2, 0.0, 0.0), matches=False).state == "lost"
+
+
+@pytest.mark.parametrize("verify", [True, False])
+def test_an_arrival_where_the_target_looks_different_is_not_believed(verify: bool) -> None:
+    homing, pose = Homing(verify=verify), (4.0, 4.2, -0.5)
+    while homing.at(pose).state == "doubtful":
+        pass
+    homing.map = homing.mapped.map = replace(homing.map, goal_translation=np.full(3, 0.01 * homing.map.depth()))
+    assert (homing.at(pose).state, homing.ctx.counts["false_map"]) == (("doubtful", 1) if verify else ("tracking", 0))
 
 
 def covered(pose) -> Image:

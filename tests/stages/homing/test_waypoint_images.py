@@ -53,6 +53,16 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
     assert out.target is None
 
 
+def test_a_robot_that_doubts_its_target_has_not_arrived() -> None:
+    path = Path()
+    path.step(path=ImagePath(5, PATH.views[:1], ("a",)))
+    step = lambda **how: path.step(vector(0, 0.005, **how), ImagePath(5, PATH.views[:1], ("a",))).progress  # noqa: E731
+    assert step().docking
+    doubtful = step(turn=0.0, state="doubtful")
+    assert (doubtful.docking, doubtful.arrived) == (False, False)
+    assert step(turn=0.0).arrived
+
+
 def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() -> None:
     path = Path()
     path.step()
