@@ -86,7 +86,9 @@ class LearnLandmarks(Stage):
         else:
             driven = map if as_driven is None else as_driven
             height = None if camera is None else camera.height
-            adjusted = adjusted_drive(views, _rows(words), driven.poses, check.seen, height, ctx.rng)
+            adjusted = adjusted_drive(
+                views, _rows(words), driven.poses, check.seen, height, ctx.rng, map.pose_source == "guess"
+            )
             poses = map.poses if adjusted.problem else adjusted.poses
             matches = pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))

@@ -31,6 +31,8 @@ COMPASS_SIGMA = math.radians(3.0)
 """Standard deviation of a turn that the compass finds between two images (rad), near walls that pass by."""
 BLIND_SIGMA = 0.5
 """Radians per second that a robot may turn where a camera sees too little of the circle for a compass."""
+VISUAL_ODOMETRY = "visual_odometry"
+"""Node that sees the motion in the images, so that none has to be guessed for what reads it."""
 
 
 class VisualCompass:
@@ -100,11 +102,13 @@ def settled_speed(ctx: Context, name: str, camera: Camera | None, speed: float |
     tick and none is given, or one makes a map of positions and the speed is 0, naming it and what to type.
     """
     maps = [] if has_truth else ctx.readers.get("odometry", [])  # with it, positions are true
-    readers = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
+    everyone = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
+    maps, readers = ([each for each in some if each != VISUAL_ODOMETRY] for some in (maps, everyone))
     if speed is None and readers:
         raise UnreadableRecording(
             f"{name} has neither odometry nor a position for every image, needed by {_listed(readers)}; type "
-            "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that needs none: "
+            "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that sees motion in the "
+            "images (omninav; of others that have a particle filter: landmarks=sift) or needs none: "
             "topological_localisation"
         )
     if maps and not speed:
@@ -112,6 +116,9 @@ def settled_speed(ctx: Context, name: str, camera: Camera | None, speed: float |
             f"{name}: with speed=0 all its images were taken at one place, and {_listed(maps)} makes a map of "
             "positions; type speed=0.5 (m/s)"
         )
+    if VISUAL_ODOMETRY in everyone:
+        ctx.warn(f"No odometry in {name}: motion is seen in the images")
+        return NOMINAL_SPEED if speed is None else speed
     if speed is None:
         ctx.warn(f"No odometry in {name}: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
         return NOMINAL_SPEED

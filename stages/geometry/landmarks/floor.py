@@ -19,6 +19,9 @@ STEPS = 501
 """Depths at which the density is evaluated."""
 MIN_PEAK = 2.0
 """Density at the floor, over the mean of that above it within `RANGE`, at least: less is furniture."""
+MIN_STEEP, LOG_STEP, LOW_PEAK = 40, 0.01, 0.3
+"""Where no scale is known: landmarks seen steeply below, at least; step of the logarithm of the depth; density of a
+depth as a part of the largest, at least."""
 MIN_LANDMARKS = 50
 """Landmarks within about a bandwidth of the floor, at least."""
 
@@ -43,3 +46,22 @@ def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, 
     if not len(above) or density[best] < max(MIN_LANDMARKS, MIN_PEAK * above.mean()):
         return None
     return float(at[best]) * height
+
+
+def lowest_plane(points: Array, poses: Array, references: Ints, landmarks: Ints) -> float | None:
+    """Depth of the floor below the cameras where nothing is known of the scale, in its own unit.
+
+    Arguments as of `floor_depth`. Nothing lies below a floor: of the depths at which many landmarks lie it is the
+    largest, with a part of them that `LOW_PEAK` bounds. None where no depth stands out.
+    """
+    distances = np.full(len(points), np.inf)
+    np.minimum.at(distances, landmarks, np.hypot(*(points[landmarks] - poses[references])[:, :2].T))
+    near = np.log(-points[(points[:, 2] < 0.0) & (distances < -NEAR * points[:, 2]), 2])
+    if len(near) < MIN_STEEP:
+        return None
+    at = np.arange(near.min(), near.max() + LOG_STEP, LOG_STEP)
+    density = np.exp(-0.5 * ((at[:, None] - near) / (2.0 * BANDWIDTH)) ** 2).sum(axis=1)
+    around = np.pad(density, 1)
+    strong = density > max(MIN_STEEP / 3.0, LOW_PEAK * density.max())
+    peaks = np.flatnonzero(strong & (density >= around[:-2]) & (density > around[2:]))
+    return float(np.exp(at[peaks[-1]])) if len(peaks) else None

@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 
 from .adjustment import Lens, Motions, adjusted
 from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
-from .floor import floor_depth
+from .floor import floor_depth, lowest_plane
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
 from .tracks import Tracks, joined_matches
 from .triangulation import triangulated_tracks
@@ -42,6 +42,9 @@ CONFIRMED_M, OUTLYING_M = 0.005, 0.02
 """Median distance by which images move poses that are exact, at most, and the distance of one that is not (m)."""
 MIN_SIGHTINGS, MIN_SHARE = 20, 0.5
 """Landmarks that a reference must see to tell where it is, and the part of all references that must see as many."""
+SEEN_LOOSENESS = (10.0, 10.0, 3.0)
+"""Factors of the standard deviations of odometry where it was seen in the images: where these show little its lengths
+are off by a third and more, and it says what the images say anyway."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
 NORMAL_MEDIAN = 0.6745
@@ -98,8 +101,9 @@ def adjusted_drive(
     seen: Seen,
     height: float | None,
     rng: np.random.Generator,
+    seen_motion: bool = False,
 ) -> AdjustedMap:
-    """Adjust the poses (R, 3) of a drive that odometry alone has measured.
+    """Adjust the poses (R, 3) of a drive that odometry alone has measured; `seen_motion`: it was seen in the images.
 
     Loops are closed by words and geometry, and odometry is one more measurement beside all bearings. `similarity`: row
     r is that of reference r to all (R,); `height`: of the camera over the floor (m), which gives the true scale where
@@ -115,7 +119,8 @@ def adjusted_drive(
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
-    motions = Motions(np.column_stack([along[:-1], along[1:]]), steps, odometry_sigmas(steps))
+    looseness = np.array(SEEN_LOOSENESS) if seen_motion else np.ones(3)
+    motions = Motions(np.column_stack([along[:-1], along[1:]]), steps, looseness * odometry_sigmas(steps))
     found = _Found(straightened_drive(odometry, verified), None)
     for miss in MISSES:
         again = _bundled(views, tracks, found, seen, miss, None, motions, None)
@@ -125,7 +130,12 @@ def adjusted_drive(
     assert found.camera is not None
     depth = None
     if height:
-        depth = floor_depth(found.points, found.poses, found.references, found.landmarks, height)
+        seen_by = found.references, found.landmarks
+        lowest = lowest_plane(found.points, found.poses, *seen_by) if seen_motion else height
+        if lowest is not None:
+            by = lowest / height
+            depth = floor_depth(found.points / by, found.poses / [by, by, 1.0], *seen_by, height)
+            depth = None if depth is None else depth * by
     scale = height / depth if height and depth is not None else None
     poses = found.poses.copy()
     poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])

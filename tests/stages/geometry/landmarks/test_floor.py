@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.landmarks.floor import floor_depth
+from omninav.stages.geometry.landmarks.floor import floor_depth, lowest_plane
 
 POSES = np.array([[5.0, 2.5, 0.0], [50.0, 0.0, 0.0]])
 
@@ -40,3 +40,12 @@ def test_landmarks_that_are_seen_from_far_away_alone_do_not_count():
     right = landmarks(np.random.default_rng(1), 0.95)
     seen_by = np.repeat([1, 0], [len(wrong), len(right)])
     assert depth(np.concatenate([wrong, right]), seen_by=seen_by) == pytest.approx(0.95, abs=0.006)
+
+
+@pytest.mark.parametrize("scale", [0.2, 1.0, 7.0])
+def test_the_lowest_plane_is_the_floor_in_any_unit(scale):
+    desk = landmarks(np.random.default_rng(1), 0.4, walls=0, on_floor=600)
+    points = np.concatenate([landmarks(np.random.default_rng(0), 0.9, walls=1000), desk]) * scale
+    seen = np.zeros(len(points), np.int64)
+    assert lowest_plane(points, POSES * scale, seen, np.arange(len(points))) == pytest.approx(0.9 * scale, rel=0.02)
+    assert lowest_plane(points[:30], POSES * scale, seen[:30], np.arange(30)) is None

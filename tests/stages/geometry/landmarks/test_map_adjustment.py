@@ -67,6 +67,15 @@ def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, vie
     assert found.scale is None
 
 
+def test_motion_seen_in_images_is_straightened_in_a_unit_of_its_own(world, views):
+    _, odometry = driven(world.poses)
+    odometry[:, :2] *= 1.7
+    found = adjusted_drive(views, rows(world), odometry, seen_in(views), None, np.random.default_rng(3), True)
+    error, factor = misplaced(found.poses, world.poses)
+    assert error < 0.02
+    assert factor == pytest.approx(1.0 / 1.7, rel=0.05)
+
+
 def test_a_drive_that_comes_back_to_no_place_stays_as_it_is(world, views):
     some = slice(0, 5)
     few = LocalViews(views.starts[:6], views.bearings[: views.starts[5]], views.descriptors[: views.starts[5]])

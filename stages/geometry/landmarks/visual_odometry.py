@@ -1,0 +1,170 @@
+"""Motion from image to image by the bearings of points that the last keyframes have triangulated."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
+
+from .adjustment import adjusted
+from .bearing_pose import TOLERANCE, matched, pose_of_bearings
+from .floor import lowest_plane
+from .map_making import LocalViews, fitting_matches, mean_descriptors, pair_matches, tracks_of, triangulated
+
+Array = npt.NDArray[np.float64]
+Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+KEYFRAMES = 6
+"""Images that are kept, and adjusted together when one is added."""
+RATIO = 0.8
+"""Largest ratio of a match's distance to that of the second nearest."""
+SIGMA = math.radians(0.1)
+"""Standard deviation of a bearing (rad)."""
+MIN_POINTS, SURE_POINTS = 8, 20
+"""Points that must agree on where an image was taken, and those below which matches of two images are asked before."""
+MIN_LENGTHS = 4
+"""Points that must agree on how far the camera moved along a direction that matches of two images tell."""
+RELATIVE_SIGMA = 0.1
+"""Standard deviation of that length, as a part of it."""
+MIN_MATCHES = 12
+"""Matches of two images that must agree on a motion, where too few points are known."""
+MIN_PARALLAX = math.radians(1.0)
+"""Median angle between matched bearings, once turned alike, from which two images tell a direction (rad)."""
+STILL = math.radians(0.15)
+"""The same below which the camera is taken to stand where the keyframe was (rad)."""
+KEYFRAME_PARALLAX = math.radians(3.0)
+"""The same from which an image becomes a keyframe (rad)."""
+MAX_FALSE_ALARMS = 1e-6
+"""Expected number of motions that as many matches agree on by chance, at most."""
+
+
+class Keyframes(NamedTuple):
+    """The last keyframes of a drive: `poses` (K, 3) in a frame of their own (m, m, rad), and `views`, their features.
+
+    `points` (L, 3): that they have triangulated, in that frame, with their mean `descriptors` (L, D); `depth`: of the
+    floor below the camera (m), None where it is not seen.
+    """
+
+    poses: Array
+    views: LocalViews
+    points: Array
+    descriptors: Floats
+    depth: float | None = None
+
+    def scaled(self, factor: float) -> "Keyframes":
+        """All lengths times a factor."""
+        depth = None if self.depth is None else factor * self.depth
+        return Keyframes(self.poses * [factor, factor, 1.0], self.views, factor * self.points, self.descriptors, depth)
+
+
+class Tracked(NamedTuple):
+    """Where an image was taken: `pose` (3,) in the keyframes' frame, `sigmas` (2,) of its place (m) and heading (rad).
+
+    `parallax`: median angle by which matched bearings moved since the last keyframe (rad). `scaled`: whether the length
+    of the motion is known; else it is 1, in the direction that was seen, or 0 where too little moved to tell any.
+    """
+
+    pose: Array
+    sigmas: tuple[float, float]
+    parallax: float
+    scaled: bool
+
+
+def begun(pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
+    """One keyframe, of whose points nothing is known."""
+    views = LocalViews(np.array([0, len(bearings)]), bearings, descriptors)
+    return Keyframes(pose[None], views, np.empty((0, 3)), np.empty((0, descriptors.shape[1]), np.float32))
+
+
+def tracked(keyframes: Keyframes, bearings: Array, descriptors: Bytes, rng: np.random.Generator) -> Tracked | None:
+    """Where an image with these features was taken; None where too few of them agree on that."""
+    last, looks = keyframes.poses[-1], root_descriptors(descriptors)
+    pairs = matched(looks, keyframes.descriptors)
+    seen, points = np.ascontiguousarray(bearings[pairs.first]), keyframes.points[pairs.second]
+    found, out = pose_of_bearings(seen, points, TOLERANCE, SIGMA, MIN_POINTS), None
+    if found is not None:
+        spread = max(found.sigma, SIGMA) * np.sqrt(np.diag(found.covariance))
+        distances = np.hypot(*(points[found.inliers] - np.append(last[:2], 0.0)).T[:2])
+        moved = float(np.hypot(*(found.pose - last)[:2]) / np.median(distances))
+        out = Tracked(found.pose, (float(np.hypot(*spread[:2])), float(spread[2])), moved, True)
+        if np.count_nonzero(found.inliers) >= SURE_POINTS:
+            return out
+    other = _from_last(keyframes, bearings, looks, seen, points, rng)
+    return other if out is None or (other is not None and other.scaled) else out
+
+
+def _from_last(
+    keyframes: Keyframes, bearings: Array, looks: Floats, seen: Array, points: Array, rng: np.random.Generator
+) -> Tracked | None:
+    """By the matches with the last keyframe, and the length by points (M, 3) that are `seen` (M, 3), if only a few."""
+    last, rows = keyframes.poses[-1], keyframes.views.rows(len(keyframes.poses) - 1)
+    pairs = mutual_nearest_units(keyframes.views.compared(rows), looks, RATIO)
+    first, second = keyframes.views.bearings[rows][pairs.first], bearings[pairs.second]
+    pose = relative_pose(first, second, rng, threshold=TOLERANCE) if len(first) >= MIN_MATCHES else None
+    if pose is None or np.count_nonzero(pose.inliers) < MIN_MATCHES:
+        return None
+    turn = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
+    moved = parallax(first[pose.inliers], second[pose.inliers], turn)
+    out = np.array([last[0], last[1], last[2] + turn])
+    if moved < MIN_PARALLAX:
+        return Tracked(out, (0.0, SIGMA), moved, False)
+    if false_alarms(pose, first, second, TOLERANCE) > MAX_FALSE_ALARMS:
+        return None
+    towards = _turned(pose.translation, last[2])
+    length = _length(towards, _turned(seen, float(out[2])), points - np.append(last[:2], 0.0))
+    out[:2] += (length or 1.0) * towards[:2] / np.hypot(*towards[:2])
+    return Tracked(out, (RELATIVE_SIGMA * (length or 1.0), SIGMA), moved, length is not None)
+
+
+def _length(towards: Array, bearings: Array, points: Array) -> float | None:
+    """How far along a direction (3,) most of a few points (M, 3) are seen along their bearings (M, 3)."""
+    across = np.cross(towards, bearings)
+    lengths = np.einsum("mi,mi->m", np.cross(points, bearings), across) / np.maximum((across**2).sum(axis=1), 1e-9)
+    rays = points - lengths[:, None, None] * towards
+    cos = np.einsum("lmi,mi->lm", rays, bearings) / np.maximum(np.linalg.norm(rays, axis=2), 1e-9)
+    agree = (cos > math.cos(TOLERANCE)) & (lengths > 0.0)[:, None]
+    best = agree[agree.sum(axis=1).argmax()] if len(agree) else np.empty(0)
+    return float(np.median(lengths[best])) if best.sum() >= MIN_LENGTHS else None
+
+
+def _turned(vectors: Array, angle: float) -> Array:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.asarray(vectors @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def parallax(first: Array, second: Array, turn: float) -> float:
+    """Median angle (rad) between matched bearings (M, 3) of two images, once the second is turned as the first."""
+    return float(np.median(np.linalg.norm(_turned(second, turn) - first, axis=1)))
+
+
+def is_keyframe(found: Tracked) -> bool:
+    """Whether an image has moved on so far that points are to be triangulated from it."""
+    return found.parallax > (KEYFRAME_PARALLAX if found.scaled else MIN_PARALLAX)
+
+
+def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
+    """The last keyframes and a new one, adjusted together with the points that they see; the first two stay."""
+    views, first = keyframes.views, max(0, len(keyframes.poses) + 1 - KEYFRAMES)
+    cut = views.starts[first]
+    views = LocalViews(
+        np.append(views.starts[first:] - cut, len(views.bearings) - cut + len(bearings)),
+        np.concatenate([views.bearings[cut:], bearings]),
+        np.concatenate([views.descriptors[cut:], descriptors]),
+    )
+    poses = np.concatenate([keyframes.poses[first:], pose[None]])
+    pairs = np.column_stack(np.triu_indices(len(poses), 1))
+    matches = pair_matches(views, pairs)
+    seen = triangulated(views, tracks_of(views, matches, fitting_matches(views, matches, poses)), poses)
+    owners = views.owners[seen.features]
+    held = np.full(poses.shape, math.inf)
+    held[:2] = 0.0
+    found = adjusted(poses, seen.points, owners, seen.landmarks, views.bearings[seen.features], SIGMA, held)
+    right = np.bincount(seen.landmarks[found.inliers], minlength=len(seen.points)) > 1
+    depth = lowest_plane(found.points, found.poses, owners, seen.landmarks)
+    return Keyframes(found.poses, views, found.points[right], mean_descriptors(views, seen)[right], depth)

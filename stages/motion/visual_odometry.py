@@ -1,0 +1,214 @@
+"""Odometry from images alone, where nothing else measured the motion."""
+
+import math
+from dataclasses import field
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
+from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.landmarks.map_making import LocalViews
+from omninav.stages.geometry.landmarks.visual_odometry import STILL, Keyframes, begun, extended, is_keyframe, tracked
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+
+Array = npt.NDArray[np.float64]
+Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+
+MAX_LOST = 5
+"""Images in a row that show no motion, after which the next one begins anew."""
+SCALE_SIGMAS = (0.03, 0.5)
+"""Standard deviation of a length, as a part of it: where the scale is known, and where it is a guess."""
+ESTIMATES = 9
+"""Estimates of the scale whose median counts."""
+SURE = 0.95
+"""Probability of a pose by the map's landmarks from which its distance to another one counts."""
+MIN_DISTANCE_M = 0.3
+"""Distance of two such poses at least, m."""
+MOVING, PACE_GAIN = 0.3, 0.2
+"""Part of the usual length that a motion must have to change what is usual, and by how much it does."""
+UNSCALED_KEYFRAMES = 30
+"""Keyframes without any estimate of the scale, after which the run says that it is not known."""
+
+
+class VisualOdometryState(State):
+    """The last keyframes (see `Keyframes`), in a frame of their own, and where the last image was taken in it (3,).
+
+    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `pace`: how much longer
+    the motion was before. `scales` (N,): estimates of what lengths are to be multiplied by; `by_map`: by the map's
+    landmarks. `anchor` (2, 2): a place in the frame of the keyframes, and in the map. `lost`: images in a row without
+    motion; `seen`: images with motion; `unscaled`: keyframes without scale.
+    """
+
+    poses: Array = field(default_factory=lambda: np.empty((0, 3)))
+    starts: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
+    descriptors: Bytes = field(default_factory=lambda: np.empty((0, 0), np.uint8))
+    points: Array = field(default_factory=lambda: np.empty((0, 3)))
+    looks: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    pose: Array = field(default_factory=lambda: np.zeros(3))
+    odometry: Array = field(default_factory=lambda: np.zeros(3))
+    length: float = 0.0
+    pace: float = 1.0
+    scales: Array = field(default_factory=lambda: np.empty(0))
+    by_map: bool = False
+    anchor: Array | None = None
+    lost: int = 0
+    seen: int = 0
+    unscaled: int = 0
+
+    @property
+    def keyframes(self) -> Keyframes:
+        """The last keyframes."""
+        return Keyframes(self.poses, LocalViews(self.starts, self.bearings, self.descriptors), self.points, self.looks)
+
+    @keyframes.setter
+    def keyframes(self, new: Keyframes) -> None:
+        self.poses, (self.starts, self.bearings, self.descriptors), self.points, self.looks = new[:4]
+        self.length = 0.0
+
+
+class VisualOdometry(Stage):
+    """Sees the motion that a source could only guess in the bearings of points around.
+
+    Not in the papers. An image's pose follows from points that the last keyframes have triangulated, so that lengths
+    are kept from image to image, and where the camera stands or turns on the spot nothing is made up. Once the points
+    have moved by a few degrees the image becomes a keyframe, and the last ones are adjusted with all that they see.
+    The true length comes from the distance of two poses by the map's landmarks (`fix`), else from the camera's height
+    over a floor that is seen; else from the guess of the source at the first motion, and the run says so. Images whose
+    motion is not seen are counted (`motion_not_seen`) and give the guessed turn alone; of the next one that is seen the
+    motion from the last is known. Motions that were measured go through as they are.
+    """
+
+    speed_m_s: Annotated[float, Bounds(ge=0, le=100)] | None = None
+    """The guessed speed as it was stated, by which images that show no motion are driven; null: they are refused."""
+
+    class Out(Outputs):
+        """The motion that was seen, and the path that it leads along."""
+
+        motion: Motion | None = None
+        odometry: Pose | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        features: LocalFeatures,
+        camera: Camera,
+        motion: Motion | None,
+        odometry: Pose | None,
+        state: VisualOdometryState,
+        fix: LandmarkFix | None = None,
+    ) -> Out:
+        """See the motion to one image; `fix`: what the map said of the image before."""
+        if motion is not None and not isinstance(motion, GuessedMotion):
+            return self.Out(motion=motion, odometry=odometry)
+        descriptors = features.descriptors
+        if motion is None:
+            _begin(state, odometry, features.bearings, descriptors)
+            return self.Out(odometry=odometry)
+        _scale_by_map(state, fix)
+        guess = math.hypot(motion.x, motion.y) or motion.sigma_m
+        state.length += guess
+        before = state.pose
+        found = tracked(state.keyframes, features.bearings, descriptors, ctx.rng)
+        if found is None:
+            seen = self._lost(ctx, state, motion, features.bearings, descriptors)
+        else:
+            state.pose, state.lost, state.seen = found.pose, 0, state.seen + 1
+            if not found.scaled:
+                away = state.length * state.pace * (found.pose[:2] - state.poses[-1, :2])
+                state.pose[:2] = state.poses[-1, :2] + away if away.any() else before[:2]
+            if is_keyframe(found):
+                keyframes = extended(state.keyframes, state.pose, features.bearings, descriptors)
+                state.keyframes, state.pose = keyframes, keyframes.poses[-1].copy()
+                if keyframes.depth is not None and camera.height and not state.by_map:
+                    state.scales = np.append(state.scales, camera.height / keyframes.depth)[-ESTIMATES:]
+                before = before * _rescale(state)
+                self._say_scale(ctx, state)
+            elif not len(state.points) and found.parallax < STILL:
+                state.keyframes = begun(state.pose, features.bearings, descriptors)  # lengths begin where it drives off
+            x, y, turn = between(before, state.pose).tolist()
+            length = math.hypot(x, y)
+            if found.scaled and length > MOVING * state.pace * guess:
+                state.pace += PACE_GAIN * (length / guess - state.pace)
+            sigma = math.hypot(SCALE_SIGMAS[int(not len(state.scales))] * length, found.sigmas[0])
+            seen = GuessedMotion(x, y, turn, sigma, found.sigmas[1])
+        state.odometry = compose(state.odometry, (seen.x, seen.y, seen.turn))
+        return self.Out(motion=seen, odometry=GuessedPose(*state.odometry.tolist()))
+
+    def _lost(
+        self, ctx: Context, state: VisualOdometryState, guess: GuessedMotion, bearings: Array, descriptors: Bytes
+    ) -> GuessedMotion:
+        ctx.count("motion_not_seen", detail=f"image {ctx.tick.frame}: too few points agree on a motion")
+        state.lost += 1
+        if not state.seen and state.lost >= MAX_LOST and self.speed_m_s is None:
+            raise BadInput(
+                f"no motion is seen in the first {state.lost} images, of which the last shows {len(bearings)} points; "
+                "take sharper, larger or brighter images, or type speed=0.5 to guess their motion (m/s)"
+            )
+        seen = GuessedMotion(0.0, 0.0, guess.turn, guess.sigma_m, guess.sigma_turn)
+        if not state.seen and self.speed_m_s is not None:
+            seen = guess  # as it was stated, for images that hold no points at all
+        state.pose = compose(state.pose, (seen.x, seen.y, seen.turn))
+        if state.lost >= MAX_LOST:
+            state.keyframes = begun(state.pose, bearings, descriptors)
+            state.lost = 0
+        return seen
+
+    def _say_scale(self, ctx: Context, state: VisualOdometryState) -> None:
+        if len(state.scales):
+            by = "the map's landmarks" if state.by_map else "the camera's height over the floor"
+            ctx.fact("scale", f"of the motion seen in the images: by {by}")
+            return
+        state.unscaled += 1
+        ctx.fact("scale", "of the motion seen in the images: by a guess of the first speed")
+        if state.unscaled == UNSCALED_KEYFRAMES:
+            ctx.warn(
+                "the true length of the motion that is seen in the images is not known, as the camera's height is not "
+                "known or no floor is seen: metres are a guess, and so are those of a map that is made of it; write "
+                "the height (m) into its camera.yaml (height: 1.2), or type the speed at the start (speed=0.5)"
+            )
+
+
+def _begin(state: VisualOdometryState, odometry: Pose | None, bearings: Array, descriptors: Bytes) -> None:
+    fresh = VisualOdometryState()
+    vars(state).update(vars(fresh))
+    if odometry is not None:
+        state.odometry = np.array([odometry.x, odometry.y, odometry.heading])
+    state.keyframes = begun(state.pose, bearings, descriptors)
+
+
+def _scale_by_map(state: VisualOdometryState, fix: LandmarkFix | None) -> None:
+    """Compare the way since an earlier pose by the map's landmarks with that between both poses."""
+    if fix is None or not len(fix) or fix.probabilities[0] < SURE:
+        return
+    here, there = state.pose[:2], fix.poses[0, :2]
+    if state.anchor is None:
+        state.anchor = np.array([here, there])
+        return
+    seen, true = np.hypot(*(np.array([here, there]) - state.anchor).T)
+    if max(seen, true) < MIN_DISTANCE_M or min(seen, true) <= 0.0:
+        return
+    if not state.by_map:
+        state.by_map, state.scales = True, np.empty(0)
+    state.anchor = np.array([here, there])
+    state.scales = np.append(state.scales, true / seen)[-ESTIMATES:]
+    _rescale(state)
+
+
+def _rescale(state: VisualOdometryState) -> Array:
+    """Bring the keyframes to the scale that most estimates agree on. Returns what poses (3,) are multiplied by."""
+    factor = float(np.median(state.scales)) if len(state.scales) else 1.0
+    state.scales = state.scales / factor
+    length = state.length
+    state.keyframes = state.keyframes.scaled(factor)
+    state.length, by = length, np.array([factor, factor, 1.0])
+    state.pose, state.pace = state.pose * by, state.pace * factor
+    if state.anchor is not None:
+        state.anchor = state.anchor * [[factor], [1.0]]
+    return by

@@ -1,0 +1,139 @@
+"""Motion that is seen in images, where only a guess of it is given."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_tour import Landmarks as Points
+
+from omninav.pipeline import BadInput, Context
+from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+
+GUESS = GuessedMotion(0.37, 0.0, 0.0, 0.5, 0.5)
+STEP_M = 0.2
+FLOOR_M = 0.9
+
+
+def room(floor: bool) -> Points:
+    rng = np.random.default_rng(0)
+    walls = rng.uniform([0, 0, 0.1], [12, 6, 2.2], (1000, 3))
+    if not floor:
+        walls[:, 2] += 0.4 * (walls[:, 2] < 0.9)
+    ground = rng.uniform([0, 0, 0], [12, 6, 0], (900 if floor else 0, 3))
+    return Points(np.concatenate([walls, ground]))
+
+
+def walk(images: int) -> np.ndarray:
+    """Poses (N, 3) along a bend, an arc to the left."""
+    poses = [np.array([2.0, 1.5, 0.0])]
+    for _ in range(images - 1):
+        poses.append(compose(poses[-1], (STEP_M, 0.0, 0.04)))
+    return np.array(poses)
+
+
+def run(points: Points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, **options):
+    """What the stage says of each image; of `hidden` ones nothing is seen."""
+    stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
+    rng, outs = np.random.default_rng(1), []
+    for number, pose in enumerate(poses):
+        features = points.seen(Pose(*pose.tolist()), 3.0)
+        bearings = features.bearings + rng.normal(0.0, math.radians(0.05), features.bearings.shape)
+        features = replace(features, bearings=bearings / np.linalg.norm(bearings, axis=1, keepdims=True))
+        if number in hidden:
+            features = none_found()
+        motion = None if number == 0 else GUESS
+        camera, fix = SimpleNamespace(height=height), None if fixes is None or not number else fixes[number - 1]
+        outs.append(stage.step(ctx, features, camera, motion, GuessedPose(0.0, 0.0, 0.0), state, fix))
+    return outs, ctx
+
+
+def path(outs) -> np.ndarray:
+    return np.array([(out.odometry.x, out.odometry.y, out.odometry.heading) for out in outs])
+
+
+def scale_of(outs, poses) -> float:
+    return float(np.hypot(*path(outs)[-1, :2]) / np.hypot(*(poses[-1] - poses[0])[:2]))
+
+
+def test_a_path_has_its_shape_and_turns_where_its_scale_is_not_known() -> None:
+    poses = walk(40)
+    outs, ctx = run(room(floor=False), poses)
+    scale = scale_of(outs, poses)
+    assert scale == pytest.approx(GUESS.x / STEP_M, rel=0.35)  # as was guessed of the first motion
+    true = between(poses[0], poses)
+    assert path(outs)[:, :2] == pytest.approx(scale * true[:, :2], abs=0.03 * scale * np.hypot(*true[-1, :2]))
+    assert path(outs)[:, 2] == pytest.approx(true[:, 2], abs=math.radians(0.5))
+    assert "guess" in ctx.facts["scale"]
+    assert outs[-1].motion.sigma_m > 0.4 * STEP_M * scale
+    assert any("camera.yaml (height: 1.2)" in sentence for sentence in ctx.warnings)
+
+
+def test_the_cameras_height_over_the_floor_gives_metres() -> None:
+    poses = walk(40)
+    outs, ctx = run(room(floor=True), poses, FLOOR_M)
+    lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[1:]])
+    assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
+    assert "floor" in ctx.facts["scale"]
+    assert not ctx.warnings
+
+
+def test_poses_by_the_maps_landmarks_give_metres() -> None:
+    poses = walk(40)
+    fixes = [
+        LandmarkFix(
+            pose[None], np.eye(3)[None], np.array([50]), np.array([0.99]), 50, np.empty((0, 3), np.float32),
+            np.empty(0, np.int8),
+        )
+        for pose in poses
+    ]  # fmt: skip
+    outs, ctx = run(room(floor=False), poses, fixes=fixes)
+    lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[1:]])
+    assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
+    assert "the map's landmarks" in ctx.facts["scale"]
+
+
+def test_a_camera_that_stands_or_turns_on_the_spot_does_not_move() -> None:
+    for turn in (0.0, 0.3):
+        drive = walk(12)
+        there = np.array([compose(drive[-1], (0.0, 0.0, turn * n)) for n in range(1, 9)])
+        outs, _ = run(room(floor=True), np.concatenate([drive, there]), FLOOR_M)
+        for out in outs[-8:]:
+            assert math.hypot(out.motion.x, out.motion.y) < 0.01
+            assert out.motion.turn == pytest.approx(turn, abs=math.radians(0.3))
+        still = np.concatenate([np.repeat(drive[:1], 8, axis=0), drive])
+        outs, _ = run(room(floor=True), still, FLOOR_M)
+        assert np.hypot(*path(outs)[7, :2]) == 0.0
+
+
+def test_images_without_points_invent_no_metres_and_the_next_one_makes_up_for_them() -> None:
+    poses = walk(30)
+    outs, ctx = run(room(floor=True), poses, FLOOR_M, hidden=(20, 21))
+    assert [(out.motion.x, out.motion.y, out.motion.sigma_m) for out in outs[20:22]] == [(0.0, 0.0, GUESS.sigma_m)] * 2
+    assert math.hypot(outs[22].motion.x, outs[22].motion.y) == pytest.approx(3 * STEP_M, abs=0.03)
+    assert ctx.counts["motion_not_seen"] == 2
+    outs, _ = run(room(floor=True), poses, FLOOR_M, hidden=range(10, 18))  # too long for that: it begins anew
+    lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[22:]])
+    assert lengths == pytest.approx(STEP_M, abs=0.03)
+
+
+def test_images_that_hold_no_points_are_refused_unless_a_speed_is_stated() -> None:
+    poses = walk(8)
+    with pytest.raises(BadInput, match=r"first 5 images, of which the last shows 0 points; .* type speed=0\.5"):
+        run(room(floor=True), poses, hidden=range(8))
+    outs, _ = run(room(floor=True), poses, hidden=range(8), speed_m_s=0.74)
+    assert all(vars(out.motion) == vars(GUESS) for out in outs[1:])
+
+
+def test_motions_that_were_measured_stay() -> None:
+    stage, state = VisualOdometry(), VisualOdometryState()
+    motion, odometry = Motion(0.1, 0.0, 0.2), Pose(3.0, 1.0, 0.0)
+    features = room(floor=True).seen(odometry)
+    out = stage.step(Context("seen"), features, SimpleNamespace(height=None), motion, odometry, state)
+    assert out.motion is motion
+    assert out.odometry is odometry
