@@ -28,9 +28,9 @@ ESTIMATES = 9
 """Estimates of the scale whose median counts."""
 SURE = 0.95
 """Probability of a pose by the map's landmarks from which its distance to another one counts."""
-MIN_DISTANCE_M = 0.3
-"""Distance of two such poses at least, m."""
-MOVING, PACE_GAIN = 0.3, 0.2
+MIN_DISTANCE_M, MAX_RATIO = 0.3, 10.0
+"""Distance of two such poses at least (m), and the largest scale that it may tell."""
+MOVING, SPEED_GAIN = 0.3, 0.2
 """Part of the usual length that a motion must have to change what is usual, and by how much it does."""
 UNSCALED_KEYFRAMES = 30
 """Keyframes without any estimate of the scale, after which the run says that it is not known."""
@@ -39,7 +39,7 @@ UNSCALED_KEYFRAMES = 30
 class VisualOdometryState(State):
     """The last keyframes (see `Keyframes`), in a frame of their own, and where the last image was taken in it (3,).
 
-    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `pace`: how much longer
+    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: how much longer
     the motion was before. `scales` (N,): estimates of what lengths are to be multiplied by; `by_map`: by the map's
     landmarks. `anchor` (2, 2): a place in the frame of the keyframes, and in the map. `lost`: images in a row without
     motion; `seen`: images with motion; `unscaled`: keyframes without scale.
@@ -54,7 +54,7 @@ class VisualOdometryState(State):
     pose: Array = field(default_factory=lambda: np.zeros(3))
     odometry: Array = field(default_factory=lambda: np.zeros(3))
     length: float = 0.0
-    pace: float = 1.0
+    speed_ratio: float = 1.0
     scales: Array = field(default_factory=lambda: np.empty(0))
     by_map: bool = False
     anchor: Array | None = None
@@ -121,7 +121,7 @@ class VisualOdometry(Stage):
         else:
             state.pose, state.lost, state.seen = found.pose, 0, state.seen + 1
             if not found.scaled:
-                away = state.length * state.pace * (found.pose[:2] - state.poses[-1, :2])
+                away = state.length * state.speed_ratio * (found.pose[:2] - state.poses[-1, :2])
                 state.pose[:2] = state.poses[-1, :2] + away if away.any() else before[:2]
             if is_keyframe(found):
                 keyframes = extended(state.keyframes, state.pose, features.bearings, descriptors)
@@ -134,8 +134,8 @@ class VisualOdometry(Stage):
                 state.keyframes = begun(state.pose, features.bearings, descriptors)  # lengths begin where it drives off
             x, y, turn = between(before, state.pose).tolist()
             length = math.hypot(x, y)
-            if found.scaled and length > MOVING * state.pace * guess:
-                state.pace += PACE_GAIN * (length / guess - state.pace)
+            if found.scaled and length > MOVING * state.speed_ratio * guess:
+                state.speed_ratio += SPEED_GAIN * (length / guess - state.speed_ratio)
             sigma = math.hypot(SCALE_SIGMAS[int(not len(state.scales))] * length, found.sigmas[0])
             seen = GuessedMotion(x, y, turn, sigma, found.sigmas[1])
         state.odometry = compose(state.odometry, (seen.x, seen.y, seen.turn))
@@ -192,11 +192,13 @@ def _scale_by_map(state: VisualOdometryState, fix: LandmarkFix | None) -> None:
         state.anchor = np.array([here, there])
         return
     seen, true = np.hypot(*(np.array([here, there]) - state.anchor).T)
-    if max(seen, true) < MIN_DISTANCE_M or min(seen, true) <= 0.0:
+    if max(seen, true) < MIN_DISTANCE_M:
+        return
+    state.anchor = np.array([here, there])
+    if min(seen, true) * MAX_RATIO < max(seen, true):  # one of both is wrong
         return
     if not state.by_map:
         state.by_map, state.scales = True, np.empty(0)
-    state.anchor = np.array([here, there])
     state.scales = np.append(state.scales, true / seen)[-ESTIMATES:]
     _rescale(state)
 
@@ -208,7 +210,7 @@ def _rescale(state: VisualOdometryState) -> Array:
     length = state.length
     state.keyframes = state.keyframes.scaled(factor)
     state.length, by = length, np.array([factor, factor, 1.0])
-    state.pose, state.pace = state.pose * by, state.pace * factor
+    state.pose, state.speed_ratio = state.pose * by, state.speed_ratio * factor
     if state.anchor is not None:
         state.anchor = state.anchor * [[factor], [1.0]]
     return by

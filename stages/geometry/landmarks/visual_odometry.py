@@ -110,7 +110,7 @@ def _from_last(
     if pose is None or np.count_nonzero(pose.inliers) < MIN_MATCHES:
         return None
     turn = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
-    moved = parallax(first[pose.inliers], second[pose.inliers], turn)
+    moved = _parallax(first[pose.inliers], second[pose.inliers], turn)
     out = np.array([last[0], last[1], last[2] + turn])
     if moved < MIN_PARALLAX:
         return Tracked(out, (0.0, SIGMA), moved, False)
@@ -138,7 +138,7 @@ def _turned(vectors: Array, angle: float) -> Array:
     return np.asarray(vectors @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def parallax(first: Array, second: Array, turn: float) -> float:
+def _parallax(first: Array, second: Array, turn: float) -> float:
     """Median angle (rad) between matched bearings (M, 3) of two images, once the second is turned as the first."""
     return float(np.median(np.linalg.norm(_turned(second, turn) - first, axis=1)))
 
