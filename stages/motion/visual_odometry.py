@@ -39,10 +39,10 @@ UNSCALED_KEYFRAMES = 30
 class VisualOdometryState(State):
     """The last keyframes (see `Keyframes`), in a frame of their own, and where the last image was taken in it (3,).
 
-    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: how much longer
-    the motion was before. `scales` (N,): estimates of what lengths are to be multiplied by; `by_map`: by the map's
-    landmarks. `anchor` (2, 2): a place in the frame of the keyframes, and in the map. `lost`: images in a row without
-    motion; `seen`: images with motion; `unscaled`: keyframes without scale.
+    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: how much
+    longer the motion was before. `scales` (N,): estimates of what lengths are to be multiplied by; `by_map`: by the
+    map's landmarks. `anchor` (2, 2): a place in the frame of the keyframes, and in the map. `lost`: images in a row
+    without motion; `seen`: images with motion; `unscaled`: keyframes without scale.
     """
 
     poses: Array = field(default_factory=lambda: np.empty((0, 3)))
@@ -131,7 +131,7 @@ class VisualOdometry(Stage):
                 before = before * _rescale(state)
                 self._say_scale(ctx, state)
             elif not len(state.points) and found.parallax < STILL:
-                state.keyframes = begun(state.pose, features.bearings, descriptors)  # lengths begin where it drives off
+                state.length = 0.0  # lengths begin where the camera moves off
             x, y, turn = between(before, state.pose).tolist()
             length = math.hypot(x, y)
             if found.scaled and length > MOVING * state.speed_ratio * guess:

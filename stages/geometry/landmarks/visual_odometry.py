@@ -36,7 +36,7 @@ MIN_MATCHES = 12
 """Matches of two images that must agree on a motion, where too few points are known."""
 MIN_PARALLAX = math.radians(1.0)
 """Median angle between matched bearings, once turned alike, from which two images tell a direction (rad)."""
-STILL = math.radians(0.15)
+STILL = math.radians(0.3)
 """The same below which the camera is taken to stand where the keyframe was (rad)."""
 KEYFRAME_PARALLAX = math.radians(3.0)
 """The same from which an image becomes a keyframe (rad)."""
