@@ -9,6 +9,7 @@ import pytest
 from made_tour import Landmarks as Points
 
 from omninav.pipeline import BadInput, Context
+from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState
@@ -37,8 +38,8 @@ def walk(images: int) -> np.ndarray:
     return np.array(poses)
 
 
-def run(points: Points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, **options):
-    """What the stage says of each image; of `hidden` ones nothing is seen."""
+def run(points: Points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, kept=False, **options):
+    """What the stage says of each image; of `hidden` ones nothing is seen. `kept`: its state goes through bytes."""
     stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
     rng, outs = np.random.default_rng(1), []
     for number, pose in enumerate(poses):
@@ -48,6 +49,10 @@ def run(points: Points, poses: np.ndarray, height: float | None = None, hidden=(
         if number in hidden:
             features = none_found()
         motion = None if number == 0 else GUESS
+        if kept:
+            fresh = VisualOdometryState()
+            restore_state(fresh, decode(encode(encode_state(state))))
+            state = fresh
         camera, fix = SimpleNamespace(height=height), None if fixes is None or not number else fixes[number - 1]
         outs.append(stage.step(ctx, features, camera, motion, GuessedPose(0.0, 0.0, 0.0), state, fix))
     return outs, ctx
@@ -128,6 +133,12 @@ def test_images_that_hold_no_points_are_refused_unless_a_speed_is_stated() -> No
         run(room(floor=True), poses, hidden=range(8))
     outs, _ = run(room(floor=True), poses, hidden=range(8), speed_m_s=0.74)
     assert all(vars(out.motion) == vars(GUESS) for out in outs[1:])
+
+
+def test_a_run_that_goes_on_from_its_saved_state_sees_the_same_to_the_last_bit() -> None:
+    poses = walk(16)
+    once, again = (run(room(floor=True), poses, FLOOR_M, hidden=(9,), kept=kept)[0] for kept in (False, True))
+    assert path(once).tobytes() == path(again).tobytes()
 
 
 def test_motions_that_were_measured_stay() -> None:
