@@ -57,6 +57,15 @@ def test_a_single_wrong_pose_among_exact_ones_is_mended_and_the_others_stay(worl
     assert misplaced(found.poses, world.poses)[0] < 0.003
 
 
+def test_exact_poses_stay_where_images_are_too_vague_to_fit_others_better(world, views):
+    rng = np.random.default_rng(5)
+    vague = views.bearings + np.radians(0.35) * rng.standard_normal(views.bearings.shape)
+    vague /= np.linalg.norm(vague, axis=1, keepdims=True)
+    found = to_given(world, views.looking_along(vague), world.poses)
+    assert not found.problem
+    assert (found.poses == world.poses).all(axis=1).mean() > 0.95
+
+
 def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, views):
     _, odometry = driven(world.poses)
     found = adjusted_drive(views, rows(world), odometry, seen_in(views), None, np.random.default_rng(3))
