@@ -23,7 +23,7 @@ from omninav.pipeline.engine import chunks as chunk_files
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.chunks import sums_of
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.stages.fusion.landmark_update import LandmarkUpdate
+from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
 from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.references import cut_references, joined_references
 from omninav.stages.sensor.landmark_pose import LandmarkPose
@@ -70,7 +70,7 @@ def used(folder: Path, files: Files) -> Any:
     belief = Particles(np.zeros((50, 3)), np.full(50, 0.02))
     return (
         fix,
-        LandmarkUpdate().step(ctx, belief, fix).belief,
+        LandmarkUpdate().step(ctx, LandmarkUpdateState(), belief, fix).belief,
         cut_references(map, np.arange(len(map)) > 0),
         joined_references([map, map], map.pose_source),
         map.moved(map.poses + 1.0),

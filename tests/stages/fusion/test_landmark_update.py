@@ -3,10 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
-from omninav.stages.fusion.landmark_update import LandmarkUpdate
+from omninav.pipeline import Context, Tick
+from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.pose import Motion
 
 HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
 SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
@@ -24,10 +26,11 @@ def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> La
     )
 
 
-def updated(now: Particles, *fixes: LandmarkFix | None, seed: int = 0) -> Particles:
-    stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed))
+def updated(now: Particles, *fixes: LandmarkFix | None, seed: int = 0, motion: Motion | None = None) -> Particles:
+    stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed), Tick(1, 0))
+    last = LandmarkUpdateState()
     for fix in fixes:
-        now = stage.step(ctx, now, fix).belief
+        now = stage.step(ctx, last, now, fix, motion).belief
     return now
 
 
@@ -93,6 +96,19 @@ def test_a_few_landmarks_where_the_map_looks_alike_do_not_move_a_belief_that_kno
     doubts = Particles(poses, np.repeat([(1.0 - 1e-4) / 500, 1e-4 / 500], 500))
     few = fix_at(THERE, probabilities=(0.15,))
     assert share_at(updated(doubts, few, few, few), HERE) > 0.9
+
+
+def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:
+    misled = [fix_at(THERE, probabilities=(0.3,))] * 8
+    standing, driving = Motion(0.0, 0.0, 0.0), Motion(2.0, 0.0, 0.0)
+    now = belief(HERE, 0.02)
+    assert share_at(updated(now, *misled, motion=standing), HERE) > 0.9
+    along = [fix_at(compose(THERE, np.array([2.0 * n, 0.0, 0.0])), probabilities=(0.3,)) for n in range(8)]
+    stage, ctx, last = LandmarkUpdate(), Context("update", np.random.default_rng(0), Tick(1, 0)), LandmarkUpdateState()
+    for n, fix in enumerate(along):
+        now = stage.step(ctx, last, now, fix, driving if n else standing).belief
+        now = Particles(compose(now.poses, np.array([2.0, 0.0, 0.0])), now.weights)
+    assert share_at(now, HERE + 8 * 2.0 * np.array([math.cos(1.0), math.sin(1.0), 0.0])) < 0.1  # each image is new
 
 
 @pytest.mark.parametrize("where", [HERE, THERE])
