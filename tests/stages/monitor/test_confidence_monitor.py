@@ -14,6 +14,7 @@ from omninav.stages.monitor.confidence_monitor import (
     best_place,
     by_landmarks,
     mass_within,
+    share_found,
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
@@ -310,3 +311,8 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     assert sure == 0.0
     assert by_landmarks(0.0, None, 0.0, here, gate, 1.0, 2.0)[0] == 0.0  # of a map without landmarks nothing follows
     assert by_landmarks(4.0, None, 1.0, here, gate, 0.0, 2.0)[0] == pytest.approx(4.0)  # nor from the same image again
+
+
+def test_landmarks_are_missed_beside_references_and_not_where_the_map_shows_nothing():
+    shares = [share_found(distance) for distance in (0.0, 2.0, 5.0, 8.0, math.inf)]
+    assert shares == pytest.approx([1.0, 0.98, 0.5, 0.01, 0.0], abs=0.01)
