@@ -48,13 +48,15 @@ FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 HALF_FOUND = 5.0
 """Distance from the nearest reference, in length scales of the map, at which half as many images have one: in offices
 and stores all do up to 1.5 m, and a third from 2 to 3 m."""
+PLACES_ALIKE = 20.0
+"""Places among which a wrong pose falls, one of which may be the estimate's: where the map looks like the image."""
 FOUND_BY_CHANCE = 0.002
 """Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
 NEW_WITHOUT = 0.2
-"""Share of an image without a pose that is new evidence: it is blurred, or shows what has changed, where the one before
-was."""
+"""Share of an image without a sure pose that is new evidence: it is blurred, or shows what has changed or misleads,
+where the one before was or did."""
 SURE = 0.9
-"""Probability of a pose by landmarks from which on the robot is known to be on the map."""
+"""Probability of a pose by landmarks, or of the estimate by all of them, from which on the robot is on the map."""
 MIN_FEATURES = 100
 """Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
 MAX_AGAINST = (1.0, 6.0)
@@ -191,7 +193,7 @@ class ConfidenceMonitor(Stage):
                 nearest = float(np.hypot(*(map.poses[:, :2] - pose[:2]).T).min(initial=math.inf))
                 looked_for *= share_found(nearest / length_scale.metres)
             recent.geometry, sure = by_landmarks(recent.geometry, fix, looked_for, pose, (gate, radians), new, most)
-            recent.found |= sure >= SURE
+            recent.found |= max(sure, 1.0 / (1.0 + math.exp(-recent.geometry))) >= SURE
             recent.missed = 0.0 if recent.found else max(recent.missed, looked_for)
             odds = min(odds, (1.0 - recent.missed) * odds) + math.log(1.0 - FOUND_AT_FIRST * recent.missed)
             odds = (1.0 - sure) * odds + recent.geometry
@@ -214,8 +216,8 @@ def by_landmarks(
 
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
     how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. Of a pose that
-    is sure with probability p, p agrees with the estimate or not, and the rest is even; it takes the place of what was
-    known before by as much.
+    is right with probability p, p agrees with the estimate or not, and takes the place of what was known before; else it
+    lies in one of `PLACES_ALIKE`, so that one of few landmarks too says something of the estimate where it is new.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
     probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
@@ -226,8 +228,11 @@ def by_landmarks(
         return max(kept + NEW_WITHOUT * novelty * against, -max_against), 0.0
     sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
-    right = min(max(agreeing + 0.5 * (1.0 - sure), FOUND_BY_CHANCE), 1.0 - FOUND_BY_CHANCE)
-    return math.log(right / (1.0 - right)) + (1.0 - sure) * kept, sure
+    by_chance = max((1.0 - sure) / PLACES_ALIKE, FOUND_BY_CHANCE)
+    told = math.log((agreeing + by_chance) / (max(sure - agreeing, 0.0) + by_chance))
+    # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
+    counted = novelty if told > 0.0 else NEW_WITHOUT * novelty
+    return (sure + (1.0 - sure) * counted) * told + (1.0 - sure) * kept, sure
 
 
 def share_found(distance: float) -> float:

@@ -9,9 +9,12 @@ from made_words import NOTHING, features_of
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
@@ -84,6 +87,35 @@ def test_an_image_that_shows_too_little_says_nothing() -> None:
     assert fix(NOTHING) is None
     assert fix(features.chosen(slice(0, 7))) is None
     assert fix(features, min_inliers=len(features) + 1) is None
+
+
+def test_points_all_in_one_spot_or_two_or_all_alike_say_nothing() -> None:
+    features = seen_from(room(), FIRST)
+    odd = (np.arange(len(features)) % 2 == 1)[:, None]
+    for bearings in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], np.where(odd, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])):
+        assert fix(replace(features, bearings=np.broadcast_to(bearings, (len(features), 3)).copy())) is None
+    assert fix(replace(features, descriptors=np.full_like(features.descriptors, 7))) is None
+    together = replace(
+        mapped_room().landmarks, points=np.tile(np.float32([3, 2, 1]), (len(mapped_room().landmarks), 1))
+    )
+    assert fix(features, replace(mapped_room(), landmarks=together)) is None
+
+
+def test_half_the_points_in_one_spot_do_not_move_the_pose() -> None:
+    features = seen_from(room(), FIRST)
+    bearings = features.bearings.copy()
+    bearings[::2] = bearings[0]
+    assert fix(replace(features, bearings=bearings)).poses[0] == pytest.approx(FIRST, abs=1e-3)
+
+
+@pytest.mark.parametrize("level", [0, 255, (10, 90, 200)])
+@pytest.mark.parametrize("size", [(64, 128), (4, 8)])
+def test_images_of_one_colour_and_of_a_few_pixels_say_nothing(level, size) -> None:
+    sift = RotationReducedSift(orientation="own", contrast=0.01, blur_px=1.0)
+    sift.setup(Context("points"))
+    image = Image(np.full((*size, 3), level, np.uint8))
+    camera = Equirectangular.of_size(size[1], size[0])
+    assert fix(sift.step(Context("points"), image, camera).features) is None
 
 
 def test_a_map_without_landmarks_says_nothing() -> None:
