@@ -98,12 +98,18 @@ def test_a_few_landmarks_where_the_map_looks_alike_do_not_move_a_belief_that_kno
     assert share_at(updated(doubts, few, few, few), HERE) > 0.9
 
 
+def test_a_pose_that_is_rather_wrong_proposes_no_place() -> None:
+    found = updated(belief(HERE), fix_at(THERE, probabilities=(0.45,)))
+    assert share_at(found, THERE, 1.0) == 0.0
+    assert share_at(updated(belief(HERE), fix_at(THERE, probabilities=(0.55,))), THERE, 1.0) > 0.0
+
+
 def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:
-    misled = [fix_at(THERE, probabilities=(0.3,))] * 8
+    misled = [fix_at(THERE, probabilities=(0.6,))] * 8
     standing, driving = Motion(0.0, 0.0, 0.0), Motion(2.0, 0.0, 0.0)
     now = belief(HERE, 0.02)
     assert share_at(updated(now, *misled, motion=standing), HERE) > 0.9
-    along = [fix_at(compose(THERE, np.array([2.0 * n, 0.0, 0.0])), probabilities=(0.3,)) for n in range(8)]
+    along = [fix_at(compose(THERE, np.array([2.0 * n, 0.0, 0.0])), probabilities=(0.6,)) for n in range(8)]
     stage, ctx, last = LandmarkUpdate(), Context("update", np.random.default_rng(0), Tick(1, 0)), LandmarkUpdateState()
     for n, fix in enumerate(along):
         now = stage.step(ctx, last, now, fix, driving if n else standing).belief
