@@ -216,8 +216,8 @@ def by_landmarks(
 
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
     how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. Of a pose that
-    is right with probability p, p agrees with the estimate or not, and takes the place of what was known before; else it
-    lies in one of `PLACES_ALIKE`, so that one of few landmarks too says something of the estimate where it is new.
+    is right with probability p, p agrees with the estimate or not, and takes the place of what was known before; else
+    it lies in one of `PLACES_ALIKE`, so that one of few landmarks too says something of the estimate where it is new.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
     probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
