@@ -15,6 +15,7 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.requests import Restart
 
 Array = npt.NDArray[np.float64]
 
@@ -71,9 +72,10 @@ class LandmarkUpdate(Stage):
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
+        restart: Restart | None = None,
     ) -> Out:
         """Fuse belief and fix."""
-        if motion is None or ctx.tick.first_of_log:
+        if motion is None or ctx.tick.first_of_log or restart is not None:
             last.poses, last.driven = np.empty((0, 3)), 0.0
         else:
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
@@ -85,9 +87,10 @@ class LandmarkUpdate(Stage):
         sure = np.minimum(fix.probabilities, 1.0 - OUTLIER_SHARE)
         unsaid = (1.0 - min(float(sure.sum()), 1.0 - OUTLIER_SHARE)) / PLACES_ALIKE
         old = belief.weights * unsaid**novelty
-        poses, weights, recovery = [belief.poses], [old], []
+        poses, weights, recovery, free = [belief.poses], [old], [], np.ones(len(belief.poses), np.bool_)
         for mean, covariance, probability in zip(fix.poses, fix.covariances, sure.tolist(), strict=True):
-            near = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL)
+            near = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL) & free
+            free &= ~near  # where two poses lie close together, a particle counts for the better one
             share = float(np.add.reduce(belief.weights[near]))
             if share > 0.0:
                 there, spread = weighted_moments(belief.poses[near], belief.weights[near])

@@ -57,13 +57,15 @@ NEW_WITHOUT = 0.2
 where the one before was or did."""
 SURE = 0.9
 """Probability of a pose by landmarks, or of the estimate by all of them, from which on the robot is on the map."""
+SURE_TOGETHER = 4.6
+"""Log odds of an estimate on which poses of fewer landmarks agree, from which on the same is known: 99 %."""
 MIN_FEATURES = 100
 """Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
 MAX_AGAINST = (1.0, 6.0)
 """Log odds that images without landmarks speak against an estimate, at most: on the map, where some of it has changed;
 and before any was found, in what may be another building."""
 FOUND_AT_FIRST = 0.95
-"""Share of drives that are found by landmarks at once, in a map whose own images all are."""
+"""Share of drives that landmarks find at once, in a map that finds all of its own left-out images."""
 
 
 class ConfidenceMonitorState(State):
@@ -193,7 +195,7 @@ class ConfidenceMonitor(Stage):
                 nearest = float(np.hypot(*(map.poses[:, :2] - pose[:2]).T).min(initial=math.inf))
                 looked_for *= share_found(nearest / length_scale.metres)
             recent.geometry, sure = by_landmarks(recent.geometry, fix, looked_for, pose, (gate, radians), new, most)
-            recent.found |= max(sure, 1.0 / (1.0 + math.exp(-recent.geometry))) >= SURE
+            recent.found |= sure >= SURE or recent.geometry >= SURE_TOGETHER
             recent.missed = 0.0 if recent.found else max(recent.missed, looked_for)
             odds = min(odds, (1.0 - recent.missed) * odds) + math.log(1.0 - FOUND_AT_FIRST * recent.missed)
             odds = (1.0 - sure) * odds + recent.geometry
@@ -225,7 +227,7 @@ def by_landmarks(
     if fix is None:
         found = FOUND_OF_LEFT_OUT * found_rate
         against = min(0.0, math.log((1.0 - found) / (1.0 - FOUND_ELSEWHERE)))
-        return max(kept + NEW_WITHOUT * novelty * against, -max_against), 0.0
+        return max(kept + NEW_WITHOUT * novelty * against, min(kept, -max_against)), 0.0
     sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
     by_chance = max((1.0 - sure) / PLACES_ALIKE, FOUND_BY_CHANCE)

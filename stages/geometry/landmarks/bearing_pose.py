@@ -40,7 +40,7 @@ ELSEWHERE = (0.5, math.radians(10.0))
 MAX_POSES = 2
 """Poses that an image may have: the best one, and its rival."""
 RIVAL_SHARE = 0.5
-"""Share of the best pose's inliers that a rival must have: with fewer it is some thousand times less probable."""
+"""Share of the best pose's inliers that a rival must have: none with fewer is looked for."""
 STEPS = 10
 """Gauss-Newton steps of the refinement."""
 

@@ -9,6 +9,7 @@ from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.requests import Restart
 
 HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
 SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
@@ -140,3 +141,13 @@ def test_chance_comes_from_the_seed_alone() -> None:
     one, other = (updated(belief(HERE), fix_at(HERE), fix_at(THERE)) for _ in range(2))
     assert one.poses.tobytes() == other.poses.tobytes()
     assert one.weights.tobytes() == other.weights.tobytes()
+
+
+def test_after_a_restart_a_standing_robot_is_found_by_the_landmarks_it_saw_before() -> None:
+    rng = np.random.default_rng(3)
+    anywhere = Particles(rng.uniform([-10.0, -10.0, -3.0], [10.0, 10.0, 3.0], (5000, 3)), np.full(5000, 1 / 5000))
+    stage, ctx, last = LandmarkUpdate(), Context("update", rng, Tick(1, 0)), LandmarkUpdateState()
+    still = Motion(0.0, 0.0, 0.0)
+    stage.step(ctx, last, anywhere, fix_at(HERE), still)
+    told = [stage.step(ctx, last, anywhere, fix_at(HERE), still, restart=again).belief for again in (None, Restart())]
+    assert share_at(told[1], HERE) > 0.5 > 5.0 * share_at(told[0], HERE)  # without, it is the same image once more

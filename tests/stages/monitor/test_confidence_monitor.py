@@ -320,3 +320,8 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
 def test_landmarks_are_missed_beside_references_and_not_where_the_map_shows_nothing():
     shares = [share_found(distance) for distance in (0.0, 2.0, 5.0, 8.0, math.inf)]
     assert shares == pytest.approx([1.0, 0.98, 0.5, 0.01, 0.0], abs=0.01)
+
+
+def test_a_dark_image_does_not_take_back_what_landmarks_said_against_an_estimate():
+    assert by_landmarks(-6.0, None, 0.0, np.zeros(3), (0.5, 0.2), 0.0, 1.0)[0] == pytest.approx(-6.0)
+    assert by_landmarks(-6.0, None, 1.0, np.zeros(3), (0.5, 0.2), 1.0, 1.0)[0] < -3.0
