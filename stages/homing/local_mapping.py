@@ -1,7 +1,7 @@
 """A local map of the features around the robot, and the robot's pose in it."""
 
 import math
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.plane.se2 import wrap_angle
+from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
 from omninav.stages.geometry.two_views.epipolar import yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
@@ -41,10 +41,13 @@ MIN_REBUILD_DISTANCE = 0.1
 """Distance to the target, over the features' typical distance, below which the baseline is too short for a new map."""
 
 MIN_VERIFIED_INLIERS = 14
-"""Features that must agree in each of two images before the robot relies on a target: of images of another place 13 and
-fewer do (docs/experiments/topological_nav_homing_vectors.md)."""
+"""Features that must agree in each of two images before the robot relies on a target: none of 3,980 pairs hidden
+behind walls has so many, but 13 of 2,420 of places with the same walls do (docs/experiments/
+topological_nav_homing_vectors.md)."""
+MIN_APART_M = 0.2
+"""Distance between the two images by odometry, metres: the same image twice would bear out the same false matches."""
 MAX_DOUBTFUL_M = 0.6
-"""Way after which a doubtful map that no image has shown again is forgotten, metres."""
+"""Way after which a doubtful map that no image has shown again, and a witness, are forgotten, metres."""
 MAX_HEADING_DIFFERENCE_DEG = 5.0
 """Largest difference of the target's headings by both, degrees."""
 
@@ -64,16 +67,18 @@ NO_MATCHES = Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.ze
 class LocalMappingState(State):
     """The local map of the tick before, and how many were made.
 
-    `heading`: by odometry, rad. Of the target with the number `target`: `doubtful`, the last such map, moved on by
-    odometry; `witness`, its heading by the last relative pose that enough features agreed with. None: there was none.
+    Of the target with the number `target`: `doubtful`, the last such map, moved on by odometry; `witness`, its heading
+    (rad) in the robot's frame by a relative pose that enough features agreed with. None: there was none. `since` (3,):
+    odometry since the witness (m, m, rad); `unseen_m`: way since the witness on which the target was not found.
     """
 
     map: LocalMap | None = None
     made: int = 0
-    heading: float = 0.0
     target: int = -1
     doubtful: LocalMap | None = None
     witness: float | None = None
+    since: Array = field(default_factory=lambda: np.zeros(3))
+    unseen_m: float = 0.0
 
 
 class LocalMapping(Stage):
@@ -89,10 +94,12 @@ class LocalMapping(Stage):
     says the target is reached, where the two views still differ, is discarded.
 
     A relative pose with few inliers may be one of another place that looks alike. Until `MIN_VERIFIED_INLIERS` features
-    have agreed in two images, and both with the same heading of the target, the map is `doubtful`, and is made anew.
+    have agreed in two images, `MIN_APART_M` apart or more, and both with the same heading of the target, the map is
+    `doubtful`, and is made anew. A target that was borne out needs one such image to be found again a short way on.
 
-    Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, and the unit in
-    metres is not known: the camera is the only sensor. Raises BadInput for correspondences of other features.
+    Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
+    metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
+    only sensor. Raises BadInput for correspondences of other features.
     """
 
     matching: Literal["every_image", "at_start"] = "every_image"
@@ -126,7 +133,10 @@ class LocalMapping(Stage):
         motion: Motion | None = None,
     ) -> Out:
         """Locate the robot; `correspondences` are of `features` with those of the target."""
-        state.heading += 0.0 if motion is None else motion.turn
+        if motion is not None:
+            state.since = compose(state.since, (motion.x, motion.y, motion.turn))
+            state.unseen_m += math.hypot(motion.x, motion.y)
+            state.witness = state.witness if state.unseen_m <= MAX_DOUBTFUL_M else None
         if target is None:
             state.map = None
             return self.Out()
@@ -139,6 +149,8 @@ class LocalMapping(Stage):
         state.map = shown
         if shown.state == "lost":
             state.map, shown = self._begun(ctx, state, shown, matches, motion)
+        if shown.state in ("new", "tracking"):
+            state.unseen_m = 0.0
         return self.Out(map=shown, tracks=_labelled(shown, tracks) if len(shown) else None)
 
     def _tracked(
@@ -251,15 +263,16 @@ class LocalMapping(Stage):
         return bool(np.count_nonzero(same) < max(len(matches.rows) / 2, enough))
 
     def _verified(self, state: LocalMappingState, new: LocalMap, with_odometry: bool) -> bool:
-        # Whether this image and one before bear each other out; without odometry they may have different headings.
+        # Whether this image and one before bear each other out; without odometry place and heading do not count.
         if new.inliers < MIN_VERIFIED_INLIERS:
             return False
-        heading, witness = state.heading + yaw_of(new.goal_rotation), state.witness
-        state.witness = heading
-        if witness is None:
-            return False
-        limit = math.radians(MAX_HEADING_DIFFERENCE_DEG)
-        return not with_odometry or abs(wrap_angle(heading - witness)) < limit
+        heading = yaw_of(new.goal_rotation)
+        if state.witness is not None:
+            off = abs(wrap_angle(state.since[2] + heading - state.witness))
+            if not with_odometry or off < math.radians(MAX_HEADING_DIFFERENCE_DEG):
+                return not with_odometry or math.hypot(*state.since[:2]) >= MIN_APART_M
+        state.witness, state.since, state.unseen_m = heading, np.zeros(3), 0.0
+        return False
 
     def _made(
         self, ctx: Context, state: LocalMappingState, old: LocalMap, matches: Matches, min_inliers: int

@@ -166,10 +166,47 @@ def test_a_map_that_says_the_target_is_reached_where_views_differ_is_discarded()
     assert off_deg(vector, pose)[0] < 3.0
 
 
-def test_a_new_map_is_doubtful_until_a_second_image_bears_it_out() -> None:
+STILL = Motion(0.0, 0.0, 0.0)
+SIDE_BY_SIDE = (4.2, 4.6, 0.4), (4.3, 4.65, 0.4), (4.4, 4.7, 0.4)
+"""Two steps of 0.11 m towards the target."""
+
+
+def on_the_way(homing: Homing, poses, before=None) -> list[str]:
+    """States of the vectors at these poses, with the motions from each to the next."""
+    states = []
+    for pose in poses:
+        motion = STILL if before is None else Motion(*(float(v) for v in between(before, pose)))
+        states.append(homing.at(pose, motion).state)
+        before = pose
+    return states
+
+
+def test_a_new_map_is_doubtful_until_an_image_from_further_on_bears_it_out() -> None:
+    assert on_the_way(Homing(verify=True), (*SIDE_BY_SIDE, (4.5, 4.75, 0.4))) == ["doubtful"] * 2 + ["new", "tracking"]
+
+
+def test_images_of_a_robot_that_stands_do_not_bear_each_other_out() -> None:
     homing = Homing(verify=True)
-    states = [homing.at(pose, Motion(0.0, 0.0, 0.0)).state for pose in [(4.2, 4.6, 0.4)] * 3]
-    assert states == ["doubtful", "new", "tracking"]
+    assert on_the_way(homing, SIDE_BY_SIDE[:1] * 6) == ["doubtful"] * 6
+    assert on_the_way(homing, SIDE_BY_SIDE[2:], before=SIDE_BY_SIDE[0]) == ["new"]
+
+
+def test_an_image_bears_out_none_from_long_after() -> None:
+    homing = Homing(verify=True)
+    homing.at(SIDE_BY_SIDE[0], STILL)
+    for way in (0.35, -0.35):  # and back
+        homing.at(SIDE_BY_SIDE[0], Motion(way, 0.0, 0.0), matches=False)
+    assert on_the_way(homing, SIDE_BY_SIDE[2:], before=SIDE_BY_SIDE[0]) == ["doubtful"]
+
+
+def test_a_target_that_was_borne_out_is_found_again_by_one_image_a_short_way_on() -> None:
+    homing, poses = Homing(verify=True), [*SIDE_BY_SIDE, *drive(5, SIDE_BY_SIDE[2], (4.8, 4.85, 0.4))[1:]]
+    on_the_way(homing, poses)
+    for lost_for, state in ((0.0, "new"), (0.7, "doubtful")):
+        homing.map = homing.mapped.map = None
+        for way in (lost_for / 2, -lost_for / 2):
+            homing.at(poses[-1], Motion(way, 0.0, 0.0), matches=False)
+        assert homing.at(poses[-1], STILL).state == state
 
 
 def test_too_few_matches_never_bear_each_other_out() -> None:
@@ -182,9 +219,10 @@ def test_too_few_matches_never_bear_each_other_out() -> None:
 
 def test_two_images_with_different_headings_of_the_target_do_not_bear_each_other_out() -> None:
     homing, pose = Homing(verify=True), (4.2, 4.6, 0.4)
-    homing.at(pose)
-    assert homing.at(pose, Motion(0.0, 0.0, math.radians(20.0))).state == "doubtful"  # it has not turned
-    assert homing.at(pose, Motion(0.0, 0.0, 0.0)).state == "new"
+    homing.at(pose, STILL)
+    x, y, _ = (float(v) for v in between(pose, SIDE_BY_SIDE[2]))
+    assert homing.at(SIDE_BY_SIDE[2], Motion(x, y, math.radians(20.0))).state == "doubtful"  # it has not turned
+    assert on_the_way(homing, [(4.6, 4.8, 0.4)], before=SIDE_BY_SIDE[2]) == ["new"]
 
 
 def test_another_target_has_to_be_borne_out_anew() -> None:
