@@ -39,7 +39,8 @@ class WarpingVector(Stage):
     Möller, Krzykawski & Gerstmayr 2010: for every direction and turn, how well do the columns of one view match those
     of the other, each at the place and magnification in which a robot that has moved so would see it, at a distance of
     its own? Columns count by how rare as good a match is. Where enough features agree, the local map's own vector
-    is given on: it is the more accurate one. The camera moves on a plane and stands upright.
+    is given on, a doubtful one too: it is the more accurate one. The vector of whole images is `new`: no second image
+    has to bear it out. The camera moves on a plane and stands upright.
 
     `ratio` is over the nearness at the target's first vector, `distance` the same; metres are not known. Raises
     BadInput for an image without its camera, and a camera that does not see the full circle.
@@ -71,7 +72,7 @@ class WarpingVector(Stage):
         """One homing vector; `vector`: the local map's, `target`: the image to go to."""
         if vector.number != state.target:
             state.target, state.nearness = vector.number, 0.0
-        weak = not vector.is_found or (vector.state == "new" and vector.inliers < MIN_FEATURES)
+        weak = vector.state == "lost" or (vector.state in ("new", "doubtful") and vector.inliers < MIN_FEATURES)
         if not weak or target is None:
             return self.Out(vector=vector)
         if self._target is None or self._target[0] is not target:

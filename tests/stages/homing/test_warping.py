@@ -56,7 +56,17 @@ def test_it_is_nearer_where_less_of_the_way_is_left():
     assert vectors[1].ratio == pytest.approx(vectors[1].nearness / vectors[0].nearness)
 
 
-@pytest.mark.parametrize(("state", "inliers", "stays"), [("tracking", 8, True), ("new", 18, True), ("new", 17, False)])
+@pytest.mark.parametrize(
+    ("state", "inliers", "stays"),
+    [
+        ("tracking", 8, True),
+        ("new", 18, True),
+        ("new", 17, False),
+        ("doubtful", 18, True),
+        ("doubtful", 17, False),
+        ("lost", 18, False),
+    ],
+)
 def test_a_vector_on_which_enough_features_agree_is_given_on(state: str, inliers: int, stays: bool):
     given = replace(LOST, state=state, inliers=inliers, why="")
     assert (vector(WarpingVector(), seen((4.4, 4.6, 2.0)), seen(TARGET), given) is given) == stays
