@@ -34,16 +34,15 @@ DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
 
 
 class FollowHomingState(State):
-    """Since when (ns) the target has been lost or doubtful, and since when no direction has been free; None: not now.
+    """Since when (ns) targets have been lost or doubtful, and since when no direction has been free; None: not now.
 
-    `searched` (ns): time for which the target with the number `target` has not been found, up to `stamp` (ns).
+    `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone.
     """
 
     lost_since: int | None = None
     blocked_since: int | None = None
     target: int = -1
-    searched: int = 0
-    stamp: int = 0
+    sought_since: int | None = None
 
 
 class FollowHoming(Stage):
@@ -51,9 +50,9 @@ class FollowHoming(Stage):
 
     Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
     for a while where its distance in metres is known, and a doubtful one slowly, since more of it is seen from closer
-    by. Then the robot stands and is `lost`, or searches, if `wander` is wired: it drives by that command, and again for
-    a while towards what may be its target, until it is sure; after `search_s` it stands. It is `blocked` where no
-    direction is free, or where `stalled` says so. `status` gives the reason.
+    by. Then the robot is `lost` until it is sure of its target: it stands, or searches, if `wander` is wired: it drives
+    by that command, and again for a while towards what may be its target. After `search_s` without a break it stands.
+    It is `blocked` where no direction is free, or where `stalled` says so. `status` gives the reason.
     """
 
     max_speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -67,7 +66,8 @@ class FollowHoming(Stage):
     wander_after_s: Annotated[float, Bounds(gt=0)] = 5.0
     """Time after which a robot whose target is lost wanders."""
     search_s: Annotated[float, Bounds(gt=0)] = 60.0
-    """Time in all for which a target may be lost or doubtful; then the robot stands, until it has another."""
+    """Time without a break for which a target may be lost or doubtful; then the robot stands, until it is sure of it
+    again or has another."""
 
     class Out(Outputs):
         command: Command
@@ -90,17 +90,22 @@ class FollowHoming(Stage):
         if vector is None:
             return self._stand("waiting", "there is no target")
         state.lost_since, lost_s = _since(state.lost_since, not vector.is_found, tick)
-        self._remember(state, vector, tick)
-        if not vector.is_found and state.searched >= self.search_s * 1e9:
+        if vector.number != state.target:
+            state.target, state.sought_since = vector.number, None
+        state.sought_since, sought_s = _since(state.sought_since, not vector.is_found, tick)
+        if sought_s >= self.search_s:
             ctx.count("gave_up")
             return self._stand("lost", f"the target was not seen in {self.search_s:g} s: {vector.why}")
-        if not self._approaches(vector, lost_s):
+        if not self._approaches(vector, lost_s, sought_s):
             if wander is not None and lost_s >= self.wander_after_s:
                 ctx.count("wandered_lost")
                 return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
             ctx.count("stood_lost")
             return self._stand("lost", vector.why)
-        if progress is not None and progress.docking:
+        moving = DrivingStatus("driving")
+        if sought_s >= DOUBTFUL_S:  # a planner that waits for the target must not begin to wait again
+            moving = DrivingStatus("lost", f"it drives towards what may be its target: {vector.why}")
+        elif progress is not None and progress.docking:
             return self.Out(command=Command(0.0, self._turn(vector.turn)), status=DrivingStatus("docking"))
         if stalled is not None:
             ctx.count("stood_blocked")
@@ -110,11 +115,12 @@ class FollowHoming(Stage):
         state.blocked_since, blocked_s = _since(state.blocked_since, direction is None, tick)
         if direction is None:
             if blocked_s < BLOCKED_AFTER_S:  # somebody may be passing by
-                return self._stand("driving", "waiting for a way through")
+                why = "waiting for a way through"
+                return self._stand(moving.state, f"{moving.why}; {why}" if moving.why else why)
             ctx.count("stood_blocked")
             return self._stand("blocked", f"nothing is free for {LOOKAHEAD_M:g} m towards the target")
         if abs(direction) > math.radians(TURN_IN_PLACE_DEG):
-            return self.Out(command=Command(0.0, self._turn(direction)), status=DrivingStatus("driving"))
+            return self.Out(command=Command(0.0, self._turn(direction)), status=moving)
         speed *= math.cos(direction) * (DOUBTFUL_SPEED if vector.state == "doubtful" else 1.0)
         if progress is None or progress.last:
             known = vector.metres is not None
@@ -124,18 +130,12 @@ class FollowHoming(Stage):
             ranges = np.minimum(scan.ranges, scan.farthest)
             if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(STOP_DISTANCE_M, left):
                 speed = 0.0
-        return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
+        return self.Out(command=Command(speed, self._turn(direction)), status=moving)
 
-    def _remember(self, state: FollowHomingState, vector: HomingVector, tick: Tick) -> None:
-        if vector.number != state.target:
-            state.target, state.searched, state.stamp = vector.number, 0, tick.stamp
-        state.searched += 0 if vector.is_found else tick.stamp - state.stamp
-        state.stamp = tick.stamp
-
-    def _approaches(self, vector: HomingVector, lost_s: float) -> bool:
+    def _approaches(self, vector: HomingVector, lost_s: float, sought_s: float) -> bool:
         """Whether the robot drives towards its target; to a doubtful one for a while, and then again as it wanders."""
         if vector.state == "doubtful":
-            return lost_s % (self.wander_after_s + DOUBTFUL_S) < DOUBTFUL_S
+            return sought_s % (self.wander_after_s + DOUBTFUL_S) < DOUBTFUL_S
         return vector.is_found or (lost_s < BLOCKED_AFTER_S and vector.metres is not None)
 
     def _free_direction(self, vector: HomingVector, scan: Scan | None, left: float) -> tuple[float | None, float]:
@@ -154,7 +154,7 @@ class FollowHoming(Stage):
     def _turn(self, angle: float) -> float:
         return max(-self.max_angular_speed, min(self.max_angular_speed, HEADING_GAIN * angle))
 
-    def _stand(self, state: Literal["waiting", "driving", "arrived", "lost", "blocked"], why: str) -> Out:
+    def _stand(self, state: Literal["waiting", "driving", "docking", "arrived", "lost", "blocked"], why: str) -> Out:
         return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))
 
 

@@ -159,9 +159,19 @@ def test_towards_a_doubtful_target_it_goes_slowly_for_a_while_and_again_as_it_wa
     robot = Robot(wander_after_s=5.0, wanders=True)
     doubtful = vector(0.0, state="doubtful", why="8 of 20 matches agree")
     said = [robot.drive(doubtful, progress(), scan()) for _ in range(60)]
-    assert [out.status.state for out in said] == ["driving"] * 25 + ["lost"] * 25 + ["driving"] * 10
-    assert {out.command.speed for out in said[:25]} == {0.2}
+    assert [out.status.state for out in said] == ["driving"] * 25 + ["lost"] * 35  # a planner waits from then on
+    assert {out.command.speed for out in said[:25] + said[50:]} == {0.2}
     assert said[30].status.why == "it wanders: 8 of 20 matches agree"
+    assert said[50].status.why == "it drives towards what may be its target: 8 of 20 matches agree"
+    another = HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, None, 8, "doubtful")
+    assert robot.drive(another, progress(), scan()).status.state == "driving"
+
+
+def test_a_target_that_is_lost_now_and_then_is_not_given_up() -> None:
+    robot = Robot(wanders=True, search_s=4.0)
+    lost = vector(state="lost", why="2 of 9 matches agree")
+    said = [robot.drive(vector() if tick % 5 else lost, progress(), scan()) for tick in range(200)]
+    assert not any("not seen" in out.status.why for out in said)
 
 
 def test_a_search_ends_and_a_target_that_is_seen_then_is_driven_to_all_the_same() -> None:
