@@ -20,7 +20,7 @@ QUANTITIES = {
     "homing.reached": Quantity(title="Target reached", unit="%", better="higher", least=1.0),
     "homing.arrived": Quantity(title="Arrival reported", unit="%", better="higher"),
     "homing.time_s": Quantity(title="Time until arrival", better="lower", absent="never"),
-    "homing.lost_rate": Quantity(title="Images in which the target was lost", better="lower"),
+    "homing.lost_rate": Quantity(title="Images in which the target was lost or doubtful", better="lower"),
     "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
     "homing.start_m": Quantity(title="Distance to the target at the start", context=True),
 }
@@ -40,10 +40,10 @@ class HomingErrors(MetricStage):
     It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
     how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `WITHIN_M` of the
     target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and `end`, the same as experiments
-    that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost;
-    `direction_error_deg` (median, p90, max), between the homing vector and the true direction of the target; `inliers`,
-    median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, doubtful or not, None
-    where the target was lost. Gives nothing where there was never a vector, or no truth.
+    that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost or
+    doubtful; `direction_error_deg` (median, p90, max), between the homing vector and the true direction of the target;
+    `inliers`, median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, doubtful or
+    not, None where the target was lost. Gives nothing where there was never a vector, or no truth.
     """
 
     def step(
