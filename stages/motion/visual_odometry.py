@@ -21,7 +21,7 @@ Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
 
 MAX_LOST = 5
-"""Images in a row that show no motion, after which the next one begins anew."""
+"""Images in a row that show no motion, from which on each begins anew."""
 SCALE_SIGMAS = (0.03, 0.5)
 """Standard deviation of a length, as a part of it: where the scale is known, and where it is a guess."""
 ESTIMATES = 9
@@ -30,6 +30,8 @@ SURE = 0.95
 """Probability of a pose by the map's landmarks from which its distance to another one counts."""
 MIN_DISTANCE_M, MAX_RATIO = 0.3, 10.0
 """Distance of two such poses at least (m), and the largest scale that it may tell."""
+AGREEING, MAX_SPREAD = 3, 1.2
+"""Such scales in a row that must agree before they count, and the largest ratio of two of them that do."""
 MOVING, SPEED_GAIN = 0.3, 0.2
 """Part of the usual length that a motion must have to change what is usual, and by how much it does."""
 UNSCALED_KEYFRAMES = 30
@@ -39,10 +41,11 @@ UNSCALED_KEYFRAMES = 30
 class VisualOdometryState(State):
     """The last keyframes (see `Keyframes`), in a frame of their own, and where the last image was taken in it (3,).
 
-    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: how much
-    longer the motion was before. `scales` (N,): estimates of what lengths are to be multiplied by; `by_map`: by the
-    map's landmarks. `anchor` (2, 2): a place in the frame of the keyframes, and in the map. `lost`: images in a row
-    without motion; `seen`: images with motion; `unscaled`: keyframes without scale.
+    `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: length
+    seen over length guessed, of late. `scales` (N,): estimates of what lengths are to be multiplied by, and
+    `map_scales` (M,): those of the map's landmarks, which count alone once they agree (`by_map`). `anchor` (2, 2): a
+    place in the frame of the keyframes, and in the map. `lost`: images in a row without motion; `seen`: images with
+    motion; `unscaled`: keyframes without scale.
     """
 
     poses: Array = field(default_factory=lambda: np.empty((0, 3)))
@@ -56,6 +59,7 @@ class VisualOdometryState(State):
     length: float = 0.0
     speed_ratio: float = 1.0
     scales: Array = field(default_factory=lambda: np.empty(0))
+    map_scales: Array = field(default_factory=lambda: np.empty(0))
     by_map: bool = False
     anchor: Array | None = None
     lost: int = 0
@@ -69,7 +73,7 @@ class VisualOdometryState(State):
 
     @keyframes.setter
     def keyframes(self, new: Keyframes) -> None:
-        self.poses, (self.starts, self.bearings, self.descriptors), self.points, self.looks = new[:4]
+        self.poses, (self.starts, self.bearings, self.descriptors), self.points, self.looks = new
         self.length = 0.0
 
 
@@ -81,12 +85,13 @@ class VisualOdometry(Stage):
     have moved by a few degrees the image becomes a keyframe, and the last ones are adjusted with all that they see.
     The true length comes from the distance of two poses by the map's landmarks (`fix`), else from the camera's height
     over a floor that is seen; else from the guess of the source at the first motion, and the run says so. Images whose
-    motion is not seen are counted (`motion_not_seen`) and give the guessed turn alone; of the next one that is seen the
-    motion from the last is known. Motions that were measured go through as they are.
+    motion is not seen are counted (`motion_not_seen`) and go on by the usual step with the guessed turn, as uncertain
+    as a guess; the next one that is seen corrects it. Motions that were measured go through as they are.
     """
 
     speed_m_s: Annotated[float, Bounds(ge=0, le=100)] | None = None
-    """The guessed speed as it was stated, by which images that show no motion are driven; null: they are refused."""
+    """The guessed speed as it was stated, by which a log is driven whose images show no motion from the start; null and
+    0: such a log is refused if it is the first."""
 
     class Out(Outputs):
         """The motion that was seen, and the path that it leads along."""
@@ -114,50 +119,62 @@ class VisualOdometry(Stage):
         _scale_by_map(state, fix)
         guess = math.hypot(motion.x, motion.y) or motion.sigma_m
         state.length += guess
-        before = state.pose
+        before, usual = state.pose, state.speed_ratio * guess
         found = tracked(state.keyframes, features.bearings, descriptors, ctx.rng)
         if found is None:
-            seen = self._lost(ctx, state, motion, features.bearings, descriptors)
+            seen = self._lost(ctx, state, motion, usual, features.bearings, descriptors)
         else:
-            state.pose, state.lost, state.seen = found.pose, 0, state.seen + 1
+            lost, state.lost, state.seen, state.pose = state.lost, 0, state.seen + 1, found.pose
+            unit = 1.0 if found.scaled else state.speed_ratio * state.length
             if not found.scaled:
-                away = state.length * state.speed_ratio * (found.pose[:2] - state.poses[-1, :2])
-                state.pose[:2] = state.poses[-1, :2] + away if away.any() else before[:2]
+                away = unit * (found.pose[:2] - state.poses[-1, :2])
+                stood = state.poses[-1, :2] if lost else before[:2]
+                state.pose[:2] = state.poses[-1, :2] + away if away.any() else stood
+                unit = unit if away.any() else usual
+            known = found.scaled and len(state.scales) > 0
             if is_keyframe(found):
-                keyframes = extended(state.keyframes, state.pose, features.bearings, descriptors)
+                keyframes, depth = extended(state.keyframes, state.pose, features.bearings, descriptors)
                 state.keyframes, state.pose = keyframes, keyframes.poses[-1].copy()
-                if keyframes.depth is not None and camera.height and not state.by_map:
-                    state.scales = np.append(state.scales, camera.height / keyframes.depth)[-ESTIMATES:]
-                before = before * _rescale(state)
+                if depth is not None and camera.height and not state.by_map:
+                    state.scales = np.append(state.scales, camera.height / depth)[-ESTIMATES:]
+                by = _rescale(state)
+                before, unit = before * by, unit * by[0]
                 self._say_scale(ctx, state)
             elif not len(state.points) and found.parallax < STILL:
                 state.length = 0.0  # lengths begin where the camera moves off
             x, y, turn = between(before, state.pose).tolist()
             length = math.hypot(x, y)
-            if found.scaled and length > MOVING * state.speed_ratio * guess:
+            if found.scaled and not lost and length > MOVING * state.speed_ratio * guess:
                 state.speed_ratio += SPEED_GAIN * (length / guess - state.speed_ratio)
-            sigma = math.hypot(SCALE_SIGMAS[int(not len(state.scales))] * length, found.sigmas[0])
+            sigma = math.hypot(SCALE_SIGMAS[int(not known)] * length, unit * found.sigmas[0])
             seen = GuessedMotion(x, y, turn, sigma, found.sigmas[1])
         state.odometry = compose(state.odometry, (seen.x, seen.y, seen.turn))
         return self.Out(motion=seen, odometry=GuessedPose(*state.odometry.tolist()))
 
     def _lost(
-        self, ctx: Context, state: VisualOdometryState, guess: GuessedMotion, bearings: Array, descriptors: Bytes
+        self,
+        ctx: Context,
+        state: VisualOdometryState,
+        guess: GuessedMotion,
+        usual: float,
+        bearings: Array,
+        descriptors: Bytes,
     ) -> GuessedMotion:
         ctx.count("motion_not_seen", detail=f"image {ctx.tick.frame}: too few points agree on a motion")
         state.lost += 1
-        if not state.seen and state.lost >= MAX_LOST and self.speed_m_s is None:
+        if not (state.seen or self.speed_m_s or ctx.tick.log) and state.lost >= MAX_LOST:
             raise BadInput(
                 f"no motion is seen in the first {state.lost} images, of which the last shows {len(bearings)} points; "
                 "take sharper, larger or brighter images, or type speed=0.5 to guess their motion (m/s)"
             )
-        seen = GuessedMotion(0.0, 0.0, guess.turn, guess.sigma_m, guess.sigma_turn)
-        if not state.seen and self.speed_m_s is not None:
-            seen = guess  # as it was stated, for images that hold no points at all
-        state.pose = compose(state.pose, (seen.x, seen.y, seen.turn))
+        seen = guess
+        if state.seen:  # else as it was stated, for images that hold no points at all
+            x, y = usual * math.cos(guess.turn / 2), usual * math.sin(guess.turn / 2)
+            seen = GuessedMotion(x, y, guess.turn, max(usual, guess.sigma_m), guess.sigma_turn)
+        state.pose, state.anchor = compose(state.pose, (seen.x, seen.y, seen.turn)), None
         if state.lost >= MAX_LOST:
             state.keyframes = begun(state.pose, bearings, descriptors)
-            state.lost = 0
+            state.scales, state.map_scales, state.by_map = np.empty(0), np.empty(0), False
         return seen
 
     def _say_scale(self, ctx: Context, state: VisualOdometryState) -> None:
@@ -166,12 +183,12 @@ class VisualOdometry(Stage):
             ctx.fact("scale", f"of the motion seen in the images: by {by}")
             return
         state.unscaled += 1
-        ctx.fact("scale", "of the motion seen in the images: by a guess of the first speed")
+        ctx.fact("scale", "of the motion seen in the images: by a guess of the speed")
         if state.unscaled == UNSCALED_KEYFRAMES:
             ctx.warn(
-                "the true length of the motion that is seen in the images is not known, as the camera's height is not "
-                "known or no floor is seen: metres are a guess, and so are those of a map that is made of it; write "
-                "the height (m) into its camera.yaml (height: 1.2), or type the speed at the start (speed=0.5)"
+                "the true length of the motion that is seen in the images is not known so far, as the camera's height "
+                "is not known or no floor is seen: metres are a guess, and so are those of a map that is made of it; "
+                "write the height (m) into its camera.yaml (height: 1.2), or type the speed at the start (speed=0.5)"
             )
 
 
@@ -197,16 +214,18 @@ def _scale_by_map(state: VisualOdometryState, fix: LandmarkFix | None) -> None:
     state.anchor = np.array([here, there])
     if min(seen, true) * MAX_RATIO < max(seen, true):  # one of both is wrong
         return
-    if not state.by_map:
-        state.by_map, state.scales = True, np.empty(0)
-    state.scales = np.append(state.scales, true / seen)[-ESTIMATES:]
-    _rescale(state)
+    state.map_scales = np.append(state.map_scales, true / seen)[-ESTIMATES:]
+    last = state.map_scales[-AGREEING:]
+    state.by_map = state.by_map or (len(last) == AGREEING and last.max() < MAX_SPREAD * last.min())
+    if state.by_map:
+        state.scales = state.map_scales
+        _rescale(state)
 
 
 def _rescale(state: VisualOdometryState) -> Array:
     """Bring the keyframes to the scale that most estimates agree on. Returns what poses (3,) are multiplied by."""
     factor = float(np.median(state.scales)) if len(state.scales) else 1.0
-    state.scales = state.scales / factor
+    state.scales, state.map_scales = state.scales / factor, state.map_scales / factor
     length = state.length
     state.keyframes = state.keyframes.scaled(factor)
     state.length, by = length, np.array([factor, factor, 1.0])

@@ -69,7 +69,7 @@ PoseSource = Literal["truth", "odometry", "guess", "estimate"]
 SOURCE_WORDS: dict[PoseSource, str] = {
     "truth": "ground truth",
     "odometry": "odometry",
-    "guess": "guessed motion",
+    "guess": "motion guessed or seen in the images",
     "estimate": "the robot's own estimates",
 }
 """Each source, as a sentence has it."""

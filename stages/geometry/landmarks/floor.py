@@ -19,9 +19,13 @@ STEPS = 501
 """Depths at which the density is evaluated."""
 MIN_PEAK = 2.0
 """Density at the floor, over the mean of that above it within `RANGE`, at least: less is furniture."""
-MIN_STEEP, LOG_STEP, LOW_PEAK = 40, 0.01, 0.3
-"""Where no scale is known: landmarks seen steeply below, at least; step of the logarithm of the depth; density of a
-depth as a part of the largest, at least."""
+MIN_STEEP = 40
+"""Landmarks seen steeply below, at least, where no scale is known."""
+LOG_STEP = 0.01
+"""Step of the logarithm of the depth there."""
+LOW_PEAK = 0.7
+"""Density of a depth below the densest one, as a part of its density, from which the floor lies there: a table may hold
+as many landmarks as the floor, and what a polished floor mirrors holds fewer."""
 MIN_LANDMARKS = 50
 """Landmarks within about a bandwidth of the floor, at least."""
 
@@ -33,9 +37,7 @@ def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, 
     scale; `references`, `landmarks` (O,): of each sighting; `height`: of the camera over the floor, as it is known. A
     map times `height` / depth has its true size. None where no depth stands out, as on a floor without texture.
     """
-    distances = np.full(len(points), np.inf)
-    np.minimum.at(distances, landmarks, np.hypot(*(points[landmarks] - poses[references])[:, :2].T))
-    depths = -points[distances < NEAR * height, 2] / height
+    depths = -points[_distances(points, poses, references, landmarks) < NEAR * height, 2] / height
     near = depths[np.abs(depths - 1.0) < RANGE + 3.0 * BANDWIDTH]
     if len(near) < MIN_LANDMARKS:
         return None
@@ -51,11 +53,10 @@ def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, 
 def lowest_plane(points: Array, poses: Array, references: Ints, landmarks: Ints) -> float | None:
     """Depth of the floor below the cameras where nothing is known of the scale, in its own unit.
 
-    Arguments as of `floor_depth`. Nothing lies below a floor: of the depths at which many landmarks lie it is the
-    largest, with a part of them that `LOW_PEAK` bounds. None where no depth stands out.
+    Arguments as of `floor_depth`. Little is seen below a floor: of the depths at which most landmarks lie, or nearly as
+    many (`LOW_PEAK`), it is the largest. None where no depth stands out.
     """
-    distances = np.full(len(points), np.inf)
-    np.minimum.at(distances, landmarks, np.hypot(*(points[landmarks] - poses[references])[:, :2].T))
+    distances = _distances(points, poses, references, landmarks)
     near = np.log(-points[(points[:, 2] < 0.0) & (distances < -NEAR * points[:, 2]), 2])
     if len(near) < MIN_STEEP:
         return None
@@ -65,3 +66,10 @@ def lowest_plane(points: Array, poses: Array, references: Ints, landmarks: Ints)
     strong = density > max(MIN_STEEP / 3.0, LOW_PEAK * density.max())
     peaks = np.flatnonzero(strong & (density >= around[:-2]) & (density > around[2:]))
     return float(np.exp(at[peaks[-1]])) if len(peaks) else None
+
+
+def _distances(points: Array, poses: Array, references: Ints, landmarks: Ints) -> Array:
+    """Horizontal distance (L,) of each landmark from the nearest reference that sees it."""
+    distances = np.full(len(points), np.inf)
+    np.minimum.at(distances, landmarks, np.hypot(*(points[landmarks] - poses[references])[:, :2].T))
+    return distances

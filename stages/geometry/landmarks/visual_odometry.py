@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
 from .adjustment import adjusted
@@ -27,7 +28,7 @@ RATIO = 0.8
 SIGMA = math.radians(0.1)
 """Standard deviation of a bearing (rad)."""
 MIN_POINTS, SURE_POINTS = 8, 20
-"""Points that must agree on where an image was taken, and those below which matches of two images are asked before."""
+"""Points that must agree on where an image was taken, and number of them below which matches of two images go first."""
 MIN_LENGTHS = 4
 """Points that must agree on how far the camera moved along a direction that matches of two images tell."""
 RELATIVE_SIGMA = 0.1
@@ -47,27 +48,25 @@ MAX_FALSE_ALARMS = 1e-6
 class Keyframes(NamedTuple):
     """The last keyframes of a drive: `poses` (K, 3) in a frame of their own (m, m, rad), and `views`, their features.
 
-    `points` (L, 3): that they have triangulated, in that frame, with their mean `descriptors` (L, D); `depth`: of the
-    floor below the camera (m), None where it is not seen.
+    `points` (L, 3): that they have triangulated, in that frame, with their mean `descriptors` (L, D).
     """
 
     poses: Array
     views: LocalViews
     points: Array
     descriptors: Floats
-    depth: float | None = None
 
     def scaled(self, factor: float) -> "Keyframes":
         """All lengths times a factor."""
-        depth = None if self.depth is None else factor * self.depth
-        return Keyframes(self.poses * [factor, factor, 1.0], self.views, factor * self.points, self.descriptors, depth)
+        return Keyframes(self.poses * [factor, factor, 1.0], self.views, factor * self.points, self.descriptors)
 
 
 class Tracked(NamedTuple):
     """Where an image was taken: `pose` (3,) in the keyframes' frame, `sigmas` (2,) of its place (m) and heading (rad).
 
     `parallax`: median angle by which matched bearings moved since the last keyframe (rad). `scaled`: whether the length
-    of the motion is known; else it is 1, in the direction that was seen, or 0 where too little moved to tell any.
+    of the motion is known; else it is 1, in the direction that was seen, or 0 where too little moved to tell any, and
+    the place's sigma is a part of the usual length.
     """
 
     pose: Array
@@ -109,11 +108,11 @@ def _from_last(
     pose = relative_pose(first, second, rng, threshold=TOLERANCE) if len(first) >= MIN_MATCHES else None
     if pose is None or np.count_nonzero(pose.inliers) < MIN_MATCHES:
         return None
-    turn = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
+    turn = yaw_of(pose.rotation)
     moved = _parallax(first[pose.inliers], second[pose.inliers], turn)
     out = np.array([last[0], last[1], last[2] + turn])
     if moved < MIN_PARALLAX:
-        return Tracked(out, (0.0, SIGMA), moved, False)
+        return Tracked(out, (moved / KEYFRAME_PARALLAX, SIGMA), moved, False)
     if false_alarms(pose, first, second, TOLERANCE) > MAX_FALSE_ALARMS:
         return None
     towards = _turned(pose.translation, last[2])
@@ -134,8 +133,7 @@ def _length(towards: Array, bearings: Array, points: Array) -> float | None:
 
 
 def _turned(vectors: Array, angle: float) -> Array:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.asarray(vectors @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]))
+    return np.asarray(vectors @ turn_about_vertical(angle).T)
 
 
 def _parallax(first: Array, second: Array, turn: float) -> float:
@@ -148,8 +146,11 @@ def is_keyframe(found: Tracked) -> bool:
     return found.parallax > (KEYFRAME_PARALLAX if found.scaled else MIN_PARALLAX)
 
 
-def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
-    """The last keyframes and a new one, adjusted together with the points that they see; the first two stay."""
+def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: Bytes) -> tuple[Keyframes, float | None]:
+    """The last keyframes and a new one, adjusted together with the points that they see; the first two stay.
+
+    With them the depth of the floor below the camera, in their unit; None where it is not seen.
+    """
     views, first = keyframes.views, max(0, len(keyframes.poses) + 1 - KEYFRAMES)
     cut = views.starts[first]
     views = LocalViews(
@@ -167,4 +168,4 @@ def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: By
     found = adjusted(poses, seen.points, owners, seen.landmarks, views.bearings[seen.features], SIGMA, held)
     right = np.bincount(seen.landmarks[found.inliers], minlength=len(seen.points)) > 1
     depth = lowest_plane(found.points, found.poses, owners, seen.landmarks)
-    return Keyframes(found.poses, views, found.points[right], mean_descriptors(views, seen)[right], depth)
+    return Keyframes(found.poses, views, found.points[right], mean_descriptors(views, seen)[right]), depth

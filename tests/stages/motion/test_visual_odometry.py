@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_tour import Landmarks as Points
 
-from omninav.pipeline import BadInput, Context
+from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.plane.se2 import between, compose
@@ -38,10 +38,10 @@ def walk(images: int) -> np.ndarray:
     return np.array(poses)
 
 
-def run(points: Points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, kept=False, **options):
+def run(points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, kept=False, log=0, **options):
     """What the stage says of each image; of `hidden` ones nothing is seen. `kept`: its state goes through bytes."""
     stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
-    rng, outs = np.random.default_rng(1), []
+    rng, outs, ctx.tick = np.random.default_rng(1), [], Tick(0, 0, log)
     for number, pose in enumerate(poses):
         features = points.seen(Pose(*pose.tolist()), 3.0)
         bearings = features.bearings + rng.normal(0.0, math.radians(0.05), features.bearings.shape)
@@ -88,19 +88,27 @@ def test_the_cameras_height_over_the_floor_gives_metres() -> None:
     assert not ctx.warnings
 
 
+def fix_at(pose: np.ndarray) -> LandmarkFix:
+    return LandmarkFix(
+        pose[None], np.eye(3)[None], np.array([50]), np.array([0.99]), 50, np.empty((0, 3), np.float32),
+        np.empty(0, np.int8),
+    )  # fmt: skip
+
+
 def test_poses_by_the_maps_landmarks_give_metres() -> None:
     poses = walk(40)
-    fixes = [
-        LandmarkFix(
-            pose[None], np.eye(3)[None], np.array([50]), np.array([0.99]), 50, np.empty((0, 3), np.float32),
-            np.empty(0, np.int8),
-        )
-        for pose in poses
-    ]  # fmt: skip
-    outs, ctx = run(room(floor=False), poses, fixes=fixes)
+    outs, ctx = run(room(floor=False), poses, fixes=[fix_at(pose) for pose in poses])
     lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[1:]])
     assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
     assert "the map's landmarks" in ctx.facts["scale"]
+
+
+def test_one_jump_of_these_poses_gives_no_scale() -> None:
+    poses = walk(20)
+    fixes: list[LandmarkFix | None] = [None] * len(poses)
+    fixes[5], fixes[9] = fix_at(poses[5]), fix_at(poses[9] + [2.0, 0.0, 0.0])
+    once, again = run(room(floor=False), poses, fixes=fixes)[0], run(room(floor=False), poses)[0]
+    assert path(once).tobytes() == path(again).tobytes()
 
 
 def test_a_camera_that_stands_or_turns_on_the_spot_does_not_move() -> None:
@@ -114,23 +122,39 @@ def test_a_camera_that_stands_or_turns_on_the_spot_does_not_move() -> None:
         still = np.concatenate([np.repeat(drive[:1], 8, axis=0), drive])
         outs, _ = run(room(floor=True), still, FLOOR_M)
         assert np.hypot(*path(outs)[7, :2]) == 0.0
+        assert all(0.0 < out.motion.sigma_m < 0.1 for out in outs[1:8])
 
 
-def test_images_without_points_invent_no_metres_and_the_next_one_makes_up_for_them() -> None:
-    poses = walk(30)
-    outs, ctx = run(room(floor=True), poses, FLOOR_M, hidden=(20, 21))
-    assert [(out.motion.x, out.motion.y, out.motion.sigma_m) for out in outs[20:22]] == [(0.0, 0.0, GUESS.sigma_m)] * 2
-    assert math.hypot(outs[22].motion.x, outs[22].motion.y) == pytest.approx(3 * STEP_M, abs=0.03)
-    assert ctx.counts["motion_not_seen"] == 2
-    outs, _ = run(room(floor=True), poses, FLOOR_M, hidden=range(10, 18))  # too long for that: it begins anew
-    lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[22:]])
-    assert lengths == pytest.approx(STEP_M, abs=0.03)
+def test_images_without_points_go_on_by_the_usual_step_and_the_next_one_corrects_it() -> None:
+    drive = walk(30)
+    stood = np.concatenate([drive[:20], np.repeat(drive[19:20], 4, axis=0), drive[20:]])
+    for poses, hidden in ((drive, (20, 21)), (stood, (20, 21, 22, 27))):
+        outs, ctx = run(room(floor=True), poses, FLOOR_M, hidden=hidden)
+        for number in hidden:
+            assert outs[number].motion.x == pytest.approx(STEP_M, abs=0.02)
+            assert outs[number].motion.sigma_m == GUESS.sigma_m
+        assert path(outs)[24, :2] == pytest.approx(between(poses[0], poses)[24, :2], abs=0.06)
+        assert ctx.counts["motion_not_seen"] == len(hidden)
+
+
+def test_after_too_many_images_without_points_the_scale_is_found_anew() -> None:
+    poses = [*walk(18)]
+    for _ in range(30):
+        poses.append(compose(poses[-1], (STEP_M / 2, 0.0, 0.02)))
+    outs, _ = run(room(floor=True), np.array(poses), FLOOR_M, hidden=range(10, 18))
+    lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[1:]])
+    sigmas = np.array([out.motion.sigma_m for out in outs[1:]])
+    assert sigmas[18] == pytest.approx(0.51 * lengths[18], rel=0.01)  # not taken for known
+    assert lengths[18:] == pytest.approx(STEP_M / 2, abs=0.015)
 
 
 def test_images_that_hold_no_points_are_refused_unless_a_speed_is_stated() -> None:
     poses = walk(8)
     with pytest.raises(BadInput, match=r"first 5 images, of which the last shows 0 points; .* type speed=0\.5"):
         run(room(floor=True), poses, hidden=range(8))
+    with pytest.raises(BadInput, match=r"no motion is seen .* type speed=0\.5"):
+        run(room(floor=True), poses, hidden=range(8), speed_m_s=0.0)
+    assert run(room(floor=True), poses, hidden=range(8), log=1)[1].counts["motion_not_seen"] == 7
     outs, _ = run(room(floor=True), poses, hidden=range(8), speed_m_s=0.74)
     assert all(vars(out.motion) == vars(GUESS) for out in outs[1:])
 

@@ -49,3 +49,10 @@ def test_the_lowest_plane_is_the_floor_in_any_unit(scale):
     seen = np.zeros(len(points), np.int64)
     assert lowest_plane(points, POSES * scale, seen, np.arange(len(points))) == pytest.approx(0.9 * scale, rel=0.02)
     assert lowest_plane(points[:30], POSES * scale, seen[:30], np.arange(30)) is None
+
+
+def test_what_a_polished_floor_mirrors_is_not_the_floor():
+    mirrored = landmarks(np.random.default_rng(1), 2.5, walls=0, on_floor=200)
+    points = np.concatenate([landmarks(np.random.default_rng(0), 0.9, walls=1000), mirrored])
+    found = lowest_plane(points, POSES, np.zeros(len(points), np.int64), np.arange(len(points)))
+    assert found == pytest.approx(0.9, rel=0.02)
