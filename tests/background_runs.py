@@ -1,5 +1,6 @@
 """Runs of the command line: in this process, or in the background and killed on their way."""
 
+import glob
 import io
 import os
 import signal
@@ -52,8 +53,10 @@ def kill(process: subprocess.Popen[bytes]) -> None:
 
 def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path, ticks: int = 0) -> None:
     """Returns once a run in that folder could be resumed after that many ticks of a graph, or is over."""
+    # Path.glob raises where a folder is renamed meanwhile, as that of a run that ends is.
+    there = f"{place}/runs/*/checkpoints/**/checkpoint"
     while process.poll() is None and not any(
-        _ticks(found) >= ticks for found in place.glob("runs/*/checkpoints/**/checkpoint")
+        _ticks(Path(found)) >= ticks for found in glob.iglob(there, recursive=True, include_hidden=True)
     ):
         time.sleep(0.02)
 
