@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.appearance.feature_matching import mutual_nearest, squared_distances
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.pose_graph import optimised_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
-from .map_making import LocalViews
+from .map_making import LocalViews, pair_matches
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -23,8 +22,6 @@ CANDIDATES, FAR_CANDIDATES = 8, 5
 """References that each is compared with: the most similar of all, and the most similar of those far along the drive."""
 FAR_M = 3.0
 """Way (m) along the drive beyond which two references are far from each other: what they share closes a loop."""
-RATIO = 0.8
-"""Largest ratio of a match's distance to that of the second nearest."""
 TOLERANCE = math.radians(0.4)
 """Angle by which a bearing may miss the epipolar plane (rad)."""
 MAX_SAMPLES = 300
@@ -79,32 +76,30 @@ def verified_pairs(views: LocalViews, pairs: Ints, rng: np.random.Generator) -> 
 
     Draws from `rng`.
     """
-    kept, turns, directions = [], [], []
-    matches = [np.empty((3, 0))]
-    for one, other in pairs.tolist():
-        a, b = views.rows(one), views.rows(other)
-        found = mutual_nearest(squared_distances(views.compared(a), views.compared(b)), RATIO)
-        if len(found.first) < MIN_INLIERS:
+    kept, turns, directions, right = [], [], [], [np.empty(0, np.int64)]
+    matches = pair_matches(views, pairs)
+    for n, pair in enumerate(pairs.tolist()):
+        rows = np.arange(matches.starts[n], matches.starts[n + 1])
+        if len(rows) < MIN_INLIERS:
             continue
-        first, second = views.bearings[a][found.first], views.bearings[b][found.second]
+        first, second = views.bearings[matches.first[rows]], views.bearings[matches.second[rows]]
         pose = relative_pose(first, second, rng, threshold=TOLERANCE, max_samples=MAX_SAMPLES)
         if pose is None or np.count_nonzero(pose.inliers) < MIN_INLIERS:
             continue
         if false_alarms(pose, first, second, TOLERANCE) > MAX_FALSE_ALARMS:
             continue
-        kept.append((one, other))
+        kept.append(pair)
         turns.append(math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))
         directions.append(math.atan2(pose.translation[1], pose.translation[0]))
-        right = found.chosen(pose.inliers)
-        matches.append(np.stack([right.first + a.start, right.second + b.start, right.ratio]))
-    first, second, ratio = np.concatenate(matches, axis=1)
+        right.append(rows[pose.inliers])
+    those = np.concatenate(right)
     return VerifiedPairs(
         np.array(kept, np.int64).reshape(-1, 2),
         np.array(turns, np.float64),
         np.array(directions, np.float64),
-        first.astype(np.int64),
-        second.astype(np.int64),
-        ratio,
+        matches.first[those],
+        matches.second[those],
+        matches.ratio[those],
     )
 
 
