@@ -133,7 +133,7 @@ class FollowHoming(Stage):
         return self.Out(command=Command(speed, self._turn(direction)), status=moving)
 
     def _approaches(self, vector: HomingVector, lost_s: float, sought_s: float) -> bool:
-        """Whether the robot drives towards its target; to a doubtful one for a while, and then again as it wanders."""
+        """Tells that the robot drives towards its target; towards a doubtful one it does so by turns with wandering."""
         if vector.state == "doubtful":
             return sought_s % (self.wander_after_s + DOUBTFUL_S) < DOUBTFUL_S
         return vector.is_found or (lost_s < BLOCKED_AFTER_S and vector.metres is not None)

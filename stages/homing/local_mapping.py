@@ -44,7 +44,7 @@ MIN_VERIFIED_INLIERS = 14
 """Features that must agree in each of two images before the robot relies on a target: none of 3,980 pairs hidden
 behind walls has so many, but 13 of 2,420 of places with the same walls do (docs/experiments/
 topological_nav_homing_vectors.md)."""
-MIN_APART_M = 0.2
+MIN_BASELINE_M = 0.2
 """Distance between the two images by odometry, metres: the same image twice would bear out the same false matches."""
 MAX_DOUBTFUL_M = 0.6
 """Way after which a doubtful map that no image has shown again, and a witness, are forgotten, metres."""
@@ -93,9 +93,10 @@ class LocalMapping(Stage):
     target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
     says the target is reached, where the two views still differ, is discarded.
 
-    A relative pose with few inliers may be one of another place that looks alike. Until `MIN_VERIFIED_INLIERS` features
-    have agreed in two images, `MIN_APART_M` apart or more, and both with the same heading of the target, the map is
-    `doubtful`, and is made anew. A target that was borne out needs one such image to be found again a short way on.
+    A relative pose with few inliers may be one of another place that looks the same. The map is `doubtful`, and made
+    again, until `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or
+    more, and both give the target the same heading. A target that was borne out needs one such image to be found again
+    a short way on.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
     metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
@@ -114,7 +115,7 @@ class LocalMapping(Stage):
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
     verify: bool = True
-    """Whether a second image must bear out a new map, and the target's look an arrival; in the paper none has to."""
+    """Asks a second image to bear out a new map, and the target's look an arrival; the paper asks for neither."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
@@ -270,7 +271,7 @@ class LocalMapping(Stage):
         if state.witness is not None:
             off = abs(wrap_angle(state.since[2] + heading - state.witness))
             if not with_odometry or off < math.radians(MAX_HEADING_DIFFERENCE_DEG):
-                return not with_odometry or math.hypot(*state.since[:2]) >= MIN_APART_M
+                return not with_odometry or math.hypot(*state.since[:2]) >= MIN_BASELINE_M
         state.witness, state.since, state.unseen_m = heading, np.zeros(3), 0.0
         return False
 

@@ -66,7 +66,7 @@ class HomingVector(Value):
 
     @property
     def is_found(self) -> bool:
-        """Whether the target is known well enough to rely on it."""
+        """Tells that the target is known well enough to rely on it."""
         return self.state in ("new", "tracking")
 
 

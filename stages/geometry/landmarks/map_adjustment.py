@@ -102,7 +102,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
 
 
 def _fitting(views: LocalViews, matches: PairMatches, poses: Array) -> Ints:
-    """How many of its matches fit at each reference (R,)."""
+    """The number (R,) of matches that fit, of each reference."""
     fits = fitting_matches(views, matches, poses, OFF_PLANES[-1])
     both = np.concatenate([matches.first[fits], matches.second[fits]])
     return np.bincount(views.owners[both], minlength=len(views))

@@ -36,7 +36,7 @@ RELATIVE_SIGMA = 0.1
 MIN_MATCHES = 12
 """Matches of two images that must agree on a motion, where too few points are known."""
 MIN_PARALLAX = math.radians(1.0)
-"""Median angle between matched bearings, once turned alike, from which two images tell a direction (rad)."""
+"""Median angle between matched bearings, both turned the same way, from which two images tell a direction (rad)."""
 STILL = math.radians(0.3)
 """The same below which the camera is taken to stand where the keyframe was (rad)."""
 KEYFRAME_PARALLAX = math.radians(3.0)
@@ -62,7 +62,7 @@ class Keyframes(NamedTuple):
 
 
 class Tracked(NamedTuple):
-    """Where an image was taken: `pose` (3,) in the keyframes' frame, `sigmas` (2,) of its place (m) and heading (rad).
+    """The pose of an image: `pose` (3,) in the keyframes' frame, `sigmas` (2,) of its place (m) and heading (rad).
 
     `parallax`: median angle by which matched bearings moved since the last keyframe (rad). `scaled`: whether the length
     of the motion is known; else it is 1, in the direction that was seen, or 0 where too little moved to tell any, and
@@ -82,7 +82,7 @@ def begun(pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
 
 
 def tracked(keyframes: Keyframes, bearings: Array, descriptors: Bytes, rng: np.random.Generator) -> Tracked | None:
-    """Where an image with these features was taken; None where too few of them agree on that."""
+    """Finds the pose of an image with these features; None where too few of them agree on one."""
     last, looks = keyframes.poses[-1], root_descriptors(descriptors)
     pairs = matched(looks, keyframes.descriptors)
     seen, points = np.ascontiguousarray(bearings[pairs.first]), keyframes.points[pairs.second]
@@ -101,7 +101,7 @@ def tracked(keyframes: Keyframes, bearings: Array, descriptors: Bytes, rng: np.r
 def _from_last(
     keyframes: Keyframes, bearings: Array, looks: Floats, seen: Array, points: Array, rng: np.random.Generator
 ) -> Tracked | None:
-    """By the matches with the last keyframe, and the length by points (M, 3) that are `seen` (M, 3), if only a few."""
+    """Finds it by matches with the last keyframe, and the length by points (M, 3) `seen` (M, 3), if only a few."""
     last, rows = keyframes.poses[-1], keyframes.views.rows(len(keyframes.poses) - 1)
     pairs = mutual_nearest_units(keyframes.views.compared(rows), looks, RATIO)
     first, second = keyframes.views.bearings[rows][pairs.first], bearings[pairs.second]
@@ -122,7 +122,7 @@ def _from_last(
 
 
 def _length(towards: Array, bearings: Array, points: Array) -> float | None:
-    """How far along a direction (3,) most of a few points (M, 3) are seen along their bearings (M, 3)."""
+    """The way along a direction (3,) after which most of a few points (M, 3) are seen along their bearings (M, 3)."""
     across = np.cross(towards, bearings)
     lengths = np.einsum("mi,mi->m", np.cross(points, bearings), across) / np.maximum((across**2).sum(axis=1), 1e-9)
     rays = points - lengths[:, None, None] * towards
@@ -142,7 +142,7 @@ def _parallax(first: Array, second: Array, turn: float) -> float:
 
 
 def is_keyframe(found: Tracked) -> bool:
-    """Whether an image has moved on so far that points are to be triangulated from it."""
+    """Tells that an image has moved on so far that points are to be triangulated from it."""
     return found.parallax > (KEYFRAME_PARALLAX if found.scaled else MIN_PARALLAX)
 
 

@@ -56,11 +56,11 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
 def test_a_robot_that_doubts_its_target_has_not_arrived() -> None:
     path = Path()
     path.step(path=ImagePath(5, PATH.views[:1], ("a",)))
-    step = lambda **how: path.step(vector(0, 0.005, **how), ImagePath(5, PATH.views[:1], ("a",))).progress  # noqa: E731
-    assert step().docking
-    doubtful = step(turn=0.0, state="doubtful")
+    one_view = ImagePath(5, PATH.views[:1], ("a",))
+    assert path.step(vector(0, 0.005), one_view).progress.docking
+    doubtful = path.step(vector(0, 0.005, turn=0.0, state="doubtful"), one_view).progress
     assert (doubtful.docking, doubtful.arrived) == (False, False)
-    assert step(turn=0.0).arrived
+    assert path.step(vector(0, 0.005, turn=0.0), one_view).progress.arrived
 
 
 def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() -> None:

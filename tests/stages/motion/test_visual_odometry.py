@@ -39,7 +39,7 @@ def walk(images: int) -> np.ndarray:
 
 
 def run(points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, kept=False, log=0, **options):
-    """What the stage says of each image; of `hidden` ones nothing is seen. `kept`: its state goes through bytes."""
+    """The stage's output for each image; `hidden` ones show nothing. `kept`: its state goes through bytes."""
     stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
     rng, outs, ctx.tick = np.random.default_rng(1), [], Tick(0, 0, log)
     for number, pose in enumerate(poses):
