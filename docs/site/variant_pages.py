@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from hydra import compose
 from omegaconf import OmegaConf
@@ -13,7 +14,8 @@ from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.run.inputs import read_inputs
 from omninav.pipeline.run.plan import plan
 
-NEEDED = {"topological_nav": ["goal=kitchen"]}
+GOAL = Path(__file__).resolve().parents[1] / "experiments" / "topological_nav_homing_vectors_campus.png"
+NEEDED = {"topological_nav": ["goal=kitchen"], "landmark_nav": [f"goal={GOAL}"]}
 """What is typed to draw a variant that does not run without."""
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.particles import uniform_around
@@ -41,12 +41,16 @@ class ParticlePrior(Stage):
         self,
         ctx: Context,
         map: ReferenceGraph | None,
-        truth: Pose | None,
+        truth: Pose | None = None,
         length_scale: LengthScale | None = None,
         area: FreeSpace | None = None,
         restart: Restart | None = None,
+        tick: Tick | None = None,
     ) -> Out:
-        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
+        """Give the first belief, also where somebody asks a running robot to start again (`restart`).
+
+        `tick`: needed where no other input comes with each image, so that this is asked at each.
+        """
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         where = self.at if restart is None else restart.at or "uniform"

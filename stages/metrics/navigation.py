@@ -11,8 +11,11 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
+
+Array = npt.NDArray[np.float64]
 
 QUANTITIES = {
     "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),
@@ -42,10 +45,11 @@ WITHIN_M = 0.5
 class Navigation(MetricStage):
     """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
 
-    `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken;
-    `end_error_m`: how far from there it ended. `collisions`, in a simulated world; `path_length_m`: driven, on a robot
-    by its odometry; `shortest_m`: from where it began along the images of the map, the shortest path that it could have
-    known; `time_s`: until it said that it has arrived or given up, else all of it. `routes`: how many it planned;
+    `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken, or to
+    the point that is its goal; `end_error_m`: how far from there it ended. `collisions`, in a simulated world;
+    `path_length_m`: driven, on a robot by its odometry; `shortest_m`: from where it began along the images of the map,
+    the shortest path that it could have known; `time_s`: until it said that it has arrived or given up, else all of it.
+    `routes`: how many it planned;
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Truth of the map's poses
@@ -57,7 +61,7 @@ class Navigation(MetricStage):
         ctx: Context,
         drive: Drive,
         routes: Sequence[PlannedRoute | None],
-        map: TopologicalMap,
+        map: TopologicalMap | ReferenceGraph,
     ) -> MetricStage.Out:
         """The whole drive at once."""
         planned = [route for route in routes if route is not None]
@@ -73,7 +77,10 @@ class Navigation(MetricStage):
         driven = float(drive.distance[tallied[-1]]) if len(tallied) else by_odometry
         goal = int(last.places[-1]) if len(last.places) else None
         apart = shortest = None
-        if goal is not None and map.pose_source == "truth":
+        if map.pose_source == "truth" and isinstance(map, ReferenceGraph) and last.goal is not None:
+            apart = math.dist(spots[-1], (last.goal.x, last.goal.y))
+            shortest = metres_of_first(map, spots[0], planned)
+        elif map.pose_source == "truth" and isinstance(map, TopologicalMap) and goal is not None:
             apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
             shortest = shortest_metres(map, spots[0], goal)
         found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
@@ -98,6 +105,15 @@ class Navigation(MetricStage):
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
+
+
+def metres_of_first(map: ReferenceGraph, start: Array, routes: Sequence[PlannedRoute]) -> float | None:
+    """Metres from a point (x, y) along the references of the first route, and on to its goal; None without a route."""
+    first = next((route for route in routes if route.number >= 0 and route.goal is not None), None)
+    if first is None or first.goal is None:
+        return None
+    way = np.vstack([start, map.poses[first.places, :2], (first.goal.x, first.goal.y)])
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:

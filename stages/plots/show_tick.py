@@ -175,9 +175,9 @@ class ShowTick(Stage):
         if map is not None and len(map) > 1.1 * before.map_size:
             before.map_size = len(map)
             add("/map", "visualization_msgs/msg/MarkerArray", map_markers(map, tick.stamp))
-        if route is not None and isinstance(map, TopologicalMap) and route.number != before.route:
+        if route is not None and map is not None and route.number != before.route:
             before.route = route.number
-            places = map.poses[map.places[route.places]]
+            places = map_poses(map)[map.places[route.places] if isinstance(map, TopologicalMap) else route.places]
             path = path_bytes(np.full(len(places), tick.stamp), places, tick.stamp)
             made.append(("/plan", "nav_msgs/msg/Path", path))
         return RosMessages.of(tick.stamp, made) if made else None

@@ -70,11 +70,17 @@ class TrajectoryOverMap(Stage):
 
 
 def planned_routes(routes: Sequence[PlannedRoute | None], map: AnyMap | None) -> list[Array]:
-    """Each route that was planned, in order: x and y (V, 2) of the views along it."""
-    if not isinstance(map, TopologicalMap):
-        return []
-    found = {route.number: route.places for route in routes if route is not None and len(route.places)}
-    return [map.poses[map.views_along(found[number])[0]][:, :2] for number in sorted(found)]
+    """Each route that was planned, in order: x and y (V, 2) of the views along it, and of a goal beside them."""
+    found = {route.number: route for route in routes if route is not None and route.number >= 0}
+    lines = [_views_along(found[number], map) for number in sorted(found)]
+    return [line for line in lines if len(line)]
+
+
+def _views_along(route: PlannedRoute, map: AnyMap | None) -> Array:
+    if isinstance(map, TopologicalMap):
+        return map.poses[map.views_along(route.places)[0]][:, :2]
+    goal = np.empty((0, 2)) if route.goal is None else np.array([(route.goal.x, route.goal.y)])
+    return np.vstack([map_poses(map)[route.places, :2], goal])
 
 
 def _drives_itself(drive: Drive) -> bool:

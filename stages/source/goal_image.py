@@ -22,9 +22,9 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
 class GoalImage(Stage):
     """Gives the goal's image, with the robot's own camera as the one that took it.
 
-    Raises BadInput where no goal is named, where no place of a map that is still to be learned can have its name, where
-    there is no such file, where it is no image, and where it has another size than the robot's camera takes: before
-    anything runs, as far as can be.
+    Raises BadInput where no goal is named, where no place of the map can have its name (the map is still to be learned,
+    or has no places), where there is no such file, where it is no image, and where it has another size than the robot's
+    camera takes: before anything runs, as far as can be.
     """
 
     goal: str | int | None = None
@@ -37,6 +37,8 @@ class GoalImage(Stage):
     """The saved map in which the goal is, if there is one; null: a map is learned first, and takes long."""
     tour: str | tuple[str, ...] | None = None
     """The log that the map is learned from; null: a drive through the world."""
+    places: bool = True
+    """Tells that the map has places; without, only an image can be a goal."""
 
     class Out(Outputs):
         """Absent where the goal is no image."""
@@ -77,6 +79,11 @@ class GoalImage(Stage):
         if self.goal is None or not str(self.goal).strip():
             raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=IMAGE.png")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
+            if not self.places:
+                raise BadInput(
+                    f"goal: {self.goal} is no image, and the map has no places; type goal=IMAGE.png, what the robot's "
+                    "camera saw there"
+                )
             self._refuse_unknown(str(self.goal).strip())
             return None
         file = Path(str(self.goal))

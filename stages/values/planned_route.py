@@ -8,15 +8,19 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 
+from .requests import GoalPoint
+
 
 class PlannedRoute(Value):
     """Through which `places` (K,) the robot is to go, the believed one first, the goal last; none before it is known.
 
-    `state`: `locating`, it is not yet known where the robot is; `under way`; `arrived`; `gave up`; and `why`, where one
-    would ask. `number`: another way has another, from 0; -1 before the first.
+    On a map of references these are references, and the goal is a point beside them, `goal`. `state`: `locating`, it is
+    not yet known where the robot is; `under way`; `arrived`; `gave up`; and `why`, where one would ask. `number`:
+    another way has another, from 0; -1 before the first.
     """
 
     places: Annotated[npt.NDArray[np.int64], Shape("K"), Bounds(ge=0)]
     state: Literal["locating", "under way", "arrived", "gave up"]
     number: Annotated[int, Bounds(ge=-1)]
     why: str = ""
+    goal: GoalPoint | None = None

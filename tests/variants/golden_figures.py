@@ -7,6 +7,8 @@ from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
+import cv2
+
 from omninav.pipeline.cli.main import main
 from omninav.stages.recordings.opening import open_recording
 
@@ -23,10 +25,13 @@ SMALL_CAMERA = (
     "world.camera.mask={inner_radius_px: 15, outer_radius_px: 104}",
 )
 
+GOAL_FRAME = 14
+
 RUNS: dict[str, tuple[str, ...]] = {
     "homing": (*SMALL_CAMERA, "nodes.source.seconds=4"),
     "homing_as_printed": (*SMALL_CAMERA, "nodes.source.seconds=4"),
     "homing_field": ("world=home_store_demo", *SMALL_CAMERA, "nodes.field.rings=2"),
+    "landmark_nav": (TOUR, "world=home_store_demo", *SMALL_CAMERA, "goal=goal.png", "nodes.source.seconds=4"),
     "matched_pairs": (MAPPED, "nodes.matches.pairs=4"),
     "omninav": (TOUR, DRIVE),
     "omninav_map": (MAPPED,),
@@ -79,6 +84,7 @@ def measured(variant: str, place: Path, cache: Path) -> dict[str, Any]:
     of = variant.removesuffix("_map")
     named = ("map", f"variant={of}") if of != variant else (f"variant={variant}",)
     words = ("simulate", *RUNS[variant]) if variant == "simulate" else (*named, *RUNS[variant], *kept)
+    write_goal(place)
     with chdir(place):
         code = main(words)
     assert code == 0, f"omninav {' '.join(words)} ended with {code}"
@@ -88,6 +94,14 @@ def measured(variant: str, place: Path, cache: Path) -> dict[str, Any]:
     manifest = json.loads((run / "manifest.json").read_text())
     content = {"metrics": json.loads((run / "metrics.json").read_text()), "facts": manifest["facts"]}
     return {"ticks": manifest["ticks"], **dict(sorted(_figures(content)))}
+
+
+def write_goal(place: Path) -> tuple[float, float]:
+    """Write an image of the drive as goal.png into a folder, and say where it was taken (m)."""
+    recording = open_recording(str(DATA / "drive.mcap"))
+    cv2.imwrite(str(place / "goal.png"), recording.image(GOAL_FRAME))
+    x, y, _ = recording.truth[GOAL_FRAME]
+    return float(x), float(y)
 
 
 def _figures_of_log(log: Path) -> dict[str, Any]:

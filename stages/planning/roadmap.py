@@ -1,0 +1,204 @@
+"""The way to where an image was taken, along the references of a map."""
+
+import math
+from dataclasses import field
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.roadmap import Ways, ahead_on, way_from, ways_to
+from omninav.stages.geometry.plane.se2 import wrap_angle
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.drive import pose_row
+from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.requests import GoalPoint
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+MIN_PROBABILITY = 0.5
+"""Least confidence in the estimate with which the robot drives, and probability of a pose by landmarks that counts."""
+LOOKAHEAD_M = 0.8
+"""Distance along the way of the point that the robot drives towards, metres."""
+LEG_M = 2.0
+"""Length of the legs of a way, metres: whoever watches whether the robot comes closer compares within one."""
+ARRIVAL_M, MAX_HEADING_ERROR_DEG = 0.02, 2.0
+"""Distance to the goal at which the robot has only to turn, metres, and heading error with which it has arrived."""
+DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
+"""Metres by which a way counts as longer that leads closer than the radius to where it was found blocked."""
+RETRY_S, MAX_BLOCKED = 5.0, 20
+"""Seconds from a blocked way to the next one, and how many are tried."""
+
+
+class RoadmapPlannerState(State):
+    """The goal and the way there.
+
+    `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `metres`, `next` (R,): of the shortest
+    way to it from each reference; `extra` (R,): metres that count more where ways were blocked, `blocked` times, and
+    from when on (ns) they can be again. `number`: of the way, -1 until the robot knows where it is, and the references
+    along it, `places` (K,), as it was planned. `leg`: its number, and `left`: metres to go when it began.
+    """
+
+    goal: Array = field(default_factory=lambda: np.zeros(0))
+    metres: Array = field(default_factory=lambda: np.zeros(0))
+    next: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    extra: Array = field(default_factory=lambda: np.zeros(0))
+    blocked: int = 0
+    retry: int = 0
+    number: int = -1
+    places: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    leg: int = 0
+    left: float = 0.0
+    docking: bool = False
+    ended: Literal["", "arrived", "gave up"] = ""
+    why: str = ""
+
+
+class RoadmapPlanner(Stage):
+    """Gives the vector along the shortest way to a goal over the references of a map, at every tick.
+
+    The roadmap's points are the references, joined along the drive and wherever two are closer than the robot is wide,
+    so that no wall is between them. The goal's pose is that of its image by landmarks. While the confidence in its own
+    pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
+    landmarks tell. It has arrived where landmarks in its present image say so. Where a way is blocked, ways around are
+    preferred, and after too many it gives up. Raises BadInput for a goal that the map's landmarks cannot place.
+    """
+
+    goal: str | None = None
+    """The goal's image file."""
+    robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Of the robot's body."""
+
+    class Out(Outputs):
+        """`vector`: absent once the way has ended, and so is `progress`, but of a robot that has arrived."""
+
+        vector: HomingVector | None = None
+        progress: PathProgress | None = None
+        route: PlannedRoute
+
+    def step(
+        self,
+        ctx: Context,
+        state: RoadmapPlannerState,
+        tick: Tick,
+        map: ReferenceGraph,
+        estimate: PoseEstimate,
+        confidence: PoseConfidence,
+        fix: LandmarkFix | None = None,
+        goal_fix: LandmarkFix | None = None,
+        goal_features: LocalFeatures | None = None,
+        status: DrivingStatus | None = None,
+        point: GoalPoint | None = None,
+    ) -> Out:
+        """Say where to drive; `status` is that of the tick before, `point` where a running robot is asked to go."""
+        if point is not None:
+            self._set_out(state, map, np.array([point.x, point.y, math.nan]))
+        elif not len(state.goal):
+            self._set_out(state, map, goal_pose(self.goal, goal_fix, goal_features, map))
+        if state.ended:
+            return _stopped(state)
+        here, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
+        places = self._way(state, map, here)
+        new = sure and state.number < 0
+        if places is not None and status is not None and status.state == "blocked" and tick.stamp >= state.retry:
+            ctx.count("blocked_way")
+            ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
+            state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= LOOKAHEAD_M)
+            state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
+            self._plan(state, map)
+            places, new = self._way(state, map, here), True
+        if places is None or state.blocked > MAX_BLOCKED:
+            state.ended, state.why = "gave up", state.why or "no way leads to the goal"
+            return _stopped(state)
+        if new:
+            state.number, state.places = state.number + 1, places
+        ahead, beyond = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
+        x, y = ahead - here[:2]
+        left = math.hypot(x, y) + beyond
+        if new or left < state.left - LEG_M:
+            state.leg, state.left = state.leg + 1, left
+        turn = self._dock(state, here, fix)
+        if state.docking and abs(turn) <= math.radians(MAX_HEADING_ERROR_DEG):
+            state.ended = "arrived"
+            return _stopped(state)
+        vector = HomingVector(
+            number=state.leg,
+            direction=wrap_angle(math.atan2(y, x) - here[2]),
+            turn=turn,
+            distance=left,
+            ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3),
+            nearness=1.0,
+            metres=math.hypot(x, y) if state.number >= 0 else None,
+            inliers=0 if fix is None else int(fix.inliers[0]),
+            state="tracking" if sure else "lost",
+            why="" if sure else f"the confidence in where it is is {confidence.probability:.2f}",
+        )
+        progress = PathProgress(state.number, 0, 1, state.leg, beyond == 0.0, state.docking, False)
+        return self.Out(vector=vector, progress=progress, route=_route(state, "under way" if sure else "locating"))
+
+    def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
+        state.goal, state.extra = goal, np.zeros(len(map))
+        state.blocked, state.docking, state.ended, state.why = 0, False, "", ""
+        self._plan(state, map)
+
+    def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:
+        reach = 2.0 * self.robot_radius_m
+        state.metres, state.next = ways_to(state.goal[:2], map.poses[:, :2], map.edges, reach, state.extra)
+
+    def _way(self, state: RoadmapPlannerState, map: ReferenceGraph, here: Array) -> Ints | None:
+        to_goal = math.dist(here[:2], state.goal[:2])
+        ways = Ways(state.metres, state.next)
+        return way_from(here[:2], map.poses[:, :2], ways, 2.0 * self.robot_radius_m, to_goal)
+
+    def _dock(self, state: RoadmapPlannerState, here: Array, fix: LandmarkFix | None) -> float:
+        """The turn to the goal's heading (rad); docking begins, and ends, by landmarks alone."""
+        if fix is not None and fix.probabilities[0] >= MIN_PROBABILITY:
+            here = fix.poses[0]
+            allowed = ARRIVAL_M * (2.0 if state.docking else 1.0)
+            state.docking = math.dist(here[:2], state.goal[:2]) <= allowed
+        return 0.0 if math.isnan(state.goal[2]) else wrap_angle(state.goal[2] - here[2])
+
+
+def _line(state: RoadmapPlannerState, map: ReferenceGraph, places: Ints) -> Array:
+    """The way (K, 2) over references to the goal."""
+    line: Array = np.vstack([map.poses[places, :2], state.goal[:2]])
+    return line
+
+
+def _route(state: RoadmapPlannerState, now: Literal["locating", "under way", "arrived", "gave up"]) -> PlannedRoute:
+    why = state.why if now == "gave up" else ""
+    return PlannedRoute(state.places, now, state.number, why, GoalPoint(*state.goal[:2].tolist()))
+
+
+def _stopped(state: RoadmapPlannerState) -> RoadmapPlanner.Out:
+    if state.ended != "arrived":
+        return RoadmapPlanner.Out(route=_route(state, "gave up"))
+    there = PathProgress(state.number, 1, 1, state.leg, True, False, True)
+    return RoadmapPlanner.Out(progress=there, route=_route(state, "arrived"))
+
+
+def goal_pose(goal: str | None, fix: LandmarkFix | None, features: LocalFeatures | None, map: ReferenceGraph) -> Array:
+    """The pose (3,) from which the goal's image was taken. Raises BadInput where landmarks do not tell it."""
+    if map.landmarks is None:
+        raise BadInput("goal: the map was saved without landmarks; learn it again from its tour with landmarks=sift")
+    if fix is not None and fix.probabilities[0] >= MIN_PROBABILITY:
+        pose: Array = fix.poses[0]
+        return pose
+    seen = 0 if features is None else len(features)
+    agree = "too few landmarks agree on where it was taken"
+    if fix is not None:
+        agree = f"{fix.inliers[0]} landmarks agree on where it was taken, and some 24 are needed"
+        if len(fix) > 1:
+            agree += f"; {fix.inliers[1]} on another place"
+    raise BadInput(
+        f"goal: the map's landmarks do not tell where {goal} was taken: it shows {seen} features, and {agree}; "
+        "give an image from closer to where the map was made"
+    )

@@ -1,0 +1,128 @@
+"""Driving to an image's place in a room of landmarks."""
+
+import math
+
+import numpy as np
+import pytest
+from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.planning.roadmap import MAX_BLOCKED, RoadmapPlanner, RoadmapPlannerState, goal_pose
+from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.homing import DrivingStatus
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.requests import GoalPoint
+
+START, GOAL = (2.0, 2.6, 2.0), (8.0, 3.2, -1.0)
+
+
+def fix_of(features: LocalFeatures) -> LandmarkFix | None:
+    stage, ctx = LandmarkPose(), Context("landmark_pose")
+    stage.setup(ctx)
+    return stage.step(ctx, features, mapped_room()).fix
+
+
+def fix_at(pose) -> LandmarkFix:
+    found = fix_of(seen_from(room(), np.array(pose)))
+    assert found is not None
+    return found
+
+
+class Drive:
+    """A robot that knows its pose, and obeys."""
+
+    def __init__(self, start=START, goal_features=None) -> None:
+        self.planner, self.plan = RoadmapPlanner(goal="shelf.png"), RoadmapPlannerState()
+        self.follow, self.following = FollowHoming(), FollowHomingState()
+        self.pose, self.tick, self.status = np.array(start), 0, None
+        self.features = seen_from(room(), np.array(GOAL)) if goal_features is None else goal_features
+        self.goal = fix_of(self.features)
+
+    def step(self, confidence=1.0, fix=None, point=None, status=None) -> RoadmapPlanner.Out:
+        tick, ctx = Tick(self.tick, 10**15 + self.tick * 200_000_000), Context("planning")
+        self.tick += 1
+        pose = Pose(*self.pose.tolist())
+        out = self.planner.step(
+            ctx,
+            self.plan,
+            tick,
+            mapped_room(),
+            PoseEstimate(pose, np.eye(3), 1.0, pose),
+            PoseConfidence(confidence),
+            fix,
+            self.goal,
+            self.features,
+            status or self.status,
+            point,
+        )
+        done = self.follow.step(ctx, self.following, tick, out.vector, out.progress)
+        self.status = done.status
+        turned = compose(self.pose, (done.command.speed * 0.2, 0.0, done.command.turning * 0.2))
+        self.pose = np.array(turned)
+        return out
+
+
+def test_a_robot_stops_where_the_image_was_taken_and_looks_as_it_did() -> None:
+    drive = Drive()
+    out = drive.step()
+    assert out.vector.direction == pytest.approx(0.0 - START[2], abs=0.35)  # along the way that was mapped
+    while out.route.state != "arrived" and drive.tick < 400:
+        near = math.dist(drive.pose[:2], GOAL[:2]) < 1.0
+        out = drive.step(fix=fix_at(drive.pose) if near else None)
+    assert math.dist(drive.pose[:2], GOAL[:2]) < 0.03
+    assert abs(drive.pose[2] - GOAL[2]) < math.radians(3.0)
+    assert drive.tick < 200
+    assert out.route.number == 0
+    assert drive.status.state == "arrived"
+
+
+def test_only_landmarks_tell_that_it_has_arrived() -> None:
+    drive = Drive(start=GOAL)
+    assert not drive.step().progress.docking
+    assert drive.step(fix=fix_at(GOAL)).route.state == "arrived"
+
+
+def test_a_robot_that_does_not_know_where_it_is_has_no_route() -> None:
+    drive = Drive()
+    out = drive.step(confidence=0.3)
+    assert (out.vector.state, out.vector.metres, out.route.state) == ("lost", None, "locating")
+    assert drive.status.state == "lost"
+    assert drive.step(confidence=0.9).route.state == "under way"
+
+
+def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_up() -> None:
+    drive = Drive(start=(3.0, 3.0, 0.0))  # between two passes of the tour
+    before = set(drive.step().route.places.tolist())
+    blocked = DrivingStatus("blocked", "a chair")
+    after = drive.step(status=blocked).route
+    assert after.number == 1
+    assert not before & set(after.places.tolist())
+    for _ in range(26 * MAX_BLOCKED):
+        drive.pose = np.array((3.0, 3.0, 0.0))
+        out = drive.step(status=blocked)
+    assert (out.route.state, out.route.why) == ("gave up", "a chair")
+    assert drive.status.state == "waiting"
+
+
+def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
+    drive = Drive(start=GOAL)
+    drive.step(fix=fix_at(GOAL))
+    out = drive.step(point=GoalPoint(2.0, 2.5))
+    assert out.route.state == "under way"
+    assert (out.route.goal.x, out.vector.turn) == (2.0, 0.0)
+
+
+def test_an_image_of_elsewhere_is_refused_with_what_was_seen() -> None:
+    elsewhere = seen_from(room(seed=5), np.array(GOAL))
+    drive = Drive(goal_features=elsewhere)
+    with pytest.raises(BadInput, match=rf"where shelf.png was taken: it shows {len(elsewhere)} features, and .* agree"):
+        drive.step()
+    with pytest.raises(BadInput, match="without landmarks; learn it again"):
+        goal_pose("shelf.png", None, None, graph_of(tour_poses()))
