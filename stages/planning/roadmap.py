@@ -25,7 +25,9 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 MIN_PROBABILITY = 0.5
-"""Least confidence in the estimate with which the robot drives, and probability of a pose by landmarks that counts."""
+"""Least confidence in the estimate with which the robot drives, and probability of a pose that tells of an arrival."""
+MIN_GOAL_PROBABILITY = 0.9
+"""Least probability of the goal's pose: the robot drives there by this one image."""
 LOOKAHEAD_M = 0.8
 """Distance along the way of the point that the robot drives towards, metres."""
 LEG_M = 2.0
@@ -189,13 +191,13 @@ def goal_pose(goal: str | None, fix: LandmarkFix | None, features: LocalFeatures
     """The pose (3,) from which the goal's image was taken. Raises BadInput where landmarks do not tell it."""
     if map.landmarks is None:
         raise BadInput("goal: the map was saved without landmarks; learn it again from its tour with landmarks=sift")
-    if fix is not None and fix.probabilities[0] >= MIN_PROBABILITY:
+    if fix is not None and fix.probabilities[0] >= MIN_GOAL_PROBABILITY:
         pose: Array = fix.poses[0]
         return pose
     seen = 0 if features is None else len(features)
     agree = "too few landmarks agree on where it was taken"
     if fix is not None:
-        agree = f"{fix.inliers[0]} landmarks agree on where it was taken, and some 24 are needed"
+        agree = f"{fix.inliers[0]} landmarks agree on where it was taken, and some 32 are needed"
         if len(fix) > 1:
             agree += f"; {fix.inliers[1]} on another place"
     raise BadInput(

@@ -10,8 +10,10 @@ from small_run import collected
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, shortest_metres
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.requests import GoalPoint
 
 # 3 m east, then 4 m north; place 3 lies apart
 CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, (1, 2): 0})
@@ -19,7 +21,10 @@ PLACES = np.array([0, 1, 2])
 
 
 def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
-    ways = [PlannedRoute(PLACES, state, 0, "tired" if state == "gave up" else "") for state in states]
+    ways = [
+        each if isinstance(each, PlannedRoute) else PlannedRoute(PLACES, each, 0, "tired" if each == "gave up" else "")
+        for each in states
+    ]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
     tallies = [DriveTally(collisions, driven)] * len(spots)
@@ -134,3 +139,19 @@ def test_a_way_along_path_images_is_as_long_as_they_lie_apart():
     bent = dataclasses.replace(made, poses=poses)
     assert shortest_metres(bent, (0.0, 0.0), 1) == pytest.approx(5.0)
     assert shortest_metres(bent, (2.0, 2.5), 1) == pytest.approx(3.5)
+
+
+def test_on_a_map_of_references_the_goal_is_a_point_beside_them():
+    route = PlannedRoute(np.array([0, 1]), "arrived", 0, goal=GoalPoint(4.0, 1.0))
+    graph = ReferenceGraph(
+        np.array([(0.0, 0.0, 0.0), (4.0, 0.0, 0.0)]),
+        np.zeros((2, 1, 1), np.float32),
+        "histograms",
+        np.array([(0, 1)], np.int64),
+        "truth",
+    )
+    found = ended([(0.0, 1.0), (4.0, 0.9)], [route, route], driven=6.6, map=graph)
+    assert found["reached"]
+    assert found["end_error_m"] == pytest.approx(0.1)
+    assert found["shortest_m"] == pytest.approx(1.0 + 4.0 + 1.0)
+    assert found["path_length_ratio"] == pytest.approx(1.1)
