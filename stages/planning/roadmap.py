@@ -1,4 +1,4 @@
-"""The way to where an image was taken, along the references of a map."""
+"""The path to where an image was taken, along the references of a map."""
 
 import math
 from dataclasses import field
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.plane.roadmap import Ways, ahead_on, way_from, ways_to
+from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
@@ -29,24 +29,25 @@ MIN_PROBABILITY = 0.5
 MIN_GOAL_PROBABILITY = 0.9
 """Least probability of the goal's pose: the robot drives there by this one image."""
 LOOKAHEAD_M = 0.8
-"""Distance along the way of the point that the robot drives towards, metres."""
+"""Distance along the path of the point that the robot drives towards, metres."""
 LEG_M = 2.0
-"""Length of the legs of a way, metres: whoever watches whether the robot comes closer compares within one."""
+"""Length of the legs of a path, metres: whoever watches whether the robot comes closer compares within one."""
 ARRIVAL_M, MAX_HEADING_ERROR_DEG = 0.02, 2.0
 """Distance to the goal at which the robot has only to turn, metres, and heading error with which it has arrived."""
 DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
-"""Metres by which a way counts as longer that leads closer than the radius to where it was found blocked."""
+"""Metres by which a path counts as longer that leads closer than the radius to where it was found blocked."""
 RETRY_S, MAX_BLOCKED = 5.0, 20
-"""Seconds from a blocked way to the next one, and how many are tried."""
+"""Seconds from a blocked path to the next one, and how many are tried."""
 
 
 class RoadmapPlannerState(State):
-    """The goal and the way there.
+    """The goal and the path there.
 
     `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `metres`, `next` (R,): of the shortest
-    way to it from each reference; `extra` (R,): metres that count more where ways were blocked, `blocked` times, and
-    from when on (ns) they can be again. `number`: of the way, -1 until the robot knows where it is, and the references
-    along it, `places` (K,), as it was planned. `leg`: its number, and `left`: metres to go when it began.
+    path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked` times, and
+    from when on (ns) they can be again. `number`: of the path, -1 until the robot knows where it is, and the references
+    along it, `places` (K,), as it was planned. `leg`: its number, and `left`: metres to go when it began (inf: it has not
+    begun).
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
@@ -58,19 +59,19 @@ class RoadmapPlannerState(State):
     number: int = -1
     places: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     leg: int = 0
-    left: float = 0.0
+    left: float = math.inf
     docking: bool = False
     ended: Literal["", "arrived", "gave up"] = ""
     why: str = ""
 
 
 class RoadmapPlanner(Stage):
-    """Gives the vector along the shortest way to a goal over the references of a map, at every tick.
+    """Gives the vector along the shortest path to a goal over the references of a map, at every tick.
 
     The roadmap's points are the references, joined along the drive and wherever two are closer than the robot is wide,
     so that no wall is between them. The goal's pose is that of its image by landmarks. While the confidence in its own
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
-    landmarks tell. It has arrived where landmarks in its present image say so. Where a way is blocked, ways around are
+    landmarks tell. It has arrived where landmarks in its present image say so. Where a path is blocked, ways around are
     preferred, and after too many it gives up. Raises BadInput for a goal that the map's landmarks cannot place.
     """
 
@@ -80,7 +81,7 @@ class RoadmapPlanner(Stage):
     """Of the robot's body."""
 
     class Out(Outputs):
-        """`vector`: absent once the way has ended, and so is `progress`, but of a robot that has arrived."""
+        """`vector`: absent once the path has ended, and so is `progress`, but of a robot that has arrived."""
 
         vector: HomingVector | None = None
         progress: PathProgress | None = None
@@ -108,25 +109,26 @@ class RoadmapPlanner(Stage):
         if state.ended:
             return _stopped(state)
         here, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
-        places = self._way(state, map, here)
-        new = sure and state.number < 0
+        places = self._path(state, map, here)
+        new = sure and math.isinf(state.left)
         if places is not None and status is not None and status.state == "blocked" and tick.stamp >= state.retry:
-            ctx.count("blocked_way")
+            ctx.count("blocked_path")
             ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
-            state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= LOOKAHEAD_M)
+            state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
             state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
             self._plan(state, map)
-            places, new = self._way(state, map, here), True
+            places, new = self._path(state, map, here), True
         if places is None or state.blocked > MAX_BLOCKED:
-            state.ended, state.why = "gave up", state.why or "no way leads to the goal"
+            state.ended, state.why = "gave up", state.why or "no path leads to the goal"
             return _stopped(state)
         if new:
             state.number, state.places = state.number + 1, places
         ahead, beyond = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
         x, y = ahead - here[:2]
         left = math.hypot(x, y) + beyond
-        if new or left < state.left - LEG_M:
+        if new or left + LEG_M < state.left < math.inf:
             state.leg, state.left = state.leg + 1, left
+        known = state.left < math.inf
         turn = self._dock(state, here, fix)
         if state.docking and abs(turn) <= math.radians(MAX_HEADING_ERROR_DEG):
             state.ended = "arrived"
@@ -136,9 +138,9 @@ class RoadmapPlanner(Stage):
             direction=wrap_angle(math.atan2(y, x) - here[2]),
             turn=turn,
             distance=left,
-            ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3),
+            ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3) if known else 1.0,
             nearness=1.0,
-            metres=math.hypot(x, y) if state.number >= 0 else None,
+            metres=math.hypot(x, y) if known else None,
             inliers=0 if fix is None else int(fix.inliers[0]),
             state="tracking" if sure else "lost",
             why="" if sure else f"the confidence in where it is is {confidence.probability:.2f}",
@@ -148,17 +150,17 @@ class RoadmapPlanner(Stage):
 
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra = goal, np.zeros(len(map))
-        state.blocked, state.docking, state.ended, state.why = 0, False, "", ""
+        state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
         self._plan(state, map)
 
     def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:
         reach = 2.0 * self.robot_radius_m
-        state.metres, state.next = ways_to(state.goal[:2], map.poses[:, :2], map.edges, reach, state.extra)
+        state.metres, state.next = paths_to(state.goal[:2], map.poses[:, :2], map.edges, reach, state.extra)
 
-    def _way(self, state: RoadmapPlannerState, map: ReferenceGraph, here: Array) -> Ints | None:
+    def _path(self, state: RoadmapPlannerState, map: ReferenceGraph, here: Array) -> Ints | None:
         to_goal = math.dist(here[:2], state.goal[:2])
-        ways = Ways(state.metres, state.next)
-        return way_from(here[:2], map.poses[:, :2], ways, 2.0 * self.robot_radius_m, to_goal)
+        known = Paths(state.metres, state.next)
+        return path_from(here[:2], map.poses[:, :2], known, 2.0 * self.robot_radius_m, to_goal)
 
     def _dock(self, state: RoadmapPlannerState, here: Array, fix: LandmarkFix | None) -> float:
         """The turn to the goal's heading (rad); docking begins, and ends, by landmarks alone."""
@@ -170,7 +172,7 @@ class RoadmapPlanner(Stage):
 
 
 def _line(state: RoadmapPlannerState, map: ReferenceGraph, places: Ints) -> Array:
-    """The way (K, 2) over references to the goal."""
+    """The path (K, 2) over references to the goal."""
     line: Array = np.vstack([map.poses[places, :2], state.goal[:2]])
     return line
 

@@ -1,4 +1,4 @@
-"""Ways to a goal along a roadmap: points at which a robot has been, and what joins them."""
+"""Paths to a goal along a roadmap: points at which a robot has been, and what joins them."""
 
 from typing import NamedTuple
 
@@ -8,22 +8,22 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-NO_WAY = -9999
-"""The next point of one from which no way leads to the goal."""
+NO_PATH = -9999
+"""The next point of one from which no path leads to the goal."""
 
 
-class Ways(NamedTuple):
-    """The shortest way from each of N points: `metres` (N,) to the goal, and the `next` point (N,), N for the goal."""
+class Paths(NamedTuple):
+    """The shortest path from each of N points: `metres` (N,) to the goal, and the `next` point (N,), N for the goal."""
 
     metres: Array
     next: Ints
 
 
-def ways_to(goal: Array, points: Array, edges: Ints, reach: float, extra: Array) -> Ways:
-    """Shortest ways to a goal (2,) from points (N, 2) along `edges` (E, 2), and between points closer than `reach` m.
+def paths_to(goal: Array, points: Array, edges: Ints, reach: float, extra: Array) -> Paths:
+    """Shortest paths to a goal (2,) from points (N, 2) along `edges` (E, 2), and between points closer than `reach` m.
 
     The goal is joined with all points that are at most `reach` farther from it than the nearest one. `extra` (N,):
-    metres by which a way through a point counts as longer. Dijkstra's algorithm.
+    metres by which a path through a point counts as longer. Dijkstra's algorithm.
     """
     from scipy.sparse import coo_matrix  # slow to import, and seldom needed
     from scipy.sparse.csgraph import dijkstra
@@ -38,11 +38,11 @@ def ways_to(goal: Array, points: Array, edges: Ints, reach: float, extra: Array)
     metres = np.hypot(*(places[one] - places[other]).T) + (more[one] + more[other]) / 2.0
     graph = coo_matrix((np.maximum(metres, 1e-6), (one, other)), shape=(count + 1, count + 1)).tocsr()
     lengths, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
-    return Ways(lengths[:count], before[:count].astype(np.int64))
+    return Paths(lengths[:count], before[:count].astype(np.int64))
 
 
-def way_from(place: Array, points: Array, ways: Ways, reach: float, to_goal: float) -> Ints | None:
-    """The points (K,) of the shortest way from a place (2,) that is `to_goal` m from the goal; None where none leads.
+def path_from(place: Array, points: Array, paths: Paths, reach: float, to_goal: float) -> Ints | None:
+    """The points (K,) of the shortest path from a place (2,) that is `to_goal` m from the goal; None where none leads.
 
     It begins at a point that is at most `reach` m farther away than the nearest, or is empty where the goal is.
     """
@@ -50,13 +50,13 @@ def way_from(place: Array, points: Array, ways: Ways, reach: float, to_goal: flo
     near = gaps.min() + reach
     if to_goal <= near:
         return np.zeros(0, np.int64)
-    point = int(np.argmin(np.where(gaps <= near, gaps + ways.metres, np.inf)))
-    if ways.next[point] == NO_WAY:
+    point = int(np.argmin(np.where(gaps <= near, gaps + paths.metres, np.inf)))
+    if paths.next[point] == NO_PATH:
         return None
     found = []
     while point < len(points):
         found.append(point)
-        point = int(ways.next[point])
+        point = int(paths.next[point])
     return np.array(found, np.int64)
 
 

@@ -116,7 +116,7 @@ def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
     drive.step(fix=fix_at(GOAL))
     out = drive.step(point=GoalPoint(2.0, 2.5))
     assert out.route.state == "under way"
-    assert (out.route.goal.x, out.vector.turn) == (2.0, 0.0)
+    assert (out.route.goal.x, out.route.number, out.vector.turn) == (2.0, 1, 0.0)
 
 
 def test_an_image_of_elsewhere_is_refused_with_what_was_seen() -> None:

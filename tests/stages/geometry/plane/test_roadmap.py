@@ -1,9 +1,9 @@
-"""Ways over a roadmap of two corridors with a wall between them."""
+"""Paths over a roadmap of two corridors with a wall between them."""
 
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.plane.roadmap import ahead_on, way_from, ways_to
+from omninav.stages.geometry.plane.roadmap import ahead_on, path_from, paths_to
 
 # a corridor of 4 m to the right, and one back, 0.9 m beside it: driven as one, round the far end
 X = np.arange(0.0, 4.1, 0.5)
@@ -13,32 +13,32 @@ NONE = np.zeros(len(POINTS))
 
 
 def test_no_way_leads_through_a_wall_that_is_between_two_corridors() -> None:
-    ways = ways_to(np.array([0.0, 0.9]), POINTS, DRIVEN, 0.5, NONE)
-    assert ways.metres[0] == pytest.approx(4.0 + 0.9 + 4.0)
-    way = way_from(np.array([0.1, -0.1]), POINTS, ways, 0.5, 1.0)
-    assert {7, 8, 9, 10} <= set(way.tolist())
+    paths = paths_to(np.array([0.0, 0.9]), POINTS, DRIVEN, 0.5, NONE)
+    assert paths.metres[0] == pytest.approx(4.0 + 0.9 + 4.0)
+    found = path_from(np.array([0.1, -0.1]), POINTS, paths, 0.5, 1.0)
+    assert {7, 8, 9, 10} <= set(found.tolist())
 
 
 def test_two_passes_that_the_robot_overlaps_are_joined() -> None:
-    ways = ways_to(np.array([0.0, 0.9]), POINTS, DRIVEN, 1.0, NONE)
-    assert ways.metres[0] == pytest.approx(0.9)
+    paths = paths_to(np.array([0.0, 0.9]), POINTS, DRIVEN, 1.0, NONE)
+    assert paths.metres[0] == pytest.approx(0.9)
 
 
 def test_a_goal_beside_the_way_is_reached_from_its_nearest_points() -> None:
-    ways = ways_to(np.array([2.0, -1.0]), POINTS, DRIVEN, 0.1, NONE)
-    assert ways.next[4] == len(POINTS)
-    assert ways.metres[4] == pytest.approx(1.0)
-    assert way_from(np.array([2.0, -0.8]), POINTS, ways, 0.1, 0.2).tolist() == []
+    paths = paths_to(np.array([2.0, -1.0]), POINTS, DRIVEN, 0.1, NONE)
+    assert paths.next[4] == len(POINTS)
+    assert paths.metres[4] == pytest.approx(1.0)
+    assert path_from(np.array([2.0, -0.8]), POINTS, paths, 0.1, 0.2).tolist() == []
 
 
 def test_a_way_that_was_blocked_is_taken_where_there_is_no_other() -> None:
     ring = np.vstack([DRIVEN, [[0, len(POINTS) - 1]]])
     blocked = np.where((POINTS[:, 1] > 0.5) & (POINTS[:, 0] == 2.0), 10.0, 0.0)
-    around = ways_to(np.array([4.0, 0.9]), POINTS, ring, 0.1, blocked)
-    straight = ways_to(np.array([4.0, 0.9]), POINTS, DRIVEN[9:], 0.1, blocked)
+    around = paths_to(np.array([4.0, 0.9]), POINTS, ring, 0.1, blocked)
+    straight = paths_to(np.array([4.0, 0.9]), POINTS, DRIVEN[9:], 0.1, blocked)
     assert around.metres[-1] == pytest.approx(0.9 + 4.0 + 0.9)
     assert straight.metres[-1] == pytest.approx(4.0 + 10.0)
-    assert way_from(np.array([0.0, 0.0]), POINTS, straight, 0.1, 4.1) is None
+    assert path_from(np.array([0.0, 0.0]), POINTS, straight, 0.1, 4.1) is None
 
 
 def test_what_lies_ahead_on_a_line_is_never_behind() -> None:
