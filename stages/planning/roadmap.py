@@ -38,6 +38,8 @@ DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
 """Metres by which a path counts as longer that leads closer than the radius to where it was found blocked."""
 RETRY_S, MAX_BLOCKED = 5.0, 20
 """Seconds from a blocked path to the next one, and how many are tried."""
+SEARCH_S = 120.0
+"""Seconds for which the robot may not know where it is, and wander, before it gives up."""
 
 
 class RoadmapPlannerState(State):
@@ -45,9 +47,9 @@ class RoadmapPlannerState(State):
 
     `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `metres`, `next` (R,): of the shortest
     path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked` times, and
-    from when on (ns) they can be again. `number`: of the path, -1 until the robot knows where it is, and the references
-    along it, `places` (K,), as it was planned. `leg`: its number, and `left`: metres to go when it began (inf: it has not
-    begun).
+    from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is; None: it
+    does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was planned.
+    `leg`: its number, and `left`: metres to go when it began, inf before it does.
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
@@ -56,6 +58,7 @@ class RoadmapPlannerState(State):
     extra: Array = field(default_factory=lambda: np.zeros(0))
     blocked: int = 0
     retry: int = 0
+    lost_since: int | None = None
     number: int = -1
     places: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     leg: int = 0
@@ -109,6 +112,10 @@ class RoadmapPlanner(Stage):
         if state.ended:
             return _stopped(state)
         here, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
+        state.lost_since = None if sure else tick.stamp if state.lost_since is None else state.lost_since
+        if state.lost_since is not None and tick.stamp - state.lost_since > SEARCH_S * 1e9:
+            state.ended, state.why = "gave up", f"for {SEARCH_S:g} s it has not found out where it is"
+            return _stopped(state)
         places = self._path(state, map, here)
         new = sure and math.isinf(state.left)
         if places is not None and status is not None and status.state == "blocked" and tick.stamp >= state.retry:
@@ -151,6 +158,7 @@ class RoadmapPlanner(Stage):
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra = goal, np.zeros(len(map))
         state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
+        state.lost_since = None
         self._plan(state, map)
 
     def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:

@@ -95,6 +95,9 @@ def test_a_robot_that_does_not_know_where_it_is_has_no_route() -> None:
     assert (out.vector.state, out.vector.metres, out.route.state) == ("lost", None, "locating")
     assert drive.status.state == "lost"
     assert drive.step(confidence=0.9).route.state == "under way"
+    for _ in range(5 * 121):
+        out = drive.step(confidence=0.3)
+    assert (out.route.state, out.route.why) == ("gave up", "for 120 s it has not found out where it is")
 
 
 def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_up() -> None:
