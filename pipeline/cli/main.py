@@ -21,6 +21,7 @@ COMMANDS = (
     "simulate",
     "live",
     "report",
+    "explain",
     "compare",
     "resume",
     "experiments",
@@ -28,7 +29,7 @@ COMMANDS = (
 )
 """Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
 
-WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "experiments", "doctor")
+WITHOUT_CONFIGURATION = ("stages", "report", "explain", "compare", "resume", "experiments", "doctor")
 """Those that compose none, and have no use for flags of it."""
 
 

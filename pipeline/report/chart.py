@@ -189,6 +189,13 @@ class Layer:
         if text:
             self.marks.append(_text(at + 4, self.y.end + 14, text, "start"))
 
+    def band(self, x: tuple[float, float], colour: Colour, opacity: float = 0.25) -> None:
+        """A band from bottom to top, at least two pixels wide."""
+        first, last = self.x(x).tolist()
+        where = f'x="{first:.1f}" y="{self.y.end:.1f}" width="{max(last - first, 2.0):.1f}"'
+        look = f"fill:{ink(colour)};fill-opacity:{opacity:.2g}"
+        self.marks.append(f'<rect {where} height="{abs(self.y.start - self.y.end):.1f}" style="{look}"/>')
+
     def level(self, y: float, colour: Colour) -> None:
         """A dotted line from left to right."""
         look = f"stroke:{ink(colour)};stroke-width:1;stroke-dasharray:2 3"

@@ -9,14 +9,15 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.drive import Drive, pose_row
+from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
 
 
 class CollectDrive(Stage):
-    """Collects ticks, estimates, ground truth, odometry and matches of a whole run into one value, a row per tick."""
+    """Collects ticks, estimates, ground truth, odometry, matches and evidence of a whole run, a row per tick."""
 
     class Out(Outputs):
         """`drive`: for metrics and plots."""
@@ -33,11 +34,13 @@ class CollectDrive(Stage):
         tallies: Sequence[DriveTally | None] | None = None,
         matches: Sequence[BestMatch | None] | None = None,
         confidences: Sequence[PoseConfidence | None] | None = None,
+        evidence: Sequence[ImageEvidence | None] | None = None,
     ) -> Out:
         """The whole run at once. Each sequence is read once, in order."""
         whole, parts = array("q"), array("d")  # not lists: a long run has many rows
+        conflicts: dict[str, int] = {}
         absent = [None] * len(ticks)
-        for row, (tick, estimate, true, moved, tally, match, confidence) in enumerate(
+        for row, (tick, estimate, true, moved, tally, match, confidence, measured) in enumerate(
             zip(
                 ticks,
                 absent if estimates is None else estimates,
@@ -46,6 +49,7 @@ class CollectDrive(Stage):
                 absent if tallies is None else tallies,
                 absent if matches is None else matches,
                 absent if confidences is None else confidences,
+                absent if evidence is None else evidence,
                 strict=True,
             )
         ):
@@ -62,10 +66,15 @@ class CollectDrive(Stage):
             looked = (None,) * 3 if match is None else (match.similarity, match.distance, match.turn)
             parts.extend(math.nan if value is None else value for value in looked)
             parts.append(math.nan if confidence is None else confidence.probability)
-        row_of, log, frames, stamps, collisions, place, reference = np.array(whole, np.int64).reshape(-1, 7).T.copy()
-        columns = np.array(parts, np.float64).reshape(-1, 27)
-        estimated, covariance, weight, mean, true_pose, motions, distance, looks, trusted = (
-            np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23, 26), axis=1)
+            numbers = (None if measured is None else getattr(measured, name) for name in EVIDENCE)
+            parts.extend(math.nan if value is None else value for value in numbers)
+            said = "" if measured is None else measured.conflict
+            whole.append(conflicts.setdefault(said, len(conflicts)) if said else -1)
+        counts = np.array(whole, np.int64).reshape(-1, 8).T.copy()
+        row_of, log, frames, stamps, collisions, place, reference, conflict_of = counts
+        columns = np.array(parts, np.float64).reshape(-1, 27 + len(EVIDENCE))
+        estimated, covariance, weight, mean, true_pose, motions, distance, looks, trusted, numbers_of = (
+            np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23, 26, 27), axis=1)
         )
         similarity, visual_distance, turn = looks.T.copy()
         return self.Out(
@@ -88,5 +97,8 @@ class CollectDrive(Stage):
                 visual_distance=visual_distance,
                 reference_turn=turn,
                 confidence=trusted.ravel(),
+                evidence=numbers_of,
+                conflict=conflict_of,
+                conflicts=tuple(conflicts),
             )
         )

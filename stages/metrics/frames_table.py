@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.tables import write_table
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import EVIDENCE, Array, Drive, known
 
 from .confidence import confident
 
@@ -40,6 +40,7 @@ class FramesTable(Stage):
     | `similarity`, `visual_distance` | how much: 1 and 0 are equal; which of them, depends on the comparison |
     | `reference_turn` | how far the robot stood turned against it (rad, counter-clockwise) |
     | `place` | the most probable place of a topological map |
+    | `nearest_m` … `correlation`, `conflict` | what the image says of the estimate (see `ImageEvidence`) |
     """
 
     def step(self, ctx: Context, drive: Drive) -> None:
@@ -71,6 +72,10 @@ def columns_of(drive: Drive) -> Columns:
     columns |= {"similarity": drive.similarity, "visual_distance": drive.visual_distance}
     columns["reference_turn"] = drive.reference_turn
     columns["place"] = drive.place
+    columns |= dict(zip(EVIDENCE, drive.evidence.T, strict=True))
+    columns["conflict"] = np.ma.masked_array(
+        np.array((*drive.conflicts, ""), object)[drive.conflict], drive.conflict < 0
+    )
     return columns
 
 

@@ -15,7 +15,7 @@ from omninav.stages.geometry.appearance.visual_compass import turns_and_correlat
 from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.conflicts import Conflicts
+from omninav.stages.values.conflicts import FOREIGN, Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.image import Strip
 from omninav.stages.values.length_scale import LengthScale
@@ -483,7 +483,7 @@ def foreign(watched: Watched, length_scale_m: float) -> str:
     if fit.pairs < WINDOW or fit.share > SCATTERED or there > ELSEWHERE:
         return ""
     return (
-        f"the images fit no place of the map: of {len(believed)} best matches {100 * there:.0f} % lie at the estimate, "
+        f"{FOREIGN}: of {len(believed)} best matches {100 * there:.0f} % lie at the estimate, "
         f"and {100 * fit.share:.0f} % of {fit.pairs} pairs lie to each other as odometry says: check that the map is of"
         " this place, and was made with this camera and in a light like this"
     )

@@ -3,28 +3,49 @@
 import numpy as np
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.pipeline.report.chart import Chart
+from omninav.pipeline.report.chart import Chart, Colour
 from omninav.stages.values.drive import Drive
+from omninav.stages.values.stretches import Stretches, StretchState
+
+BANDS: dict[StretchState, Colour] = {
+    "searching": "blue",
+    "unsure": "orange",
+    "blind": "grey",
+    "wrong": "pink",
+    "jumped": "green",
+}
+"""Colours of stretches."""
+MAX_TOLD = 3
+"""Longest stretches that the caption explains."""
 
 
 class ConfidenceOverTime(FigureStage):
-    """Plots the probability that the estimate is right over time (s), the last log's. Nothing without a monitor."""
+    """Plots the probability that the estimate is right over time (s), the last log's. Nothing without a monitor.
 
-    def step(self, ctx: Context, drive: Drive) -> FigureStage.Out:
+    Bands are the stretches that were not tracked, of which the caption explains the longest.
+    """
+
+    def step(self, ctx: Context, drive: Drive, stretches: Stretches | None = None) -> FigureStage.Out:
         """The whole run at once."""
         last = drive.last_log
         if not np.isfinite(last.confidence).any():
             return self.Out()
         seconds = last.seconds
         chart = Chart((0.0, max(float(seconds[-1]), 0.1)), (0.0, 1.0), "time (s)", "confidence", height=(140.0, 140.0))
+        found = [each for each in (stretches.all if stretches else ()) if each.log == last.log[0]]
+        for each in found:
+            chart.base.band((each.start_s, each.end_s), BANDS[each.state])
+            chart.name(each.state, BANDS[each.state], "square")
         chart.base.level(0.5, "quiet")
         chart.base.line(np.column_stack([seconds, last.confidence]), "blue", 1.6)
         low = float((last.confidence < 0.5).mean())
+        longest = sorted(found, key=lambda each: each.first - each.last)[:MAX_TOLD]
+        told = [f" Images {each.first} to {each.last}, {each.cause}: {each.evidence}." for each in longest]
         figure = Figure(
             name="confidence_over_time",
             title="Confidence over time",
             caption="The probability that the estimate is right, from the images and the belief; no ground truth is "
-            f"used. {100 * low:.0f} % of the frames are below a half (dotted).",
+            f"used. {100 * low:.0f} % of the frames are below a half (dotted).{''.join(told)}",
             content=chart.svg(),
             media_type="image/svg+xml",
             order=12,

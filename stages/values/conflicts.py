@@ -2,6 +2,9 @@
 
 from omninav.pipeline import Value
 
+FOREIGN = "the images fit no place of the map"
+"""Beginning of the sentence that a map is of another building, as far as images tell."""
+
 
 class Conflicts(Value):
     """Which inputs do not fit each other, a sentence each, with its figures.

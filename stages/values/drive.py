@@ -9,10 +9,14 @@ import numpy.typing as npt
 from omninav.pipeline import Value
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 
+from .evidence import ImageEvidence
 from .pose import Pose
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+EVIDENCE = tuple(each.name for each in dataclasses.fields(ImageEvidence) if each.name != "conflict")
+"""Columns of a drive's evidence: the numbers of `ImageEvidence`."""
 
 
 class Drive(Value):
@@ -57,13 +61,20 @@ class Drive(Value):
     """Turn of the robot against it (rad, counter-clockwise); NaN where there is none."""
     confidence: Array
     """Probability that the estimate is right, as a monitor tells it; NaN where there is none."""
+    evidence: Array
+    """Numbers that each image says of the estimate (N, `EVIDENCE`); NaN where there is none."""
+    conflict: Ints
+    """Which of `conflicts` stood first at each image; -1 where none did."""
+    conflicts: tuple[str, ...]
+    """Findings of inputs that do not fit each other."""
 
     def __len__(self) -> int:
         return len(self.row)
 
     def at(self, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> "Drive":
         """Some of the rows."""
-        return Drive(*(getattr(self, field.name)[rows] for field in dataclasses.fields(self)))
+        named = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return dataclasses.replace(self, **{name: rowed[rows] for name, rowed in named.items() if name != "conflicts"})
 
     @property
     def by_log(self) -> list["Drive"]:

@@ -31,7 +31,7 @@ def test_every_command_explains_itself(words, capsys):
 
 
 def test_the_example_of_every_tool_fits_its_arguments():
-    assert {*TOOLS, "simulate"} == {*tools()}
+    assert {*TOOLS, "explain", "simulate"} == {*tools()}
     for name in tools():
         tool_from(tool_class(name), tool_class(name).example.split())
 
@@ -302,6 +302,9 @@ def test_compare_and_report_print_tables(omninav, demo: Path, tmp_path: Path):
     said = omninav("compare", str(demo), str(demo), check=True).stdout
     assert "position error" in said.lower()
     assert "report.html" in omninav("report", str(demo), check=True).stdout
+    assert "Sure of the estimate" in omninav("explain", str(demo), check=True).stdout
+    assert 'id="confidence_over_time"' in (demo / "report.html").read_text()
+    assert "What happened, stretch by stretch" in (demo / "report.html").read_text()
     assert omninav("compare", str(demo)).returncode == 2
     assert omninav("report", str(tmp_path)).returncode == 2
 

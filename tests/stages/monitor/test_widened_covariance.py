@@ -62,7 +62,7 @@ def test_an_estimate_that_is_off_by_less_than_a_length_scale_is_within_the_95_pe
 def test_what_is_published_drawn_and_measured_is_the_widened_estimate(variant):
     wires = omninav.compose(variant, "publish=ros2").settings["wires"]
     own = {node for node, ports in wires.items() if "belief_estimate." in str(ports)}
-    assert own - {"conflicts"} == {"estimate", "monitor"}
+    assert own - {"conflicts", "evidence"} == {"estimate", "monitor"}
     taken = {node for node, ports in wires.items() if "'estimate.estimate'" in str(ports)}
     assert {"publish", "shown", "drive"} <= taken
 

@@ -1,0 +1,48 @@
+"""Explains a run on the terminal."""
+
+from typing import Any
+
+import numpy as np
+
+from omninav.pipeline import BadInput, Context, Tool
+from omninav.pipeline.api.run import Run
+from omninav.pipeline.files import user_path
+from omninav.stages.metrics.causes import stretches
+from omninav.stages.metrics.stretches import in_short, logs_of, row_of
+
+
+class ExplainRun(Tool):
+    """Prints where a run was searching, unsure, blind or wrong, what happened there, and what to do.
+
+    Raises BadInput for a folder that is no run, or whose run did not end or estimates no pose.
+    """
+
+    example = "runs/latest"
+
+    run_folder: str = "runs/latest"
+    """The run's folder."""
+
+    def run(self, ctx: Context) -> None:
+        """Explain it."""
+        ended = Run(user_path(self.run_folder))
+        columns, lost_m = columns_of_run(ended), float(ended.settings.get("lost_m", 2.5))
+        if not np.isfinite(columns["estimate_x"].astype(float)).any():
+            raise BadInput(
+                f"{self.run_folder}: {ended.manifest.get('variant')} estimates no pose, so there is nothing to explain;"
+                " `omninav variants` shows what localises"
+            )
+        found, logs = stretches(columns, lost_m), logs_of(columns)
+        for number, log in enumerate(logs):
+            print((f"log {number}: " if len(logs) > 1 else "") + in_short(log))
+        for stretch in found:
+            images, seconds, metres, state, cause, evidence, advice = row_of(stretch, len(logs) > 1)
+            print(f"\nimages {images:<9} {seconds:>12} s {metres:>6} m   {state:<10} {cause}\n  {evidence}")
+            if advice:
+                print(f"  -> {advice}")
+
+
+def columns_of_run(run: Run) -> dict[str, Any]:
+    """The columns of `frames.csv` of a run that has ended, as arrays."""
+    table = run.frames
+    names = getattr(table, "column_names", None) or list(table.columns)  # of pyarrow, or pandas
+    return {str(name): np.asarray(table[name]) for name in names}

@@ -1,0 +1,42 @@
+"""Stretches of a drive in which the estimate was not to be trusted."""
+
+from typing import Literal
+
+from omninav.pipeline import Value
+
+StretchState = Literal["searching", "unsure", "blind", "wrong", "jumped"]
+
+
+class Stretch(Value):
+    """Successive images, the state of the localisation in them, and what happened.
+
+    `searching`: not sure yet; `unsure`: not sure any more; `blind`: images that say nothing; `wrong`: sure, and beside
+    the truth; `jumped`: the one image at which a sure estimate lies elsewhere than odometry leads.
+    """
+
+    log: int
+    """Number of the log."""
+    first: int
+    """Its first image."""
+    last: int
+    """Its last image."""
+    start_s: float
+    """When it begins, since the log's first image (s)."""
+    end_s: float
+    """When its last image was taken (s)."""
+    metres: float
+    """How far odometry drove in it (m)."""
+    state: StretchState
+    """State of the localisation."""
+    cause: str
+    """What happened, in a few words."""
+    evidence: str
+    """The same with the numbers that support it, a sentence; with ground truth how far the estimate was off."""
+    advice: str
+    """What to type or to check; empty where there is nothing."""
+
+
+class Stretches(Value):
+    """All stretches of a drive that were not tracked, in order."""
+
+    all: tuple[Stretch, ...]

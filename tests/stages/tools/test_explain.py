@@ -1,0 +1,33 @@
+import pytest
+from small_run import collected, small_run
+
+from omninav.pipeline import BadInput, Context
+from omninav.pipeline.files import write_json
+from omninav.stages.metrics.frames_table import FramesTable
+from omninav.stages.tools.explain import ExplainRun
+
+
+def test_a_run_is_explained_log_by_log_from_its_frames(tmp_path, capsys):
+    run_folder(tmp_path, small_run(frames=60, logs=2).drive)
+    ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
+    said = capsys.readouterr().out
+    assert "log 0: Sure of the estimate" in said
+    assert "nodes.evidence" in said
+    assert "images 1:0-" in said
+    assert "searching" in said
+
+
+def test_a_run_that_estimates_no_pose_or_did_not_end_is_refused(tmp_path):
+    run = small_run(frames=3)
+    run_folder(tmp_path, collected(run.ticks, run.truth))
+    with pytest.raises(BadInput, match="homing estimates no pose"):
+        ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
+    (tmp_path / "frames.parquet").unlink()
+    with pytest.raises(BadInput, match="omninav resume"):
+        ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
+
+
+def run_folder(folder, drive):
+    write_json(folder / "manifest.json", {"variant": "homing"})
+    (folder / "config.yaml").write_text("lost_m: 2.5\n")
+    FramesTable().step(Context("frames", folder=folder), drive)
