@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
 from conftest import TOUR
-from golden_figures import SMALL_CAMERA, write_goal
+from golden_figures import DATA, SMALL_CAMERA, write_goal
 
 from omninav.pipeline.graph.ground_truth import truth_in_the_loop
 from omninav.pipeline.mcap.reader import LogReader
@@ -54,3 +54,9 @@ def test_nothing_that_steers_the_robot_knows_the_truth(tmp_path: Path, monkeypat
     with composed([*WORDS]) as config:
         graph = plan(complete(config)).graph
     assert list(truth_in_the_loop(graph)) == []
+
+
+def test_a_robot_that_runs_now_takes_the_map_and_the_goal(omninav, whole: Path, tmp_path: Path):
+    write_goal(tmp_path)
+    given = (f"map={whole / 'map.omap'}", f"camera={DATA / 'camera.yaml'}", "goal=goal.png")
+    omninav("check", "variant=landmark_nav", "source=live", "log=live", *given, check=True)

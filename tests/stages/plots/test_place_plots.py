@@ -14,8 +14,10 @@ from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, 
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.requests import GoalPoint
 
 CTX = Context("view")
 MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1, 2): 0, (2, 3): 2})
@@ -52,6 +54,9 @@ def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
     first, last = planned_routes(ways, MAP)
     assert first.tolist() == [[1.0, 1.0], [1.0, 1.0], [4.0, 1.0], [4.0, 4.0]]  # path images lie at their owner's
     assert len(last) == 5
+    references = ReferenceGraph(MAP.poses, np.zeros((4, 1, 1)), "histograms", np.zeros((0, 2), np.int64), "truth")
+    beside = PlannedRoute(np.array([0, 1]), "under way", 0, goal=GoalPoint(5.0, 1.5))
+    assert planned_routes([beside], references)[0].tolist() == [[1.0, 1.0], [4.0, 1.0], [5.0, 1.5]]
 
 
 def test_a_contact_of_a_robot_that_drives_itself_is_marked_where_it_was():
