@@ -11,7 +11,9 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Quantity
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed
+from omninav.stages.camera.strip_elevations import with_elevations_found
 from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -87,15 +89,33 @@ class CameraCheck(NamedTuple):
             parts.append(f"it is turned by {math.degrees(by['yaw']):.1f} degrees more, yaw {right.yaw:.3f}")
         if not parts:
             return ""
-        found = "; ".join(parts)
-        ctx.fact("camera_found", found)
-        ctx.warn(
-            f"the tour's images show that the camera is not as it is described: {found}. The map is less exact by it; "
-            "the run's folder has the right description: type camera=FOLDER/camera.yaml"
-        )
-        return write_camera(right)
+        return _told(ctx, "; ".join(parts), right)
+
+    def elevations_told(
+        self, ctx: Context, camera: Camera | None, views: LocalViews, matches: PairMatches, poses: Array
+    ) -> str:
+        """Say where the horizon of a strip lies that does not say its elevations, as `told`."""
+        if camera is None or camera.elevations_known or not len(self.pixels):
+            return ""
+        if np.abs(camera.unproject(self.pixels)[0] - self.bearings).max() > SAME_RAY:
+            return ""
+        right = with_elevations_found(camera, self.pixels, views, matches, poses)
+        if right is None:
+            return ""
+        top, bottom = (math.degrees(each) for each in right.elevations)
+        found = f"its rows go from {top:.1f} to {bottom:.1f} degrees above the horizon, which camera.yaml does not say"
+        return _told(ctx, found, right)
 
     def _turned(self, other: Camera) -> float:
         rays, looks = other.unproject(self.pixels)
         cos = np.einsum("ij,ij->i", rays[looks], self.bearings[looks])
         return float(np.median(np.arccos(np.clip(cos, -1.0, 1.0)))) if looks.any() else 0.0
+
+
+def _told(ctx: Context, found: str, right: Camera) -> str:
+    ctx.fact("camera_found", found)
+    ctx.warn(
+        f"the tour's images show that the camera is not as it is described: {found}. The map is less exact by it; "
+        "the run's folder has the right description: type camera=FOLDER/camera.yaml"
+    )
+    return write_camera(right)

@@ -105,7 +105,7 @@ class LearnLandmarks(Stage):
             sigma,
             words,
             rate,
-            check.told(ctx, adjusted.camera),
+            check.told(ctx, adjusted.camera) or check.elevations_told(ctx, camera, views, matches, map.poses),
         )
         ctx.fact("landmarks", len(landmarks))
         moved = np.hypot(*(poses - map.poses)[:, :2].T)

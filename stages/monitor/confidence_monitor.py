@@ -217,9 +217,10 @@ def by_landmarks(
     """Log odds that an estimate (3,) is right by landmarks, after those `before`, and how sure this image's are.
 
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
-    how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. Of a pose that
-    is right with probability p, p agrees with the estimate or not, and takes the place of what was known before; else
-    it lies in one of `PLACES_ALIKE`, so that one of few landmarks too says something of the estimate where it is new.
+    how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. A wrong pose
+    lies in one of `PLACES_ALIKE`, so that few landmarks that agree with the estimate say much for it; where they lie
+    elsewhere, as much as the pose may be wrong speaks against it. A sure pose outweighs all that was known before, as
+    the robot may have been carried elsewhere.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
     probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
@@ -230,11 +231,14 @@ def by_landmarks(
         return max(kept + NEW_WITHOUT * novelty * against, min(kept, -max_against)), 0.0
     sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
-    by_chance = max((1.0 - sure) / PLACES_ALIKE, FOUND_BY_CHANCE)
-    told = math.log((agreeing + by_chance) / (max(sure - agreeing, 0.0) + by_chance))
+    elsewhere = max(sure - agreeing, 0.0)
+    wrong = (1.0 - sure) * (agreeing / PLACES_ALIKE + elsewhere) / (agreeing + elsewhere)
+    by_chance = max(wrong, FOUND_BY_CHANCE)
+    told = math.log((agreeing + by_chance) / (elsewhere + by_chance))
     # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
     counted = novelty if told > 0.0 else NEW_WITHOUT * novelty
-    return (sure + (1.0 - sure) * counted) * told + (1.0 - sure) * kept, sure
+    bound = math.log(1.0 / KIDNAPPING_PROBABILITY)
+    return min(max(kept, -bound), bound) + (sure + (1.0 - sure) * counted) * told, sure
 
 
 def share_found(distance: float) -> float:

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -5,11 +6,13 @@ import pytest
 from landmark_world import NOISE, house
 
 from omninav.pipeline import Context
+from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.self_calibration import adjustable
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.landmarks.adjustment import adjusted
+from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.mapping.camera_check import CameraCheck
 from omninav.stages.recordings.camera_yaml import parse_camera
 
@@ -79,3 +82,41 @@ def test_bearings_of_other_pixels_and_cameras_without_an_axis_are_not_checked(se
         assert each.camera is None
         assert each.metrics(np.empty(0)) == {}
         assert each.seen(np.arange(0)).sigmas.shape == (0,)
+
+
+def strip_told(top, described):
+    """What is said, and the camera.yaml written, of a strip whose upper edge truly lies at `top` (rad)."""
+    world = house(np.random.default_rng(0))
+    true = Equirectangular(720, 300, 360.0, elevation_top=top, elevation_bottom=top - math.radians(150.0))
+    pixels, seen = true.project(world.bearings)
+    rows = np.flatnonzero(seen)
+    rows = rows[np.argsort(world.references[rows], kind="stable")]
+    bearings = described.unproject(pixels[rows])[0]
+    owners, landmarks = world.references[rows], world.landmarks[rows]
+    starts = np.searchsorted(owners, np.arange(len(world.poses) + 1))
+    views = LocalViews(starts, bearings, np.zeros((len(rows), 1), np.uint8))
+    pairs = np.column_stack([np.arange(len(world.poses) - 1), np.arange(1, len(world.poses))])
+    shared = []
+    for one, other in pairs:
+        seen_by = landmarks[views.rows(one)], landmarks[views.rows(other)]
+        _, first, second = np.intersect1d(*seen_by, return_indices=True)
+        shared.append((first + starts[one], second + starts[other]))
+    lengths = np.cumsum([0, *(len(first) for first, _ in shared)])
+    first, second = (np.concatenate([each[n] for each in shared]) for n in (0, 1))
+    matches = PairMatches(pairs, lengths, first, second, np.zeros(len(first)))
+    ctx = Context("landmarks")
+    check = CameraCheck(None, {}, pixels[rows], bearings)
+    return ctx.warnings, check.elevations_told(ctx, described, views, matches, world.poses)
+
+
+def test_the_horizon_of_a_strip_that_does_not_say_it_is_found():
+    unsaid = Cylindrical(720, 300, 360.0)
+    warnings, file = strip_told(math.radians(90.0), unsaid)
+    assert np.degrees(parse_camera(file, "camera.yaml").elevations) == pytest.approx((90.0, -60.0), abs=0.5)
+    assert "its rows go from 90.0 to -60.0 degrees" in warnings[0]
+
+
+def test_elevations_that_are_right_or_said_stay():
+    assert strip_told(math.radians(75.0), Cylindrical(720, 300, 360.0)) == ([], "")
+    said = Cylindrical(720, 300, 360.0, elevation_top=1.0, elevation_bottom=-1.0)
+    assert strip_told(math.radians(90.0), said) == ([], "")
