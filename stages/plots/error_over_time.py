@@ -45,8 +45,8 @@ def _summary(drive: Drive, several: bool) -> str:
     words = "converged at once" if settled == 0 else "never converged"
     if settled:
         words = f"converged after {counted(settled, 'frame')} (green line)"
-    beside = "" if odometry is None else f", odometry alone {_last(odometry, drive):.2f} m"
-    text = f"{which}{words}; at the end the estimate is {_last(drive.estimate, drive):.2f} m off{beside}."
+    beside = "" if odometry is None else f", odometry alone {_last(odometry, drive):.3f} m"
+    text = f"{which}{words}; at the end the estimate is {_last(drive.estimate, drive):.3f} m off{beside}."
     return text[:1].upper() + text[1:]
 
 

@@ -275,15 +275,15 @@ def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> li
         errors(drive.estimate[one], drive.truth[one]) for errors in (position_errors, heading_errors_deg)
     )
     if np.isfinite(metres):
-        facts.append(("error", f"{metres:.2f} m, {degrees:.1f}°"))
+        facts.append(("error", f"{metres:.3f} m, {degrees:.1f}°"))
     if known(drive.estimate[one]).all():
         x, y, heading = drive.estimate[n]
-        facts.append(("estimate", f"x {x:.2f} m, y {y:.2f} m, {math.degrees(heading):.0f}°"))
+        facts.append(("estimate", f"x {x:.3f} m, y {y:.3f} m, {math.degrees(heading):.0f}°"))
     if isinstance(belief, PlaceBelief):
         place = int(np.argmax(belief.probabilities))
         facts.append(("believed", f"place {place}, {100 * belief.probabilities[place]:.0f} %"))
     elif belief is not None and np.isfinite(spread := spread_m(belief)) and spread > 0:
-        facts.append(("spread of the belief", f"{spread:.2f} m"))
+        facts.append(("spread of the belief", f"{spread:.3f} m"))
     if drive.reference[n] >= 0:
         words = [f"number {drive.reference[n]}"]
         if np.isfinite(drive.similarity[n]):

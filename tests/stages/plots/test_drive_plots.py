@@ -104,7 +104,7 @@ def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     assert [slide.label.split(" · ")[0] for slide in slides] == [f"frame {n}" for n in range(30)]
     facts = dict(slides[4].facts)
     wrong = np.hypot(*(drive.estimate[4] - drive.truth[4])[:2])
-    assert facts["error"].startswith(f"{wrong:.2f} m")
+    assert facts["error"].startswith(f"{wrong:.3f} m")
     assert facts["best match"].startswith("number 7, similarity 90 %, taken")
     assert [words for words, _ in slides[4].photographs] == ["image", "best match in the map"]
     assert slides[4].overlay != slides[5].overlay
