@@ -5,6 +5,7 @@ import numpy as np
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.geometry.probability.particles import systematic
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
@@ -46,7 +47,7 @@ def _step() -> list[Row]:
     moved, length_scale, start = Motion(0.2, 0.0, 0.05), LengthScale(0.6), _particles()
 
     def ours() -> None:
-        predicted = motion.step(ctx, start, moved).belief
+        predicted = motion.step(ctx, start, moved, MeasuredNoise()).belief
         weighted = sensor.step(ctx, field, predicted, whole, moved, length_scale)
         proposed = proposals.step(ctx, weighted.field, whole, length_scale).proposals
         fusion.step(ctx, predicted, weighted.likelihood, proposed)

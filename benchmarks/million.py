@@ -31,6 +31,7 @@ from omninav.stages.candidates.reference_index import BuildReferenceIndex, Build
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.sensor.near_references import NearReferences
@@ -93,7 +94,7 @@ class Filter:
     def step(self, frame: Frame) -> None:
         """One image."""
         number, moved, view, _ = frame
-        belief = self.motion.step(self._at(self.motion, number), self.belief, moved).belief
+        belief = self.motion.step(self._at(self.motion, number), self.belief, moved, MeasuredNoise()).belief
         context = self._at(self.candidates, number)
         chosen = self.candidates.step(context, view, self.map, self.index, belief, self.scale).candidates
         alike = self.match.step(self._at(self.match, number), view, self.map, chosen).similarities

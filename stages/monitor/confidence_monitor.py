@@ -43,6 +43,8 @@ KIDNAPPING_PROBABILITY = 0.02
 """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
 or found itself again."""
 
+CARRIED_SINCE = 0.002
+"""The same after landmarks were found, of which the next sure ones tell at once."""
 FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 HALF_FOUND = 5.0
@@ -223,7 +225,7 @@ def by_landmarks(
     the robot may have been carried elsewhere.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
-    probability += (0.5 - probability) * KIDNAPPING_PROBABILITY * novelty
+    probability += (0.5 - probability) * CARRIED_SINCE * novelty
     kept = math.log(probability / (1.0 - probability))
     if fix is None:
         found = FOUND_OF_LEFT_OUT * found_rate

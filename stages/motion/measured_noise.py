@@ -28,8 +28,8 @@ says nothing of its wheels."""
 
 class MeasuredNoise(State):
     """Squared errors of odometry in variances of its stated noise, of turns and of lengths: `squares` (2,), summed over
-    so many `stretches`. `anchor` (3,): the last sure pose; `since` (3,): odometry from there; `expected` (2,): variances
-    of its turn and length by the stated noise; `driven`: its way (m)."""
+    so many `stretches`. `anchor` (3,): the last sure pose; `since` (3,): odometry from there; `driven`: its way (m);
+    `expected` (2,): variances of its turn and length by the stated noise."""
 
     squares: Array = field(default_factory=lambda: np.full(2, PRIOR))
     stretches: float = PRIOR

@@ -17,6 +17,7 @@ from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, Delaye
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.mapping.past_states import CorrectPastStates, CorrectPastStatesState
 from omninav.stages.match.neighbours import ViewNeighbours
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.pose import Motion, Pose
@@ -98,7 +99,7 @@ def run(
         hypothesis = sensor.step(ctx["rest"], neighbours, known).hypothesis
         belief = start.step(ctx["first"], known, Pose(*map(float, pose))).belief or belief
         assert belief is not None
-        moved = move.step(ctx["motion"], belief, motion)
+        moved = move.step(ctx["motion"], belief, motion, MeasuredNoise())
         belief = fuse.step(ctx["fusion"], moved.belief, hypothesis).belief
         state = gather.step(ctx["rest"], belief).state
         past = correct.step(ctx["rest"], view, state, moved.model, path, neighbours, known).corrections

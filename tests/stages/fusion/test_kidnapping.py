@@ -12,6 +12,7 @@ from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
@@ -87,7 +88,7 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
         moved = STEP if k else None
         if k == 0:
             belief = start.step(contexts["start"], MAP, None, LENGTH_SCALE).belief
-        belief = motion.step(contexts["motion"], belief, moved).belief
+        belief = motion.step(contexts["motion"], belief, moved, MeasuredNoise()).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
         chosen = candidates.step(contexts["candidates"], view, MAP, INDEX, belief, LENGTH_SCALE).candidates
         alike = match.step(contexts["match"], view, MAP, chosen).similarities

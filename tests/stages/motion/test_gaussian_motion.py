@@ -10,6 +10,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion, motion_gaussian, move_gaussians
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.gaussian import GaussianMotion
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import Motion
@@ -36,7 +37,9 @@ def test_the_linearised_motion_has_the_moments_of_the_sampled_one() -> None:
     rng = np.random.default_rng(0)
     poses = start + rng.multivariate_normal(np.zeros(3), covariance, number)
     ctx = Context("motion", rng)
-    sampled = RotationTranslationRotation().step(ctx, Particles(poses, np.full(number, 1 / number)), motion)
+    sampled = RotationTranslationRotation().step(
+        ctx, Particles(poses, np.full(number, 1 / number)), motion, MeasuredNoise()
+    )
     belief = GaussianMixture(start[None], covariance[None], np.ones(1))
     out = GaussianMotion().step(ctx, belief, motion)
     apart = np.stack([sampled.belief.poses[:, i] - out.belief.means[0, i] for i in range(3)], axis=1)

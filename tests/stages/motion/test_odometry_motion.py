@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion, move_poses
 from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Motion
@@ -48,7 +49,7 @@ def test_samples_have_the_spread_that_the_parameters_say() -> None:
     number = 200_000
     ctx = Context("motion", np.random.default_rng(3))
     start = Particles(np.zeros((number, 3)), np.full(number, 1 / number))
-    poses = stage.step(ctx, start, Motion(1.0, 0.0, 0.5)).belief.poses
+    poses = stage.step(ctx, start, Motion(1.0, 0.0, 0.5), MeasuredNoise()).belief.poses
     way = math.sqrt(0.05**2 + 0.04**2 * 0.5 + 0.02**2)
     first = math.sqrt((0.1**2 * 0.5 + 0.02**2 + 0.01**2) / 2)
     heading = math.sqrt(2) * first
@@ -61,13 +62,15 @@ def test_samples_have_the_spread_that_the_parameters_say() -> None:
 
 def test_without_motion_the_belief_stays() -> None:
     belief = Particles(np.ones((5, 3)), np.full(5, 0.2))
-    assert RotationTranslationRotation().step(Context("motion"), belief, None).belief is belief
+    assert RotationTranslationRotation().step(Context("motion"), belief, None, MeasuredNoise()).belief is belief
 
 
 def test_weights_pass_unchanged_and_the_input_is_not_written_to() -> None:
     poses, weights = np.zeros((4, 3)), np.array([0.1, 0.2, 0.3, 0.4])
     out = (
-        RotationTranslationRotation(**SILENT).step(Context("motion"), Particles(poses, weights), Motion(1, 0, 0)).belief
+        RotationTranslationRotation(**SILENT)
+        .step(Context("motion"), Particles(poses, weights), Motion(1, 0, 0), MeasuredNoise())
+        .belief
     )
     assert np.array_equal(out.weights, weights)
     assert not poses.any()
@@ -81,7 +84,7 @@ def test_many_small_motions_are_as_uncertain_as_the_one_they_make_up() -> None:
     def spread(parts: int) -> np.ndarray:
         ctx, belief = Context("motion", np.random.default_rng(1)), start
         for _ in range(parts):
-            belief = stage.step(ctx, belief, Motion(1.0 / parts, 0.0, 0.3 / parts)).belief
+            belief = stage.step(ctx, belief, Motion(1.0 / parts, 0.0, 0.3 / parts), MeasuredNoise()).belief
         return belief.poses[:, [0, 2]].std(axis=0)
 
     assert spread(50)[1] == pytest.approx(spread(1)[1], rel=0.02)
