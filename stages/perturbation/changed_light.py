@@ -1,35 +1,40 @@
 """Other light than when the map was learned: brightness, contrast, colour, and from which side."""
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.values.image import Panorama, Pixels, column_azimuths
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
+
+Array = npt.NDArray[np.float64]
 
 Gain = Annotated[float, Bounds(gt=0, le=10)]
 
 
 def changed_light(
-    pixels: Pixels, gamma: float, gains: tuple[float, float, float], side: float, direction: float
+    pixels: Pixels, gamma: float, gains: tuple[float, float, float], side: float, direction: float, azimuths: Array
 ) -> Pixels:
-    """A panorama in other light: 255 (v / 255)^gamma gain (1 + side cos(azimuth - direction)), cut at 255.
+    """An image in other light: 255 (v / 255)^gamma gain (1 + side cos(azimuth - direction)), cut at 255.
 
     `pixels` (rows, columns, 3) uint8; `gains`: of blue, green, red; `side` in [0, 1]: share by which light from
-    `direction` (radians, counter-clockwise from forward) exceeds the mean.
+    `direction` (radians, counter-clockwise from forward) exceeds the mean; `azimuths` (columns,) or (rows, columns).
     """
     curve = 255.0 * (np.arange(256) / 255.0) ** gamma
-    around = 1.0 + side * np.cos(column_azimuths(pixels.shape[1]) - direction)
-    levels: npt.NDArray[np.float64] = curve[pixels] * np.asarray(gains) * around[:, None]
+    around = 1.0 + side * np.cos(azimuths - direction)
+    levels: Array = curve[pixels] * np.asarray(gains) * around[..., None]
     return np.rint(np.minimum(levels, 255.0)).astype(np.uint8)
 
 
 class ChangedLight(Stage):
-    """Shows the panorama in other light than the map was learned in.
+    """Shows the image, as it was taken or unwarped, in other light than the map was learned in.
 
-    The light is fixed to the robot: it turns with it, as a lamp on the robot or its shadow does.
+    Local features see images as they were taken: wire those where a graph has any. The light is fixed to the robot: it
+    turns with it, as a lamp on the robot or its shadow does.
     """
 
     gamma: Annotated[float, Bounds(gt=0, le=10)] = 1.0
@@ -46,12 +51,31 @@ class ChangedLight(Stage):
     """Direction it comes from, counter-clockwise from forward."""
 
     class Out(Outputs):
-        """The panorama in other light."""
+        """What was given, in other light."""
 
-        panorama: Panorama
+        panorama: Panorama | None = None
+        image: Image | None = None
 
-    def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Change the light of one panorama."""
+    def step(
+        self,
+        ctx: Context,
+        panorama: Panorama | None = None,
+        image: Image | None = None,
+        camera: Camera | None = None,
+    ) -> Out:
+        """Change the light of a panorama, or of an image, which needs its camera."""
+        out = self.Out()
+        if panorama is not None:
+            changed = self._changed(panorama.pixels, column_azimuths(panorama.pixels.shape[1]))
+            out = replace(out, panorama=replace(panorama, pixels=changed))
+        if image is not None:
+            if camera is None:
+                raise BadInput("changed_light: an image needs its camera: wire camera: source.camera beside it")
+            rays, _ = camera.unproject(camera.grid())
+            azimuths = np.nan_to_num(np.arctan2(rays[..., 1], rays[..., 0]))
+            out = replace(out, image=Image(self._changed(image.pixels, azimuths)))
+        return out
+
+    def _changed(self, pixels: Pixels, azimuths: Array) -> Pixels:
         gains = (self.gain * self.blue, self.gain, self.gain * self.red)
-        pixels = changed_light(panorama.pixels, self.gamma, gains, self.side, math.radians(self.direction_deg))
-        return self.Out(panorama=Panorama(pixels, panorama.elevation_top, panorama.elevation_bottom))
+        return changed_light(pixels, self.gamma, gains, self.side, math.radians(self.direction_deg), azimuths)

@@ -10,13 +10,14 @@ from omninav.stages.features.haar_integral import HaarIntegral
 from omninav.stages.features.hsv_histogram import HsvHistogram
 from omninav.stages.features.mean_rgb import MeanRgb
 from omninav.stages.perturbation.changed_light import changed_light
-from omninav.stages.values.image import Panorama, Windows
+from omninav.stages.values.image import Panorama, Windows, column_azimuths
 
 CTX = Context("features", np.random.default_rng(0))
+AROUND = column_azimuths(360)
 SCENE = np.random.default_rng(0).integers(20, 120, (40, 360, 3), dtype=np.uint8)
-WARM = changed_light(SCENE, 1.0, (0.6, 1.0, 1.3), 0.0, 0.0)
-DARK = changed_light(SCENE, 1.0, (0.7, 0.7, 0.7), 0.0, 0.0)
-FROM_ONE_SIDE = changed_light(SCENE, 1.0, (1.0, 1.0, 1.0), 0.5, 1.0)
+WARM = changed_light(SCENE, 1.0, (0.6, 1.0, 1.3), 0.0, 0.0, AROUND)
+DARK = changed_light(SCENE, 1.0, (0.7, 0.7, 0.7), 0.0, 0.0, AROUND)
+FROM_ONE_SIDE = changed_light(SCENE, 1.0, (1.0, 1.0, 1.0), 0.5, 1.0, AROUND)
 
 
 @pytest.mark.parametrize("light", [WARM, DARK])

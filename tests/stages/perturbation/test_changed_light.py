@@ -1,13 +1,16 @@
 """Other light than the map was learned in."""
 
 import numpy as np
+import pytest
 
-from omninav.pipeline import Context
+from omninav.pipeline import BadInput, Context
+from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.perturbation.changed_light import ChangedLight, changed_light
-from omninav.stages.values.image import Panorama
+from omninav.stages.values.image import Image, Panorama, column_azimuths
 
 CTX = Context("perturbation", np.random.default_rng(0))
 GREY = np.full((4, 360, 3), 100, np.uint8)
+AROUND = column_azimuths(360)
 
 
 def test_as_it_is_by_default():
@@ -15,8 +18,8 @@ def test_as_it_is_by_default():
 
 
 def test_gamma_gain_and_colour():
-    assert (changed_light(GREY, 1.0, (0.5, 1.0, 3.0), 0.0, 0.0)[0, 0] == [50, 100, 255]).all()
-    assert (changed_light(GREY, 2.0, (1.0, 1.0, 1.0), 0.0, 0.0) == round(255 * (100 / 255) ** 2)).all()
+    assert (changed_light(GREY, 1.0, (0.5, 1.0, 3.0), 0.0, 0.0, AROUND)[0, 0] == [50, 100, 255]).all()
+    assert (changed_light(GREY, 2.0, (1.0, 1.0, 1.0), 0.0, 0.0, AROUND) == round(255 * (100 / 255) ** 2)).all()
 
 
 def test_light_from_the_left_is_brightest_there():
@@ -24,3 +27,11 @@ def test_light_from_the_left_is_brightest_there():
     assert abs(int(view.argmax()) - 90) <= 12  # columns run clockwise from behind, so the left is a quarter in
     assert view.max() == 150
     assert view.min() == 50
+
+
+def test_an_image_is_lit_as_its_camera_looks():
+    forward_left = Equirectangular(360, 4, 0.0, sense="counter_clockwise", elevation_top=0.1, elevation_bottom=-0.1)
+    view = ChangedLight(side=0.5, direction_deg=90).step(CTX, image=Image(GREY), camera=forward_left).image.pixels
+    assert abs(int(view[0, :, 0].argmax()) - 90) <= 12
+    with pytest.raises(BadInput, match="an image needs its camera"):
+        ChangedLight().step(CTX, image=Image(GREY))
