@@ -1,7 +1,7 @@
 """Two drives through a level of a game engine, as logs: corridors that look alike, and other brightness at last.
 
     pip install vizdoom
-    python benchmarks/game_level.py --out FOLDER [--level map01] [--seed 0] [--people]
+    python benchmarks/game_level.py --out FOLDER [--level map01] [--seed 0] [--people] [--beside 2]
 
 Writes `tour.mcap` and `drive.mcap` with images, odometry and truth. ViZDoom (MIT) brings Freedoom's levels (BSD). A
 panorama is stitched of four views of 90 degrees. The tour visits points all over the level; the drive visits half of
@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, gaussian_filter, gaussian_filter1d
+from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter, gaussian_filter1d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -48,6 +48,8 @@ PIXEL_RATIO, TANGENT = 1.2, 0.44
 """Height of the engine's pixels over their width; tangent of the panorama's highest elevation."""
 GAMMA = {"tour": 0.6, "drive": 0.85}
 POINTS = 12
+AVOIDED = 20.0
+"""Factor of the cost of cells near the tour's way, for a drive beside it."""
 
 
 class Level:
@@ -147,9 +149,14 @@ def free_cells(walls: Array) -> tuple[Bools, Array]:
 class Routes:
     """Ways over free cells, which differ by the costs of the cells."""
 
-    def __init__(self, free: Bools, corner: Array, rng: np.random.Generator) -> None:
+    def __init__(self, free: Bools, corner: Array, rng: np.random.Generator, avoided: Array, beside: float) -> None:
         self.corner = corner
         cost = np.exp(0.7 * _unit(gaussian_filter(rng.normal(size=free.shape), 2.0)))
+        if len(avoided) and beside:
+            rows, columns = np.floor((avoided - corner) / (CELL / UNITS)).astype(int)[:, ::-1].T
+            driven_over = np.zeros(free.shape, np.bool_)
+            driven_over[rows, columns] = True
+            cost[distance_transform_edt(~driven_over) * CELL / UNITS < beside] *= AVOIDED
         number = np.full(free.shape, -1)
         number[free] = np.arange(int(free.sum()))
         self.cells, cost, number = np.argwhere(free), np.pad(cost, 1), np.pad(number, 1, constant_values=-1)
@@ -269,16 +276,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of routes and of odometry's errors")
     parser.add_argument("--within", type=float, default=40.0, help="metres on the path from the start that are visited")
     parser.add_argument("--people", action="store_true", help="figures stand about in the drive")
+    parser.add_argument("--beside", type=float, default=0.0, help="metres that the drive keeps off the tour's way")
     given = parser.parse_args()
+    tour = np.empty((0, 2))
     given.out.mkdir(parents=True, exist_ok=True)
     for name in ("tour", "drive"):
         level = Level(given.level, people=given.people and name == "drive")
         rng = np.random.default_rng([given.seed, name == "drive"])
-        routes = Routes(*free_cells(level.walls), rng)
+        routes = Routes(*free_cells(level.walls), rng, tour, given.beside)
         if name == "tour":
             points = routes.nearest_first(routes.far_points(routes.nearest(level.start), POINTS, given.within))
         chosen = points if name == "tour" else rng.permutation(points[:-1])[: POINTS // 2].tolist()
         poses = driven(routes.path(chosen))
+        tour = poses[:, :2] if name == "tour" else tour
         write(level, poses, given.out / f"{name}.mcap", GAMMA[name], rng)
         metres = np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()
         print(f"{given.out / name}.mcap: {-(-len(poses) // STEPS_PER_IMAGE)} images, {metres:.0f} m")
