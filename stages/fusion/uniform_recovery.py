@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
@@ -34,16 +33,9 @@ class UniformRecovery(Stage):
 
         belief: Particles
 
-    def step(
-        self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None = None
-    ) -> Out:
-        """Fuse prediction and observation."""
-        if self.random_particles and proposals is None:
-            raise BadInput(
-                "fusion: random particles are drawn from proposals; wire fusion.proposals to a sensor that gives them "
-                "(nodes.sensor.proposals above 0), or type nodes.fusion.random_particles=0"
-            )
-        number = min(self.random_particles, self.number)
+    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
+        """Fuse prediction and observation; without proposals, as of a robot that was not carried, none is random."""
+        number = 0 if proposals is None else min(self.random_particles, self.number)
         poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, number, proposals)
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
 

@@ -7,6 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
+from omninav.stages.values.track import Track
 
 
 class FreeSpaceProposals(Stage):
@@ -19,10 +20,12 @@ class FreeSpaceProposals(Stage):
     """Poses proposed at each image."""
 
     class Out(Outputs):
-        """Poses of equal weights."""
+        """Poses of equal weights; absent of a robot that was not carried."""
 
-        proposals: Particles
+        proposals: Particles | None = None
 
-    def step(self, ctx: Context, tick: Tick, free: FreeSpace) -> Out:
+    def step(self, ctx: Context, tick: Tick, free: FreeSpace, track: Track | None = None) -> Out:
         """Propose poses for one image: `tick` is read so that others are drawn for the next."""
+        if track is not None and track.unbroken:
+            return self.Out()
         return self.Out(proposals=Particles(free.draw(ctx.rng, self.number), np.full(self.number, 1.0 / self.number)))

@@ -29,9 +29,12 @@ NEAR_EACH = 2
 """References that are candidates around each of them."""
 COVARIANCE_FACTOR = 2.5
 """Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
-ODDS_PER_INLIER, EVEN_INLIERS, MAX_LOG_ODDS = 0.3, 24.0, 8.0
-"""Log odds (nats) that a pose is right, by how many landmarks agree: of images of another building with the same walls
-and ceilings 12 to 26 agree, of a changed shop's own 98 % have 10 and more (docs/experiments/landmarks.md)."""
+SECTOR = math.radians(15.0)
+"""Width of a sector of the view (rad)."""
+ODDS_PER_SECTOR, EVEN_SECTORS, MAX_LOG_ODDS = 0.75, 7.5, 8.0
+"""Log odds (nats) that a pose is right, by the sectors in which landmarks agree: what misleads is one wall or one shelf
+that repeats itself, so that of 40 landmarks that agree on a wrong pose all lie in three to seven sectors of 24, and 16
+that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.001, 0.001, math.radians(0.01))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 WITHOUT_LANDMARKS = (
@@ -47,8 +50,9 @@ class LandmarkPose(Stage):
     Candidates are the references that share most visual words with the image, over the whole map, and those near the
     belief, both always: a belief may be wrong, and words may be ambiguous. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
-    elsewhere, since wrong matches agree with each other in places that repeat themselves. An image with too few inliers
-    says nothing, and so does a map without landmarks. Raises BadInput for features of another kind than the map's.
+    elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is as sure as its
+    inliers lie all around. An image with too few inliers says nothing, and so does a map without landmarks. Raises
+    BadInput for features of another kind than the map's.
     """
 
     word_references: Annotated[int, Bounds(ge=1)] = 10
@@ -93,7 +97,7 @@ class LandmarkPose(Stage):
                 np.array([each.pose for each in found]),
                 np.array([covariance_of(each, landmarks.sigma_rad) for each in found]),
                 inliers,
-                probabilities_of(inliers),
+                probabilities_of(np.array([sectors_of(bearings[each.inliers]) for each in found])),
                 len(points),
                 bearings.astype(np.float32),
                 agreeing(found),
@@ -128,11 +132,16 @@ def covariance_of(pose: BearingPose, sigma: float) -> Array:
     return covariance
 
 
-def probabilities_of(inliers: Ints) -> Array:
-    """Probabilities (K,) that each of rival poses is right, of which so many landmarks agree (K,).
+def sectors_of(bearings: Array) -> int:
+    """The number of sectors of the view in which some bearings (M, 3) lie."""
+    return len(distinct(np.floor(np.arctan2(bearings[:, 1], bearings[:, 0]) / SECTOR).astype(np.int64)))
 
-    The odds grow by `ODDS_PER_INLIER` (nats) with each landmark, and are even at `EVEN_INLIERS`.
+
+def probabilities_of(sectors: Ints) -> Array:
+    """Probabilities (K,) that each of rival poses is right, whose landmarks lie in so many sectors of the view (K,).
+
+    The odds grow by `ODDS_PER_SECTOR` (nats) with each sector, and are even at `EVEN_SECTORS`.
     """
-    odds = np.exp(np.minimum(ODDS_PER_INLIER * (inliers - EVEN_INLIERS), MAX_LOG_ODDS))
+    odds = np.exp(np.minimum(ODDS_PER_SECTOR * (sectors - EVEN_SECTORS), MAX_LOG_ODDS))
     probabilities: Array = odds / (1.0 + odds.sum())
     return probabilities

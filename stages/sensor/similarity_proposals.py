@@ -11,6 +11,7 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import SimilarityField
+from omninav.stages.values.track import Track
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -28,15 +29,20 @@ class SimilarityProposals(Stage):
     """Poses proposed at each image."""
 
     class Out(Outputs):
-        """Poses worth a try; absent without a field."""
+        """Poses worth a try; absent without a field, and of a robot that was not carried."""
 
         proposals: Particles | None = None
 
     def step(
-        self, ctx: Context, field: SimilarityField | None, map: ReferenceGraph, length_scale: LengthScale | None = None
+        self,
+        ctx: Context,
+        field: SimilarityField | None,
+        map: ReferenceGraph,
+        length_scale: LengthScale | None = None,
+        track: Track | None = None,
     ) -> Out:
         """Propose poses for one image."""
-        if field is None:
+        if field is None or (track is not None and track.unbroken):
             return self.Out()
         unit = metres_of(length_scale)
         headings = field.values.shape[1]

@@ -1,0 +1,153 @@
+"""Holds a belief to its track where landmarks show another place that looks the same."""
+
+import math
+from dataclasses import field
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Outputs, Stage, State
+from omninav.stages.geometry.landmarks.unbroken_view import carried_at_most
+from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.probability.particles import are_within
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.length_scale import LengthScale, metres_of
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.requests import Restart
+from omninav.stages.values.track import Track
+
+Array = npt.NDArray[np.float64]
+
+NEAR = (1.0, math.radians(30.0))
+"""Distance (m) and turn (rad) within which two poses are of one place."""
+SURE, LIKELY = 0.95, 0.5
+"""Probability of a pose by landmarks from which on it confirms the belief, and from which on it counts against it."""
+BELIEVED, CONTRADICTED = 0.5, 0.02
+"""Share of the belief around a pose above which both agree, and below which they contradict each other."""
+MAX_CONFIRMED = 20.0
+"""Way, in length scales, on which a robot that was surely on its track may see another place, at most."""
+MAX_SINCE = 100.0
+"""Way since the last pose that confirmed the track, in length scales, after which it is forgotten."""
+DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
+"""Part of the way since then by which odometry may be off, and turn by which it may be off after a metre (rad)."""
+
+
+class UnbrokenTrackState(State):
+    """The pose (3,) that landmarks confirmed last, carried by odometry, and over how long a way they did (m).
+
+    `since`: way since then, on which the robot may have been carried as far as `carried`; `against`: way on which
+    landmarks spoke against the track, and `elsewhere`: on which they confirmed a belief elsewhere (m). `bearings`
+    (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
+    """
+
+    pose: Array = field(default_factory=lambda: np.zeros(3))
+    confirmed: float = 0.0
+    since: float = 0.0
+    carried: float = 0.0
+    against: float = 0.0
+    elsewhere: float = 0.0
+    moved: Array = field(default_factory=lambda: np.zeros(3))
+    bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
+    descriptors: npt.NDArray[np.uint8] = field(default_factory=lambda: np.empty((0, 0), np.uint8))
+
+    def confirm(self, pose: Array, way: float) -> None:
+        """Go on from a pose (3,) that was confirmed over so long a way (m)."""
+        self.pose, self.confirmed = pose.copy(), way
+        self.since, self.carried, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0
+
+    def leads_to(self, pose: Array) -> bool:
+        """Whether a robot that was on the track may be at a pose (3,) by now."""
+        away, turned = pose - self.pose, abs(float(wrap(pose[2] - self.pose[2])))
+        near = math.hypot(away[0], away[1]) < NEAR[0] + self.carried + DRIFT * self.since
+        return near and turned < NEAR[1] + TURN_DRIFT * self.since
+
+
+class UnbrokenTrack(Stage):
+    """Leaves out poses by landmarks that a robot cannot have, as it was surely elsewhere and not carried since.
+
+    Not in the papers. A building may have two halls that look the same, of which the map shows one: each image of the
+    other agrees with it, and no threshold tells. But where landmarks have confirmed the belief, and each image since
+    then continues the one before as odometry says, the robot was not carried. So poses elsewhere are left out, and the
+    belief's recovery particles too, until they have gone on for as long a way as the belief was confirmed. Where an
+    image does not continue the one before, everything counts: a robot that was carried is found at once.
+    """
+
+    class Out(Outputs):
+        """Belief and fix without what the track rules out."""
+
+        belief: Particles
+        track: Track
+        fix: LandmarkFix | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        state: UnbrokenTrackState,
+        belief: Particles,
+        features: LocalFeatures | None,
+        fix: LandmarkFix | None = None,
+        motion: Motion | None = None,
+        length_scale: LengthScale | None = None,
+        restart: Restart | None = None,
+    ) -> Out:
+        """Judge one image; `features`: of it, from which `fix` was made."""
+        unit = metres_of(length_scale)
+        if motion is None or ctx.tick.first_of_log or restart is not None:
+            vars(state).update(vars(UnbrokenTrackState()))
+        else:
+            moved = np.array([motion.x, motion.y, motion.turn])
+            state.pose, state.moved = compose(state.pose, moved), compose(state.moved, moved)
+            state.since += math.hypot(motion.x, motion.y)
+        left_out = features is not None and self._ruled_out(state, belief, features, fix, unit)
+        holds = state.against < state.confirmed and state.since < MAX_SINCE * unit and math.isfinite(state.carried)
+        if holds and belief.recovery_particles:
+            belief = without_recovery(belief)
+        return self.Out(belief=belief, track=Track(holds), fix=None if left_out and holds else fix)
+
+    def _ruled_out(
+        self,
+        state: UnbrokenTrackState,
+        belief: Particles,
+        features: LocalFeatures,
+        fix: LandmarkFix | None,
+        unit: float,
+    ) -> bool:
+        """Keep account of what landmarks say of the track; whether they show a place that it does not lead to."""
+        before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
+        (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
+        way = math.hypot(moved[0], moved[1])
+        pose = None if fix is None or not len(fix) else fix.poses[0]
+        sure = 0.0 if fix is None or pose is None else float(fix.probabilities[0])
+        believed = 0.0 if pose is None else share_around(belief, pose)
+        agrees = sure >= SURE and believed > BELIEVED
+        if pose is not None and agrees and (not state.confirmed or state.leads_to(pose)):
+            state.confirm(pose, min(state.confirmed + state.since, MAX_CONFIRMED * unit))
+            return False
+        if state.confirmed and math.isfinite(state.carried):
+            state.carried = max(state.carried, carried_at_most(before, now, moved))
+        if pose is None:
+            return False
+        if agrees:  # the belief gave way, and may have been right before
+            state.elsewhere += way
+            if state.elsewhere >= state.confirmed:
+                state.confirm(pose, state.elsewhere)
+            return False
+        if believed > CONTRADICTED or state.leads_to(pose):
+            return False
+        if sure >= LIKELY:
+            state.against += way
+        return True
+
+
+def share_around(belief: Particles, pose: Array) -> float:
+    """The share of a belief close to a pose (3,)."""
+    return float(np.add.reduce(belief.weights[are_within(np.ascontiguousarray(belief.poses), pose, *NEAR)]))
+
+
+def without_recovery(belief: Particles) -> Particles:
+    """A belief without its recovery particles, of a robot that was not carried."""
+    kept = len(belief.poses) - belief.recovery_particles
+    total = float(np.add.reduce(belief.weights[:kept]))
+    return Particles(belief.poses[:kept], belief.weights[:kept] / total, 0) if total > 0.0 else belief

@@ -1,0 +1,51 @@
+"""Tells how far a robot may have been carried between two images."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
+
+from .pair_check import fit_motion
+
+Array = npt.NDArray[np.float64]
+Bytes = npt.NDArray[np.uint8]
+
+RATIO = 0.8
+"""Largest ratio of a match's distance to that of the second nearest."""
+TOLERANCE = math.radians(1.0)
+"""Angle of a bearing to the plane of the motion and the other bearing, above which a match does not fit (rad)."""
+TURNS = np.radians(np.arange(-6.0, 7.0))
+"""Errors of odometry's turn that are tried (rad)."""
+STANDING_M = 0.02
+"""Way below which only the turn counts (m)."""
+MIN_FITTING, MIN_SHARE = 25, 0.5
+"""Matches that must fit odometry's motion, and their share, of a robot that was not carried. Of images in a row 99 %
+and more have them (a house, two offices, a store), of images 1 to 3 m from where odometry says 0 to 7 %."""
+SAME_SURROUNDINGS, SURROUNDINGS_M = 40, 5.0
+"""Matches that two images of the same surroundings have, and how far off these were taken at most (m): of images in a
+row 98 % have 50 and more, also where the camera was lifted; of images more than 3 m off 98 % have fewer than 24."""
+
+
+def carried_at_most(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> float:
+    """How far (m) from where odometry says an image may have been taken: 0 if it continues the one before.
+
+    Of both: bearings (N, 3) and descriptors (N, D); `motion` (3,) between them.
+    """
+    pairs = mutual_nearest_units(root_descriptors(before[1]), root_descriptors(now[1]), RATIO)
+    first = np.ascontiguousarray(before[0][pairs.first])
+    second = np.ascontiguousarray(now[0][pairs.second])
+    number = max(_fitting(first, second, motion + np.array([0.0, 0.0, by])) for by in TURNS)
+    if number >= max(MIN_FITTING, MIN_SHARE * len(first)):
+        return 0.0
+    return SURROUNDINGS_M if len(first) >= SAME_SURROUNDINGS else math.inf
+
+
+def _fitting(first: Array, second: Array, motion: Array) -> int:
+    if math.hypot(motion[0], motion[1]) > STANDING_M:
+        return int(np.count_nonzero(fit_motion(first, second, motion, TOLERANCE)))
+    turned = second @ turn_about_vertical(float(motion[2])).T
+    return int(np.count_nonzero(np.einsum("mi,mi->m", first, turned) > math.cos(TOLERANCE)))
