@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.fusion.uniform_recovery import UniformRecovery
 from omninav.stages.values.belief import Likelihood, Particles
@@ -79,9 +78,10 @@ def test_proposals_that_are_not_asked_for_are_not_drawn():
     assert (out.poses[:, 0] < 40).all()
 
 
-def test_random_samples_that_nobody_proposes_are_refused_in_one_line():
-    with pytest.raises(BadInput, match=r"fusion\.proposals"):
-        fuse(UniformRecovery(), belief(10), np.ones(10), None)
+def test_without_proposals_none_is_random():
+    out, _ = fuse(UniformRecovery(), belief(5000), np.ones(5000), None)
+    assert len(out.poses) == 5000
+    assert (out.poses[:, 0] < 40).all()
 
 
 def test_a_uniform_start_is_spread_over_the_free_space_where_it_is_wired():

@@ -1,0 +1,90 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from landmark_world import NOISE
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.pose import Motion
+
+TWIN = np.array([30.0, 0.0, math.pi])
+"""Shift and turn of a hall that looks the same."""
+IMAGES = 24
+
+
+def seen_from(poses: np.ndarray) -> list:
+    """Features of images taken at these poses (N, 3) in a long hall, each of 200 points within 6 m ahead or behind."""
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.uniform(-6, 60, 2000), rng.choice([-4.0, 4.0], 2000), rng.uniform(-1, 1.5, 2000)])
+    own = rng.gamma(0.5, 40.0, (2000, 128))
+    out = []
+    for x, y, heading in poses:
+        shown = rng.permutation(np.flatnonzero(np.abs(points[:, 0] - x) < 6.0))[:200]
+        rays = points[shown] - (x, y, 0.0)
+        cos, sin = math.cos(heading), math.sin(heading)
+        turned = np.column_stack([cos * rays[:, 0] + sin * rays[:, 1], cos * rays[:, 1] - sin * rays[:, 0], rays[:, 2]])
+        turned += NOISE * np.linalg.norm(turned, axis=1)[:, None] * rng.standard_normal(turned.shape)
+        looks = np.clip(own[shown] * rng.normal(1.0, 0.1, (200, 128)), 0, 255).astype(np.uint8)
+        out.append(
+            replace(
+                none_found(),
+                bearings=turned / np.linalg.norm(turned, axis=1)[:, None],
+                points=np.zeros((200, 2)),
+                descriptors=looks,
+                colours=np.zeros((200, 3), np.float32),
+                sizes=np.ones(200, np.float32),
+            )
+        )
+    return out
+
+
+def fix_at(pose: np.ndarray, probability: float = 0.99) -> LandmarkFix:
+    exact = np.diag([0.005, 0.005, 0.002])[None] ** 2
+    return LandmarkFix(pose[None], exact, np.array([60]), np.array([probability]), 80)
+
+
+def driven(twin_from: int, jump_at: int | None = None, probability: float = 0.99, scale: float = 0.5) -> list:
+    """What is left of each image's fix, which shows the twin hall from `twin_from` on; the robot drives on all the way,
+    but that at `jump_at` it is carried 40 m ahead, which odometry does not see."""
+    poses = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    if jump_at is not None:
+        poses[jump_at:, 0] += 40.0
+    images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
+    believed = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    for n in range(IMAGES):
+        motion = Motion(*between(believed[n - 1], believed[n]).tolist()) if n else None
+        spread = np.random.default_rng(n).normal(0.0, 0.05, (100, 3))
+        belief = Particles(np.concatenate([believed[n] + spread, TWIN[None]]), np.full(101, 1 / 101), 1)
+        fix = fix_at(believed[n] if n < twin_from else believed[n] + TWIN, probability)
+        ctx = Context("track", np.random.default_rng(0), Tick(1, n))
+        out.append(stage.step(ctx, state, belief, images[n], fix, motion, LengthScale(scale)))
+    return out
+
+
+def test_a_hall_that_looks_the_same_is_left_out_for_as_long_a_way_as_the_track_was_confirmed():
+    out = driven(twin_from=10)
+    assert [each.fix is not None for each in out] == [True] * 10 + [False] * 8 + [True] * 6  # 9 x 0.3 m before
+    assert all(each.track.unbroken and not each.belief.recovery_particles for each in out[10:18])
+    assert out[-1].belief.recovery_particles == 1
+
+
+def test_a_robot_that_was_carried_may_be_anywhere_at_once():
+    out = driven(twin_from=10, jump_at=10)
+    assert all(each.fix is not None for each in out)
+    assert not out[10].track.unbroken
+
+
+def test_a_track_that_was_never_sure_rules_nothing_out():
+    assert all(each.fix is not None and not each.track.unbroken for each in driven(10, probability=0.9))
+
+
+def test_the_track_is_confirmed_for_twenty_length_scales_at_most():
+    out = driven(twin_from=18, scale=0.05)
+    assert sum(each.fix is None for each in out) == pytest.approx(3, abs=1)
