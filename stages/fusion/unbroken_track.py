@@ -19,6 +19,7 @@ from omninav.stages.values.requests import Restart
 from omninav.stages.values.track import Track
 
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 NEAR = (1.0, math.radians(30.0))
 """Distance (m) and turn (rad) within which two poses are of one place."""
@@ -100,45 +101,46 @@ class UnbrokenTrack(Stage):
             moved = np.array([motion.x, motion.y, motion.turn])
             state.pose, state.moved = compose(state.pose, moved), compose(state.moved, moved)
             state.since += math.hypot(motion.x, motion.y)
-        left_out = features is not None and self._ruled_out(state, belief, features, fix, unit)
+        left_out = np.zeros(0 if fix is None else len(fix), np.bool_)
+        if features is not None:
+            left_out = self._left_out(state, belief, features, fix, unit)
         holds = state.against < state.confirmed and state.since < MAX_SINCE * unit and math.isfinite(state.carried)
         if holds and belief.recovery_particles:
             belief = without_recovery(belief)
-        return self.Out(belief=belief, track=Track(holds), fix=None if left_out and holds else fix)
+        if fix is not None and holds and left_out.any():
+            fix = None if left_out.all() else fix.without(left_out)
+        return self.Out(belief=belief, track=Track(holds), fix=fix)
 
-    def _ruled_out(
+    def _left_out(
         self,
         state: UnbrokenTrackState,
         belief: Particles,
         features: LocalFeatures,
         fix: LandmarkFix | None,
         unit: float,
-    ) -> bool:
-        """Keep account of what landmarks say of the track; whether they show a place that it does not lead to."""
+    ) -> Bools:
+        """Keep account of what landmarks say of the track; which poses (K,) it does not lead to."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         way = math.hypot(moved[0], moved[1])
-        pose = None if fix is None or not len(fix) else fix.poses[0]
-        sure = 0.0 if fix is None or pose is None else float(fix.probabilities[0])
-        believed = 0.0 if pose is None else share_around(belief, pose)
-        agrees = sure >= SURE and believed > BELIEVED
-        if pose is not None and agrees and (not state.confirmed or state.leads_to(pose)):
-            state.confirm(pose, min(state.confirmed + state.since, MAX_CONFIRMED * unit))
-            return False
+        poses = np.empty((0, 3)) if fix is None else fix.poses
+        shares = np.array([share_around(belief, pose) for pose in poses])
+        agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
+        if agrees and (not state.confirmed or state.leads_to(poses[0])):
+            state.confirm(poses[0], min(state.confirmed + state.since, MAX_CONFIRMED * unit))
+            return np.zeros(len(poses), np.bool_)
         if state.confirmed and math.isfinite(state.carried):
             state.carried = max(state.carried, carried_at_most(before, now, moved))
-        if pose is None:
-            return False
         if agrees:  # the belief gave way, and may have been right before
             state.elsewhere += way
             if state.elsewhere >= state.confirmed:
-                state.confirm(pose, state.elsewhere)
-            return False
-        if believed > CONTRADICTED or state.leads_to(pose):
-            return False
-        if sure >= LIKELY:
+                state.confirm(poses[0], state.elsewhere)
+            return np.zeros(len(poses), np.bool_)
+        led = np.array([state.leads_to(pose) for pose in poses], np.bool_)
+        out: Bools = ~led & (shares <= CONTRADICTED)
+        if fix is not None and (fix.probabilities[out] >= LIKELY).any():
             state.against += way
-        return True
+        return out
 
 
 def share_around(belief: Particles, pose: Array) -> float:

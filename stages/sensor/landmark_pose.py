@@ -91,6 +91,7 @@ class LandmarkPose(Stage):
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
         if not found:
             return self.Out()
+        found.sort(key=lambda each: -sectors_of(bearings[each.inliers]))
         inliers = np.array([int(each.inliers.sum()) for each in found], np.int64)
         return self.Out(
             fix=LandmarkFix(

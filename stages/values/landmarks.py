@@ -121,3 +121,17 @@ class LandmarkFix(Value):
 
     def __len__(self) -> int:
         return len(self.poses)
+
+    def without(self, out: npt.NDArray[np.bool_]) -> "LandmarkFix":
+        """The other poses, as probable as without those (K,) that are ruled out."""
+        kept = np.flatnonzero(~out)
+        numbers = np.full(len(self) + 1, -1, np.int8)  # the last one: none, which stays none
+        numbers[kept] = np.arange(len(kept))
+        return replace(
+            self,
+            poses=self.poses[kept],
+            covariances=self.covariances[kept],
+            inliers=self.inliers[kept],
+            probabilities=self.probabilities[kept] / (1.0 - self.probabilities[out].sum()),
+            agree=None if self.agree is None else numbers[self.agree],
+        )

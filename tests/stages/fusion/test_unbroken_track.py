@@ -88,3 +88,13 @@ def test_a_track_that_was_never_sure_rules_nothing_out():
 def test_the_track_is_confirmed_for_twenty_length_scales_at_most():
     out = driven(twin_from=18, scale=0.05)
     assert sum(each.fix is None for each in out) == pytest.approx(3, abs=1)
+
+
+def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_as_without_it():
+    pose, poses = np.zeros(3), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
+    rivals = replace(fix_at(pose), poses=poses[::-1], inliers=np.array([40, 30]), probabilities=np.array([0.9, 0.08]))
+    rivals = replace(rivals, covariances=np.tile(np.eye(3) * 1e-4, (2, 1, 1)), agree=np.array([0, 1, -1, 1], np.int8))
+    only = rivals.without(np.array([True, False]))
+    assert only.poses.tolist() == [pose.tolist()]
+    assert only.probabilities == pytest.approx([0.8])
+    assert only.agree.tolist() == [-1, 0, -1, 0]
