@@ -1,7 +1,7 @@
 """Two drives through a level of a game engine, as logs: corridors that look alike, and other brightness at last.
 
     pip install vizdoom
-    python benchmarks/game_level.py --out FOLDER [--level map01] [--seed 0] [--people] [--beside 2]
+    python benchmarks/game_level.py --out FOLDER [--level map01] [--seed 0] [--people] [--offset 2]
 
 Writes `tour.mcap` and `drive.mcap` with images, odometry and truth. ViZDoom (MIT) brings Freedoom's levels (BSD). A
 panorama is stitched of four views of 90 degrees. The tour visits points all over the level; the drive visits half of
@@ -149,14 +149,14 @@ def free_cells(walls: Array) -> tuple[Bools, Array]:
 class Routes:
     """Ways over free cells, which differ by the costs of the cells."""
 
-    def __init__(self, free: Bools, corner: Array, rng: np.random.Generator, avoided: Array, beside: float) -> None:
+    def __init__(self, free: Bools, corner: Array, rng: np.random.Generator, avoided: Array, offset: float) -> None:
         self.corner = corner
         cost = np.exp(0.7 * _unit(gaussian_filter(rng.normal(size=free.shape), 2.0)))
-        if len(avoided) and beside:
+        if len(avoided) and offset:
             rows, columns = np.floor((avoided - corner) / (CELL / UNITS)).astype(int)[:, ::-1].T
             driven_over = np.zeros(free.shape, np.bool_)
             driven_over[rows, columns] = True
-            cost[distance_transform_edt(~driven_over) * CELL / UNITS < beside] *= AVOIDED
+            cost[distance_transform_edt(~driven_over) * CELL / UNITS < offset] *= AVOIDED
         number = np.full(free.shape, -1)
         number[free] = np.arange(int(free.sum()))
         self.cells, cost, number = np.argwhere(free), np.pad(cost, 1), np.pad(number, 1, constant_values=-1)
@@ -276,14 +276,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of routes and of odometry's errors")
     parser.add_argument("--within", type=float, default=40.0, help="metres on the path from the start that are visited")
     parser.add_argument("--people", action="store_true", help="figures stand about in the drive")
-    parser.add_argument("--beside", type=float, default=0.0, help="metres that the drive keeps off the tour's way")
+    parser.add_argument("--offset", type=float, default=0.0, help="metres that the drive keeps off the tour's way")
     given = parser.parse_args()
     tour = np.empty((0, 2))
     given.out.mkdir(parents=True, exist_ok=True)
     for name in ("tour", "drive"):
         level = Level(given.level, people=given.people and name == "drive")
         rng = np.random.default_rng([given.seed, name == "drive"])
-        routes = Routes(*free_cells(level.walls), rng, tour, given.beside)
+        routes = Routes(*free_cells(level.walls), rng, tour, given.offset)
         if name == "tour":
             points = routes.nearest_first(routes.far_points(routes.nearest(level.start), POINTS, given.within))
         chosen = points if name == "tour" else rng.permutation(points[:-1])[: POINTS // 2].tolist()

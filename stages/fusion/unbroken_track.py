@@ -53,9 +53,9 @@ class UnbrokenTrackState(State):
     bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
     descriptors: npt.NDArray[np.uint8] = field(default_factory=lambda: np.empty((0, 0), np.uint8))
 
-    def confirm(self, pose: Array, way: float) -> None:
-        """Go on from a pose (3,) that was confirmed over so long a way (m)."""
-        self.pose, self.confirmed = pose.copy(), way
+    def confirm(self, pose: Array, length: float) -> None:
+        """Go on from a pose (3,) that was confirmed over a path of this length (m)."""
+        self.pose, self.confirmed = pose.copy(), length
         self.since, self.carried, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0
 
     def leads_to(self, pose: Array) -> bool:
@@ -122,7 +122,7 @@ class UnbrokenTrack(Stage):
         """Keep account of what landmarks say of the track; which poses (K,) it does not lead to."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
-        way = math.hypot(moved[0], moved[1])
+        driven = math.hypot(moved[0], moved[1])
         poses = np.empty((0, 3)) if fix is None else fix.poses
         shares = np.array([share_around(belief, pose) for pose in poses])
         agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
@@ -132,14 +132,14 @@ class UnbrokenTrack(Stage):
         if state.confirmed and math.isfinite(state.carried):
             state.carried = max(state.carried, carried_at_most(before, now, moved))
         if agrees:  # the belief gave way, and may have been right before
-            state.elsewhere += way
+            state.elsewhere += driven
             if state.elsewhere >= state.confirmed:
                 state.confirm(poses[0], state.elsewhere)
             return np.zeros(len(poses), np.bool_)
         led = np.array([state.leads_to(pose) for pose in poses], np.bool_)
         out: Bools = ~led & (shares <= CONTRADICTED)
         if fix is not None and (fix.probabilities[out] >= LIKELY).any():
-            state.against += way
+            state.against += driven
         return out
 
 

@@ -5,7 +5,6 @@ from omninav.stages.geometry.plane.odometry_motion import move_poses
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion, UncertainMotion
-from omninav.stages.values.requests import Restart
 
 from .measured_noise import MeasuredNoise
 from .odometry_noise import OdometryNoiseModel
@@ -34,10 +33,9 @@ class RotationTranslationRotation(OdometryNoiseModel, Stage):
         motion: Motion | None,
         measured: MeasuredNoise,
         fix: LandmarkFix | None = None,
-        restart: Restart | None = None,
     ) -> Out:
         """Predict the belief. `fix`: of the image before."""
-        if motion is None or restart is not None:
+        if motion is None:
             measured.start(None)
         elif fix is not None:
             measured.compare(fix)

@@ -207,7 +207,7 @@ def goal_pose(goal: str | None, fix: LandmarkFix | None, features: LocalFeatures
     seen = 0 if features is None else len(features)
     agree = "too few landmarks agree on where it was taken"
     if fix is not None:
-        agree = f"{fix.inliers[0]} landmarks agree on where it was taken, and some 32 are needed"
+        agree = f"{fix.inliers[0]} landmarks agree on where it was taken, which are too few or on one side of it"
         if len(fix) > 1:
             agree += f"; {fix.inliers[1]} on another place"
     raise BadInput(
