@@ -16,7 +16,7 @@ from omninav.pipeline.run.plan import plan
 
 GOAL = Path(__file__).resolve().parents[1] / "experiments" / "topological_nav_homing_vectors_campus.png"
 NEEDED = {"topological_nav": ["goal=kitchen"], "landmark_nav": [f"goal={GOAL}"]}
-"""What is typed to draw a variant that does not run without."""
+"""Settings without which a variant does not run, as it is drawn."""
 
 
 def variants_page() -> dict[str, str]:

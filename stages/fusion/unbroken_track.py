@@ -59,7 +59,7 @@ class UnbrokenTrackState(State):
         self.since, self.carried, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0
 
     def leads_to(self, pose: Array) -> bool:
-        """Whether a robot that was on the track may be at a pose (3,) by now."""
+        """Tells whether a robot that was on the track may be at a pose (3,) by now."""
         away, turned = pose - self.pose, abs(float(wrap(pose[2] - self.pose[2])))
         near = math.hypot(away[0], away[1]) < NEAR[0] + self.carried + DRIFT * self.since
         return near and turned < NEAR[1] + TURN_DRIFT * self.since
@@ -119,7 +119,7 @@ class UnbrokenTrack(Stage):
         fix: LandmarkFix | None,
         unit: float,
     ) -> Bools:
-        """Keep account of what landmarks say of the track; which poses (K,) it does not lead to."""
+        """Keep account of what landmarks say of the track; and which poses (K,) it does not lead to."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         driven = math.hypot(moved[0], moved[1])

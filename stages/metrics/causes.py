@@ -38,7 +38,7 @@ FIRST_IMAGES = 10
 
 
 class Verdict(NamedTuple):
-    """What happened, in a few words and with the numbers that say so, and what to do."""
+    """A cause in a few words, with the numbers that say so, and with what to do."""
 
     cause: str
     evidence: str
@@ -61,7 +61,7 @@ def stretches(columns: Columns, lost_m: float) -> list[Stretch]:
 
 
 def verdict_on(part: Part) -> Verdict:
-    """What the first rule says that has something to say."""
+    """The cause that the first rule gives that has one."""
     return next(found for rule in RULES if (found := rule(part)) is not None)
 
 
@@ -242,7 +242,7 @@ def ambiguous(part: Part) -> Verdict | None:
 
 
 def unexplained(part: Part) -> Verdict:
-    """What is left."""
+    """The cause of what no rule explains."""
     words = f"the heaviest part of the belief holds {100 * part.median('estimate_weight'):.0f} % (median)"
     return Verdict("no cause found", words + landmarks_of(part))
 
@@ -255,7 +255,7 @@ RULES: tuple[Callable[[Part], Verdict | None], ...] = (
 
 
 def landmarks_of(part: Part) -> str:
-    """How many images have a pose by landmarks at the estimate, in words; empty where none are looked for."""
+    """The number of images with a pose by landmarks at the estimate, in words; empty where none are looked for."""
     if not part.log.known("landmarks"):
         return ""
     return f"; {100 * part.landmarks_agree:.0f} % of the images have landmarks there"

@@ -58,7 +58,7 @@ class Log:
         return self._arrays[name]
 
     def known(self, name: str) -> bool:
-        """Whether a column was recorded."""
+        """Tells whether a column was recorded."""
         return bool(np.isfinite(self[name]).any())
 
     @cached_property
@@ -73,7 +73,7 @@ class Log:
 
     @cached_property
     def conflicts(self) -> list[str]:
-        """What stands of inputs that do not fit each other, at each image; "": nothing."""
+        """The inputs that do not fit each other at each image; "": none."""
         found = self.columns.get("conflict")
         texts = [""] * len(self) if found is None else np.ma.filled(np.ma.asarray(found, object), "").tolist()
         return [text if isinstance(text, str) else "" for text in texts]
@@ -114,7 +114,7 @@ class Log:
 
     @cached_property
     def jumps(self) -> Array:
-        """How far each sure estimate lies from where odometry leads from a sure one before, m, beyond what is usual.
+        """Distance (m) of each sure estimate from where odometry leads from a sure one before, beyond what is usual.
 
         0 without a confidence: a place, or an image's best match, jumps at every other image.
         """
@@ -142,7 +142,7 @@ class Part:
         return self.log[name][self.first : self.last + 1]
 
     def goes_on_with(self, other: "Part") -> bool:
-        """Whether another part follows in the same state."""
+        """Tells whether another part follows in the same state."""
         return (self.log, self.last + 1, self.state) == (other.log, other.first, other.state)
 
     def median(self, name: str) -> float:
@@ -151,7 +151,7 @@ class Part:
 
     @cached_property
     def metres(self) -> float:
-        """How far odometry drove, to the first image and from it to the last one (m)."""
+        """Distance by odometry to the first image, and from it to the last one (m)."""
         return float(np.hypot(*self.log.motion[self.first : self.last + 1, :2].T).sum())
 
     @cached_property
@@ -197,7 +197,7 @@ def parts(log: Log, lost_m: float) -> Iterator[Part]:
 
 
 def in_short(log: Log) -> str:
-    """How sure one log was, in a sentence or two."""
+    """Sums up how sure one log was, in a sentence or two."""
     images, sure = counted(len(log), "image"), np.flatnonzero(log.sure)
     if not len(sure):
         return f"Never sure in {images}."

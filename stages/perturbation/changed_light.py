@@ -51,7 +51,7 @@ class ChangedLight(Stage):
     """Direction it comes from, counter-clockwise from forward."""
 
     class Out(Outputs):
-        """What was given, in other light."""
+        """The input in other light."""
 
         panorama: Panorama | None = None
         image: Image | None = None

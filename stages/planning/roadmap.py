@@ -81,7 +81,7 @@ class RoadmapPlanner(Stage):
     goal: str | None = None
     """The goal's image file."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Of the robot's body."""
+    """The robot's body (m)."""
 
     class Out(Outputs):
         """`vector`: absent once the path has ended, and so is `progress`, but of a robot that has arrived."""

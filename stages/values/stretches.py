@@ -25,15 +25,15 @@ class Stretch(Value):
     end_s: float
     """When its last image was taken (s)."""
     metres: float
-    """How far odometry drove in it (m)."""
+    """Distance by odometry within it (m)."""
     state: StretchState
     """State of the localisation."""
     cause: str
-    """What happened, in a few words."""
+    """The cause, in a few words."""
     evidence: str
     """The same with the numbers that support it, a sentence; with ground truth how far the estimate was off."""
     advice: str
-    """What to type or to check; empty where there is nothing."""
+    """Advice: a line to type, or a thing to check; empty where there is none."""
 
 
 class Stretches(Value):

@@ -4,6 +4,6 @@ from omninav.pipeline import Value
 
 
 class Track(Value):
-    """Whether a robot was surely where the belief says, and not carried since: each image continues the last one."""
+    """Continuity since landmarks surely told where the robot was: `unbroken` while each image continues the last."""
 
     unbroken: bool

@@ -31,7 +31,7 @@ row 98 % have 50 and more, also where the camera was lifted; of images more than
 
 
 def carried_at_most(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> float:
-    """How far (m) from where odometry says an image may have been taken: 0 if it continues the one before.
+    """Bounds how far (m) from where odometry says an image was taken: by 0 if it continues the one before.
 
     Of both: bearings (N, 3) and descriptors (N, D); `motion` (3,) between them.
     """
