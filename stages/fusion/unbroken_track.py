@@ -27,8 +27,9 @@ SURE, LIKELY = 0.95, 0.5
 """Probability of a pose by landmarks from which on it confirms the belief, and from which on it counts against it."""
 BELIEVED, CONTRADICTED = 0.5, 0.02
 """Share of the belief around a pose above which both agree, and below which they contradict each other."""
-MAX_CONFIRMED = 20.0
-"""Way, in length scales, on which a robot that was surely on its track may see another place, at most."""
+MAX_STEP, MAX_CONFIRMED = 2.0, 20.0
+"""Path, in length scales, that one more pose confirms, and path on which a robot that was surely on its track may see
+another place, at most."""
 MAX_SINCE = 100.0
 """Way since the last pose that confirmed the track, in length scales, after which it is forgotten."""
 DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
@@ -104,7 +105,7 @@ class UnbrokenTrack(Stage):
         left_out = np.zeros(0 if fix is None else len(fix), np.bool_)
         if features is not None:
             left_out = self._left_out(state, belief, features, fix, unit)
-        holds = state.against < state.confirmed and state.since < MAX_SINCE * unit and math.isfinite(state.carried)
+        holds = state.against < state.confirmed and state.since < MAX_SINCE * unit
         if holds and belief.recovery_particles:
             belief = without_recovery(belief)
         if fix is not None and holds and left_out.any():
@@ -127,10 +128,12 @@ class UnbrokenTrack(Stage):
         shares = np.array([share_around(belief, pose) for pose in poses])
         agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
-            state.confirm(poses[0], min(state.confirmed + state.since, MAX_CONFIRMED * unit))
+            state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_)
-        if state.confirmed and math.isfinite(state.carried):
+        if state.confirmed:
             state.carried = max(state.carried, carried_at_most(before, now, moved))
+        if math.isinf(state.carried):
+            state.confirmed, state.carried = 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before
             state.elsewhere += driven
             if state.elsewhere >= state.confirmed:
