@@ -11,8 +11,8 @@ from .equirectangular import Equirectangular
 from .model import Array, Camera
 from .strip import Strip
 
-STEP = math.radians(0.5)
-"""Spacing of the horizons that are tried, rad."""
+STEPS = math.radians(2.5), math.radians(0.5)
+"""Spacing of the horizons that are tried, of all and around the best (rad): 5 degrees off, half as many fit."""
 MIN_GAIN = 1.3
 """Factor by which more matches must fit than with the horizon in the middle."""
 MIN_FITTING = 100
@@ -44,8 +44,15 @@ def with_elevations_found(
     def fitting(strip: Strip) -> int:
         return int(fitting_matches(views.looking_along(strip.unproject(pixels)[0]), matches, poses).sum())
 
-    tops = np.arange(height - 0.5 * math.pi, 0.5 * math.pi + STEP, STEP).clip(max=0.5 * math.pi)
-    tried = [replace(guess, elevation_top=float(top), elevation_bottom=float(top) - height) for top in tops]
-    counts = [fitting(strip) for strip in tried]
-    best = int(np.argmax(counts))
-    return tried[best] if counts[best] >= max(MIN_GAIN * fitting(guess), MIN_FITTING) else None
+    lowest, highest = height - 0.5 * math.pi, 0.5 * math.pi
+    best, number = guess, 0
+    for step in STEPS:
+        around = (
+            (lowest, highest) if step == STEPS[0] else (best.elevations[0] - STEPS[0], best.elevations[0] + STEPS[0])
+        )
+        for top in np.arange(around[0], around[1] + step, step).clip(lowest, highest).tolist():
+            strip = replace(guess, elevation_top=top, elevation_bottom=top - height)
+            if (fits := fitting(strip)) > number:
+                best, number = strip, fits
+        first, last = best.elevations[0] - step, best.elevations[0] + step
+    return best if number >= max(MIN_GAIN * fitting(guess), MIN_FITTING) else None

@@ -28,7 +28,7 @@ OUTLIER_SHARE = 1e-3
 """Probability that a pose of sure landmarks is wrong all the same: they may stand elsewhere today."""
 MIN_PROPOSED = 0.5
 """Probability of a pose from which on it proposes a place where the belief is not: beside the mapped way, where no pose
-is right, one in six images has one of 8 to 23 landmarks that is metres off."""
+is right, one in six images has one that is metres off."""
 INDEPENDENT = 4.0
 """Distance driven, in length scales, after which a pose against the belief is new evidence: until then images show the
 same things, and in a store's unmapped aisle twelve in a row over 2.6 m agreed on one wrong place."""

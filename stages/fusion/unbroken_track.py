@@ -37,10 +37,10 @@ DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
 
 
 class UnbrokenTrackState(State):
-    """The pose (3,) that landmarks confirmed last, carried by odometry, and over how long a way they did (m).
+    """The pose (3,) that landmarks confirmed last, carried by odometry, and the path on which they did (m).
 
     `since`: way since then, on which the robot may have been carried as far as `carried`; `against`: way on which
-    landmarks spoke against the track, and `elsewhere`: on which they confirmed a belief elsewhere (m). `bearings`
+    landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m). `bearings`
     (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
     """
 
@@ -102,10 +102,12 @@ class UnbrokenTrack(Stage):
             moved = np.array([motion.x, motion.y, motion.turn])
             state.pose, state.moved = compose(state.pose, moved), compose(state.moved, moved)
             state.since += math.hypot(motion.x, motion.y)
+        if state.since > MAX_SINCE * unit:
+            state.confirmed = 0.0
         left_out = np.zeros(0 if fix is None else len(fix), np.bool_)
         if features is not None:
             left_out = self._left_out(state, belief, features, fix, unit)
-        holds = state.against < state.confirmed and state.since < MAX_SINCE * unit
+        holds = state.against < state.confirmed
         if holds and belief.recovery_particles:
             belief = without_recovery(belief)
         if fix is not None and holds and left_out.any():

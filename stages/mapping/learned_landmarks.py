@@ -105,6 +105,7 @@ class LearnLandmarks(Stage):
             sigma,
             words,
             rate,
+            # Poses as they came: those adjusted to a wrong horizon were bent by it.
             check.told(ctx, adjusted.camera) or check.elevations_told(ctx, camera, views, matches, map.poses),
         )
         ctx.fact("landmarks", len(landmarks))

@@ -20,7 +20,7 @@ STILL, CHANGING = 1e-3, 0.97
 """Odometry stands still that moves and turns by less (m, rad) between images that correlate less with the ones before
 (`InputConflicts`)."""
 CONFLICT_IMAGES = 128
-"""Images before a finding that it is of (`InputConflicts`)."""
+"""Images before a finding on which it rests (`InputConflicts`)."""
 SPEED_FACTOR, FIRST_SEEN = 1.5, 3
 """A robot was carried that is seen farther off than it can have driven, at so many times its largest speed, in the
 first images that clearly show it elsewhere (the median of so many: a single one may mislead)."""
@@ -28,9 +28,9 @@ PAUSES = 5.0
 """Usual intervals after which an image is missing."""
 DISTINCT_LEAD = 0.7
 """Lead at which a best match counts half (`ConfidenceMonitor`)."""
-EVEN_LANDMARKS, FOUND_ELSEWHERE = 24.0, 0.05
-"""Landmarks on which a pose is as probably right as wrong (`LandmarkPose`), and share of the images of another place
-that have any (`ConfidenceMonitor`)."""
+FEW_LANDMARKS, FOUND_ELSEWHERE = 24.0, 0.05
+"""Landmarks below which an image has few, and share of the images of another place that have any
+(`ConfidenceMonitor`)."""
 MAX_AGREEING = 0.1
 """Share of images that bear the estimate out in a map of another place, at most: best matches are there by chance."""
 FIRST_IMAGES = 10
@@ -219,11 +219,11 @@ def unlike_map(part: Part) -> Verdict | None:
 def few_landmarks(part: Part) -> Verdict | None:
     """Images bear the estimate out, but by few landmarks."""
     number, agree = part.median("landmarks"), part.landmarks_agree
-    if not number < EVEN_LANDMARKS or (part.at_estimate <= 0.5 and agree <= FOUND_ELSEWHERE):
+    if not number < FEW_LANDMARKS or (part.at_estimate <= 0.5 and agree <= FOUND_ELSEWHERE):
         return None
     words = (
         f"{100 * part.at_estimate:.0f} % of best matches lie at the estimate, and {100 * agree:.0f} % of the images "
-        f"have landmarks there, but few: {number:.0f} (median), where {EVEN_LANDMARKS:.0f} may be right or wrong"
+        f"have landmarks there, but few: {number:.0f} (median)"
     )
     advice = "the place has changed, or camera.yaml is not this camera's: omninav camera look log=LOG"
     return Verdict("few landmarks", words, advice if part.median("nearest_scales") <= NEAR_SCALES else "")

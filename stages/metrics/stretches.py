@@ -103,7 +103,8 @@ class Log:
     @cached_property
     def gate(self) -> float:
         """Distance of a best match from the estimate at which it still is of that place (m)."""
-        return max(NEAR_M, NEAR_SCALES * median(self["nearest_m"] / self["nearest_scales"]))
+        away = self["nearest_scales"] > 0.0
+        return max(NEAR_M, NEAR_SCALES * median(self["nearest_m"][away] / self["nearest_scales"][away]))
 
     @cached_property
     def agrees(self) -> Flags:

@@ -44,7 +44,7 @@ KIDNAPPING_PROBABILITY = 0.02
 or found itself again."""
 
 CARRIED_SINCE = 0.002
-"""The same after landmarks were found, of which the next sure ones tell at once."""
+"""The same of the odds by landmarks, as the next sure ones tell at once."""
 FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 HALF_FOUND = 5.0
@@ -53,7 +53,7 @@ and stores all do up to 1.5 m, and a third from 2 to 3 m."""
 PLACES_ALIKE = 20.0
 """Places among which a wrong pose falls, one of which may be the estimate's: where the map looks like the image."""
 FOUND_BY_CHANCE = 0.002
-"""Probability that even a pose of many landmarks is wrong: they may stand elsewhere today."""
+"""Probability that even a sure pose is wrong: landmarks may stand elsewhere today."""
 NEW_WITHOUT = 0.2
 """Share of an image without a sure pose that is new evidence: it is blurred, or shows what has changed or misleads,
 where the one before was or did."""
@@ -124,7 +124,7 @@ class ConfidenceMonitor(Stage):
     estimate, and fully if it is the first to do so, since it then repeats none before it. A way without images
     raises the probability that the robot was carried elsewhere, as images do.
 
-    Landmarks say more than any similarity: a pose that many of them agree on outweighs all appearance, for or against
+    Landmarks say more than any similarity: a sure pose by them outweighs all appearance, for or against
     the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
     robot may be nowhere on the map. So until one is found, in images that have features, appearance is not believed
     either: it agrees with itself in another building too.
@@ -240,7 +240,8 @@ def by_landmarks(
     # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
     counted = novelty if told > 0.0 else NEW_WITHOUT * novelty
     bound = math.log(1.0 / KIDNAPPING_PROBABILITY)
-    return min(max(kept, -bound), bound) + (sure + (1.0 - sure) * counted) * told, sure
+    kept += sure * (min(max(kept, -bound), bound) - kept)
+    return kept + (sure + (1.0 - sure) * counted) * told, sure
 
 
 def share_found(distance: float) -> float:

@@ -17,6 +17,8 @@ SURE = 0.95
 """Probability of a pose by landmarks from which it tells where the robot is."""
 STRETCH_M = 0.5
 """Way between two such poses whose odometry is compared with them, at least (m)."""
+MAX_STRETCH_M = 5.0
+"""The same at most: on a longer one the ends' distance depends on turns."""
 PRIOR = 3.0
 """Stretches as which the stated noise counts."""
 MEMORY = 100.0
@@ -56,12 +58,13 @@ class MeasuredNoise(State):
         """Compare the odometry up to here with the pose by landmarks, if it is sure."""
         if not len(fix) or fix.probabilities[0] < SURE or (self.anchor is not None and self.driven < STRETCH_M):
             return
-        if self.anchor is not None:
+        if self.anchor is not None and self.driven < MAX_STRETCH_M:
             away, covariance = fix.poses[0] - self.anchor, fix.covariances[0]
             turn = wrap_angle(float(away[2] - self.since[2]))
             length = math.hypot(away[0], away[1]) - math.hypot(self.since[0], self.since[1])
             seen = 2.0 * np.array([covariance[2, 2], 0.5 * (covariance[0, 0] + covariance[1, 1])])
-            squares = np.maximum(np.square((turn, length)) - seen, 0.0) / self.expected
+            errors = np.maximum(np.square((turn, length)) - seen, 0.0)
+            squares = np.divide(errors, self.expected, out=np.ones(2), where=self.expected > 0.0)
             kept = 1.0 if self.stretches < MEMORY else 1.0 - 1.0 / MEMORY
             self.squares = kept * self.squares + np.minimum(squares, MAX_SQUARE)
             self.stretches = kept * self.stretches + 1.0

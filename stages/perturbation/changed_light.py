@@ -64,6 +64,11 @@ class ChangedLight(Stage):
         camera: Camera | None = None,
     ) -> Out:
         """Change the light of a panorama, or of an image, which needs its camera."""
+        if panorama is None and image is None and ctx.tick.first_of_log:
+            raise BadInput(
+                "changed_light: it is wired to no image, so that light would stay as it is: type "
+                "'+wires.perturbation={panorama: unwarp.panorama}' wires.features.panorama=perturbation.panorama"
+            )
         out = self.Out()
         if panorama is not None:
             changed = self._changed(panorama.pixels, column_azimuths(panorama.pixels.shape[1]))

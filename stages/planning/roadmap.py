@@ -78,7 +78,7 @@ class RoadmapPlanner(Stage):
     preferred, and after too many it gives up. Raises BadInput for a goal that the map's landmarks cannot place.
     """
 
-    goal: str | None = None
+    goal: str | int | None = None
     """The goal's image file."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
     """The robot's body (m)."""
@@ -197,7 +197,9 @@ def _stopped(state: RoadmapPlannerState) -> RoadmapPlanner.Out:
     return RoadmapPlanner.Out(progress=there, route=_route(state, "arrived"))
 
 
-def goal_pose(goal: str | None, fix: LandmarkFix | None, features: LocalFeatures | None, map: ReferenceGraph) -> Array:
+def goal_pose(
+    goal: str | int | None, fix: LandmarkFix | None, features: LocalFeatures | None, map: ReferenceGraph
+) -> Array:
     """The pose (3,) from which the goal's image was taken. Raises BadInput where landmarks do not tell it."""
     if map.landmarks is None:
         raise BadInput("goal: the map was saved without landmarks; learn it again from its tour with landmarks=sift")

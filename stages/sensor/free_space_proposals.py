@@ -20,7 +20,7 @@ class FreeSpaceProposals(Stage):
     """Poses proposed at each image."""
 
     class Out(Outputs):
-        """Poses of equal weights; absent of a robot that was not carried."""
+        """Poses of equal weights; absent while the track is unbroken."""
 
         proposals: Particles | None = None
 

@@ -50,9 +50,9 @@ class LandmarkPose(Stage):
     Candidates are the references that share most visual words with the image, over the whole map, and those near the
     belief, both always: a belief may be wrong, and words may be ambiguous. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
-    elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is as sure as its
-    inliers lie all around. An image with too few inliers says nothing, and so does a map without landmarks. Raises
-    BadInput for features of another kind than the map's.
+    elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
+    sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
+    landmarks. Raises BadInput for features of another kind than the map's.
     """
 
     word_references: Annotated[int, Bounds(ge=1)] = 10

@@ -29,7 +29,7 @@ class SimilarityProposals(Stage):
     """Poses proposed at each image."""
 
     class Out(Outputs):
-        """Poses worth a try; absent without a field, and of a robot that was not carried."""
+        """Poses worth a try; absent without a field, and while the track is unbroken."""
 
         proposals: Particles | None = None
 

@@ -28,6 +28,8 @@ and more have them (a house, two offices, a store), of images 1 to 3 m from wher
 SAME_SURROUNDINGS, SURROUNDINGS_M = 40, 5.0
 """Matches that two images of the same surroundings have, and how far off these were taken at most (m): of images in a
 row 98 % have 50 and more, also where the camera was lifted; of images more than 3 m off 98 % have fewer than 24."""
+SAME_HEADING = 0.7
+"""Mean cosine of the turns of their matches against odometry's, above which the robot was not turned."""
 
 
 def carried_at_most(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> float:
@@ -41,7 +43,11 @@ def carried_at_most(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motio
     number = max(_fitting(first, second, motion + np.array([0.0, 0.0, by])) for by in TURNS)
     if number >= max(MIN_FITTING, MIN_SHARE * len(first)):
         return 0.0
-    return SURROUNDINGS_M if len(first) >= SAME_SURROUNDINGS else math.inf
+    if len(first) < SAME_SURROUNDINGS:
+        return math.inf
+    azimuths = [np.arctan2(each[:, 1], each[:, 0]) for each in (first, second)]
+    turned = np.exp(1j * (azimuths[1] - azimuths[0] + motion[2])).mean()  # of far points: the turn odometry missed
+    return SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf
 
 
 def _fitting(first: Array, second: Array, motion: Array) -> int:

@@ -50,8 +50,9 @@ def path_from(place: Array, points: Array, paths: Paths, reach: float, to_goal: 
     near = gaps.min() + reach
     if to_goal <= near:
         return np.zeros(0, np.int64)
-    point = int(np.argmin(np.where(gaps <= near, gaps + paths.metres, np.inf)))
-    if paths.next[point] == NO_PATH:
+    lengths = np.where(gaps <= near, gaps + paths.metres, np.inf)
+    point = int(np.argmin(lengths))
+    if not np.isfinite(lengths[point]):
         return None
     found = []
     while point < len(points):

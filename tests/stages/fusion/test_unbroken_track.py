@@ -50,12 +50,20 @@ def fix_at(pose: np.ndarray, probability: float = 0.99) -> LandmarkFix:
     return LandmarkFix(pose[None], exact, np.array([60]), np.array([probability]), 80)
 
 
-def driven(twin_from: int, jump_at: int | None = None, probability: float = 0.99, scale: float = 0.5) -> list:
+def driven(
+    twin_from: int,
+    jump_at: int | None = None,
+    turned_at: int | None = None,
+    probability: float = 0.99,
+    scale: float = 0.5,
+) -> list:
     """What is left of each image's fix, which shows the twin hall from `twin_from` on; the robot drives on all the way,
-    but that at `jump_at` it is carried 40 m ahead, which odometry does not see."""
+    but that at `jump_at` it is carried 40 m ahead, and at `turned_at` turned, which odometry does not see."""
     poses = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0
+    if turned_at is not None:
+        poses[turned_at:, 2] += math.pi
     images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
     believed = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     for n in range(IMAGES):
@@ -98,3 +106,8 @@ def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_
     assert only.poses.tolist() == [pose.tolist()]
     assert only.probabilities == pytest.approx([0.8])
     assert only.agree.tolist() == [-1, 0, -1, 0]
+
+
+def test_a_robot_that_was_turned_on_the_spot_may_be_anywhere_at_once():
+    out = driven(twin_from=10, turned_at=10)
+    assert all(each.fix is not None for each in out)
