@@ -45,12 +45,9 @@ def with_elevations_found(
         return int(fitting_matches(views.looking_along(strip.unproject(pixels)[0]), matches, poses).sum())
 
     lowest, highest = height - 0.5 * math.pi, 0.5 * math.pi
-    best, number = guess, 0
+    best, number, first, last = guess, 0, lowest, highest
     for step in STEPS:
-        around = (
-            (lowest, highest) if step == STEPS[0] else (best.elevations[0] - STEPS[0], best.elevations[0] + STEPS[0])
-        )
-        for top in np.arange(around[0], around[1] + step, step).clip(lowest, highest).tolist():
+        for top in np.arange(first, last + step, step).clip(lowest, highest).tolist():
             strip = replace(guess, elevation_top=top, elevation_bottom=top - height)
             if (fits := fitting(strip)) > number:
                 best, number = strip, fits
