@@ -33,6 +33,8 @@ FEW_LANDMARKS, FOUND_ELSEWHERE = 24.0, 0.05
 (`ConfidenceMonitor`)."""
 MAX_AGREEING = 0.1
 """Share of images that bear the estimate out in a map of another place, at most: best matches are there by chance."""
+MAX_AT_ESTIMATE = 0.5
+"""Share of best matches at an estimate that was never sure, at most: more of them show that it is of this map."""
 FIRST_IMAGES = 10
 """Images that an estimate may take from anywhere."""
 
@@ -205,7 +207,7 @@ def contradicted(part: Part) -> Verdict | None:
 def unlike_map(part: Part) -> Verdict | None:
     """Images that show nothing of the map, of a log in which hardly an image bears the estimate out."""
     said = any(text.startswith(FOREIGN) for text in part.log.conflicts[part.first : part.last + 1])
-    never = part.state == "searching" and part.last + 1 == len(part.log)
+    never = part.state == "searching" and part.last + 1 == len(part.log) and not part.at_estimate > MAX_AT_ESTIMATE
     if part.log.agrees.mean() > MAX_AGREEING or part.landmarks_agree > FOUND_ELSEWHERE or not (said or never):
         return None
     words = (
