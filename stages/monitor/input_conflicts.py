@@ -170,7 +170,8 @@ class InputConflicts(Stage):
             if not recent.judged % EVERY:
                 compare_strips(recent)
                 self._judge(ctx, recent, metres)
-        standing = of_map + tuple([recent.found[kind] for kind in recent.standing])
+        kinds = sorted(recent.standing, key=HARMLESS.__contains__)  # those that mislead first
+        standing = of_map + tuple([recent.found[kind] for kind in kinds])
         misleading = bool(of_map) or not recent.standing.keys() <= HARMLESS
         return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), standing, misleading))
 

@@ -77,7 +77,8 @@ class GoalImage(Stage):
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():
-            raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=IMAGE.png")
+            what = "goal=PLACE, its name or number, or goal=IMAGE.png" if self.places else "goal=IMAGE.png"
+            raise BadInput(f"goal: no goal is named; type {what}")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
             if not self.places:
                 raise BadInput(

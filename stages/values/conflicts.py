@@ -9,8 +9,8 @@ FOREIGN = "the images fit no place of the map"
 class Conflicts(Value):
     """Which inputs do not fit each other, a sentence each, with its figures.
 
-    `sentences`: all that was found so far; `standing`: those of them that still hold; `misleading`: whether one stands
-    for which the estimate may be wrong, and not only its stamp.
+    `sentences`: all that was found so far; `standing`: those of them that still hold, those that mislead first;
+    `misleading`: whether one stands for which the estimate may be wrong, and not only its stamp.
     """
 
     sentences: tuple[str, ...]
