@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.evidence import evidence_novelty
-from omninav.stages.geometry.probability.particles import are_within, systematic, weighted_moments
+from omninav.stages.geometry.probability.particles import are_within, share_within, systematic, weighted_moments
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -112,7 +112,7 @@ class LandmarkUpdate(Stage):
         return self.Out(belief=self._resampled(ctx, poses, weights, recovery))
 
     def _novelty(self, last: LandmarkUpdateState, belief: Particles, pose: Array, unit: float) -> float:
-        believed = float(np.add.reduce(belief.weights[are_within(np.ascontiguousarray(belief.poses), pose, *LOCAL)]))
+        believed = share_within(belief.poses, belief.weights, pose, *LOCAL)
         if believed > 0.5 or not len(last.poses) or not are_within(last.poses, pose, *LOCAL).any():
             return 1.0
         return evidence_novelty(last.driven, INDEPENDENT * unit)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.geometry.landmarks.unbroken_view import carried_at_most
 from omninav.stages.geometry.plane.se2 import compose, wrap
-from omninav.stages.geometry.probability.particles import are_within
+from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -127,7 +127,7 @@ class UnbrokenTrack(Stage):
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         driven = math.hypot(moved[0], moved[1])
         poses = np.empty((0, 3)) if fix is None else fix.poses
-        shares = np.array([share_around(belief, pose) for pose in poses])
+        shares = np.array([share_within(belief.poses, belief.weights, pose, *NEAR) for pose in poses])
         agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
@@ -146,11 +146,6 @@ class UnbrokenTrack(Stage):
         if fix is not None and (fix.probabilities[out] >= LIKELY).any():
             state.against += driven
         return out
-
-
-def share_around(belief: Particles, pose: Array) -> float:
-    """The share of a belief close to a pose (3,)."""
-    return float(np.add.reduce(belief.weights[are_within(np.ascontiguousarray(belief.poses), pose, *NEAR)]))
 
 
 def without_recovery(belief: Particles) -> Particles:

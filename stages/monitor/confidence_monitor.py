@@ -11,7 +11,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
-from omninav.stages.geometry.probability.particles import are_within
+from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
@@ -299,5 +299,5 @@ def _compared(similarities: Similarities, map: ReferenceGraph) -> Array:
 
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:
     """The share of a belief within a tolerance of a pose (3,)."""
-    near = are_within(np.ascontiguousarray(belief.poses), pose, metres, radians)
-    return min(1.0, float(np.add.reduce(belief.weights[near]) / np.add.reduce(belief.weights)))
+    mass = share_within(belief.poses, belief.weights, pose, metres, radians)
+    return min(1.0, mass / float(np.add.reduce(belief.weights)))

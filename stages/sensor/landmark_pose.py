@@ -91,14 +91,16 @@ class LandmarkPose(Stage):
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
         if not found:
             return self.Out()
-        found.sort(key=lambda each: -sectors_of(bearings[each.inliers]))
+        sectors = np.array([sectors_of(bearings[each.inliers]) for each in found])
+        order = np.argsort(-sectors, kind="stable")
+        found, sectors = [found[row] for row in order], sectors[order]
         inliers = np.array([int(each.inliers.sum()) for each in found], np.int64)
         return self.Out(
             fix=LandmarkFix(
                 np.array([each.pose for each in found]),
                 np.array([covariance_of(each, landmarks.sigma_rad) for each in found]),
                 inliers,
-                probabilities_of(np.array([sectors_of(bearings[each.inliers]) for each in found])),
+                probabilities_of(sectors),
                 len(points),
                 bearings.astype(np.float32),
                 agreeing(found),

@@ -115,6 +115,11 @@ def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Memb
     return out
 
 
+def share_within(poses: Array, weights: Array, pose: Array, metres: float, radians: float) -> float:
+    """The weight of the particles (N, 3) within a distance and a turn of a pose (3,), of weights (N,)."""
+    return float(np.add.reduce(weights[are_within(np.ascontiguousarray(poses), pose, metres, radians)]))
+
+
 @compiled(nogil=True)
 def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> tuple[Array, Array, float]:
     # The centre of the cell that is heaviest together with its neighbours, that of the heaviest of these, and its mass.

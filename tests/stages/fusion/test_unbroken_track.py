@@ -57,8 +57,8 @@ def driven(
     probability: float = 0.99,
     scale: float = 0.5,
 ) -> list:
-    """What is left of each image's fix, which shows the twin hall from `twin_from` on; the robot drives on all the way,
-    but that at `jump_at` it is carried 40 m ahead, and at `turned_at` turned, which odometry does not see."""
+    """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show the twin
+    hall; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not measure."""
     poses = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0

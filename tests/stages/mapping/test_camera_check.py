@@ -85,7 +85,7 @@ def test_bearings_of_other_pixels_and_cameras_without_an_axis_are_not_checked(se
 
 
 def strip_told(top, described):
-    """What is said, and the camera.yaml written, of a strip whose upper edge truly lies at `top` (rad)."""
+    """Returns the warnings and the camera.yaml for a strip whose upper edge truly lies at `top` (rad)."""
     world = house(np.random.default_rng(0))
     true = Equirectangular(720, 300, 360.0, elevation_top=top, elevation_bottom=top - math.radians(150.0))
     pixels, seen = true.project(world.bearings)
