@@ -127,9 +127,11 @@ class HaarIntegral(UnderGreyWorld, Stage):
     root: bool = True
     """Take the square root of the product, whose values fill the bins more evenly."""
     histogram: Literal["joint", "separate"] = "joint"
-    """One histogram over the colour channels, or one for each."""
+    """One histogram over the colour channels, or one for each: the paper's, which "considers the different channels
+    independently" (section IV)."""
     bins: Annotated[int, Bounds(ge=1, le=64)] | None = None
-    """Bins per channel; null: 8 for windows, 5 for a panorama's segments (936 images then fit in the paper's 4 MB)."""
+    """Bins per channel; null: 8 for windows, 5 for a panorama's segments (936 images then fit in the paper's 4 MB, with
+    joint histograms too)."""
     weighted: bool = True
     """Share a value between the two nearest bins, by its distance from them."""
     segments: Annotated[int, Bounds(ge=1)] = 8

@@ -4,6 +4,7 @@ import pytest
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.run.plan import plan
+from omninav.stages.features.haar_integral import Binning
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.uniform_recovery import UniformRecovery
 from omninav.stages.match.retrieval import Retrieval
@@ -69,6 +70,9 @@ def test_wolf_burgard_and_burkhardt(printed):
     assert "area" in wired(graph, "prior")
     # Section IV: several kernels, of sizes up to twice their own; products without a root.
     assert (features.kernels, max(features.scales), features.root) == (((0.0, 1.0), (3.0, 4.0)), 2.0, False)
+    # "One simply considers the different channels independently", so that 936 images take far less than 4 MB.
+    assert (features.histogram, features.bins) == ("separate", None)
+    assert 936 * len(features.kernels) * len(features.scales) * 4 * Binning(8, joint=False).length < 0.6e6
     assert type(stages["match"]) is Retrieval
     # An ordinary camera; the mean of the samples is the estimate.
     assert type(stages["unwarp"]) is PerspectiveWindow
