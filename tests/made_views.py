@@ -41,7 +41,7 @@ def made_views(
         owners=np.full(number, -1) if owners is None else np.array(owners),
         distances=np.asarray(distances, np.float64),
         shares=np.ones((number, number)) if shares is None else shares,
-        options=(0.8, 0.8, 0.5, 8, 0.01),
+        options=(0.8, 0.8, 0.5, 8, 0.01, "euclidean"),
     )
 
 

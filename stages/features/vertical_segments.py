@@ -23,6 +23,8 @@ Ints = npt.NDArray[np.int64]
 
 SAMPLES = 8
 """Samples of a segment's intensity profile: the paper's 8-point cosine transform."""
+COEFFICIENTS = 7
+"""Coefficients of it that are kept: the first ones."""
 BLUR_PX = 1.0
 """Standard deviation of the smoothing before edges are searched, pixels."""
 MIN_GRADIENT = 0.25
@@ -38,10 +40,12 @@ MARGIN = 0.2
 
 
 def profile_basis() -> Floats:
-    """Rows 1 to 7 of the orthonormal 8-point cosine transform (7, 8): the first, the mean, is left out."""
+    """Rows 0 to 6 of the orthonormal 8-point cosine transform: (7, 8)."""
     n = np.arange(SAMPLES)
-    rows = np.arange(1, SAMPLES)[:, None]
-    return (math.sqrt(2.0 / SAMPLES) * np.cos(np.pi * (n + 0.5) * rows / SAMPLES)).astype(np.float32)
+    rows = np.arange(COEFFICIENTS)[:, None]
+    basis = math.sqrt(2.0 / SAMPLES) * np.cos(np.pi * (n + 0.5) * rows / SAMPLES)
+    basis[0] /= math.sqrt(2.0)
+    return basis.astype(np.float32)
 
 
 class Segments(NamedTuple):
@@ -83,23 +87,16 @@ def _describe(
             blue, green, red = pixels[row, column, 0], pixels[row, column, 1], pixels[row, column, 2]
             add_pixel(sums, float(blue), float(green), float(red))
         correlations(sums, out[n])
-        mean = np.float32(0.0)
         for k in range(SAMPLES):
             at = top + (k + 0.5) * length / SAMPLES
             row = min(max(int(at), 0), height - 2)
             part = np.float32(at - row)
             profile[k] = (1 - part) * grey[row, column] + part * grey[row + 1, column]
-            mean += profile[k] / SAMPLES
-        norm = np.float32(0.0)
-        for k in range(SAMPLES):
-            profile[k] -= mean
-            norm += profile[k] * profile[k]
-        norm = np.sqrt(norm) if norm > 1e-3 else np.float32(1.0)
-        for c in range(SAMPLES - 1):
+        for c in range(COEFFICIENTS):
             total = np.float32(0.0)
             for k in range(SAMPLES):
                 total += basis[c, k] * profile[k]
-            out[n, 3 + c] = total / norm
+            out[n, 3 + c] = total
 
 
 def segments_of(
@@ -110,8 +107,8 @@ def segments_of(
     An edge is a local maximum along a column of the intensity's gradient, of the image smoothed by `blur` pixels,
     above `min_gradient` standard deviations of its intensity per pixel: neither scale nor offset of the light changes
     it. Every two neighbouring edges at least `min_length` pixels apart make a segment. Descriptors: colour correlations
-    over the segment widened by `MARGIN` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8
-    samples, its mean taken out and its length made 1. `circle`: the columns go around.
+    over the segment widened by `MARGIN` of its length on both sides; the first seven cosine coefficients of the
+    profile's 8 samples (grey levels). `circle`: the columns go around.
     """
     seam = min(max(2, math.ceil(3.0 * blur)), pixels.shape[1]) if circle else 0
     padded = np.concatenate([pixels[:, pixels.shape[1] - seam :], pixels, pixels[:, :seam]], axis=1) if seam else pixels
@@ -125,7 +122,7 @@ def segments_of(
     lines, rows = lines[:found], rows[:found]
     kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= min_length))
     ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
-    descriptors = np.empty((len(kept), 3 + SAMPLES - 1), np.float32)
+    descriptors = np.empty((len(kept), 3 + COEFFICIENTS), np.float32)
     _describe(smooth, grey, lines[kept], ends, margin, profile_basis(), descriptors)
     return Segments(lines[kept], ends, descriptors)
 
@@ -223,9 +220,9 @@ class FindVerticalSegments(Stage):
 
     Goedemé et al. 2007, section 3.3: along every radius of a mirror image, or every column of a panorama, each two
     neighbouring gradient maxima bound a segment; its descriptor holds three colour correlations over the widened
-    segment and seven cosine coefficients of its profile. The paper's 8-point transform has the mean as its first: the
-    profile's mean is taken out and its length made 1, as "invariant to illumination" asks, and the other seven are
-    kept. Similar neighbours become one (`prototypes`). Raises BadInput for an image without a camera.
+    segment and "the seven first coefficients" of the 8-point cosine transform of its profile, the brightness among
+    them: they are called invariant to the light, and are not (erratum 25a in docs/papers.md). Similar neighbours become
+    one (`prototypes`). Raises BadInput for an image without a camera.
     """
 
     max_segments: Annotated[int, Bounds(ge=1)] = 200

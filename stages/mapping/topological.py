@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,9 @@ class TopologicalMapping(Stage):
     """Patches of a view that the map keeps."""
     max_segments: Annotated[int, Bounds(ge=0)] = 60
     """Vertical segments of a view that the map keeps."""
+    spread: Literal["within_places", "all_views"] = "within_places"
+    """By what the sensor model scales visual distances: their root mean square from a place's views to its medoid, or
+    the paper's "standard deviation of it, measured on the data" (section 5.3): of all views of the tour."""
 
     class Out(Outputs):
         map: TopologicalMap
@@ -56,7 +59,7 @@ class TopologicalMapping(Stage):
         """The whole tour at once."""
         place = hypotheses.place
         made = self._assembled(views, place, known)
-        spread = spread_to_medoids(made, views, place)
+        spread = spread_to_medoids(made, views, place) if self.spread == "within_places" else views.deviation()
         made = dataclasses.replace(
             made, spread=spread or place_clusters.rms_within(views.distances, hypotheses.subcluster)
         )

@@ -12,6 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.visual_distance import (
     MAX_GLOBAL_DISTANCE,
     ComparisonOptions,
+    PatchDistance,
     ViewFeatures,
     colour_distances,
     compare,
@@ -54,6 +55,8 @@ class ViewComparison(Stage):
     """Shortest time between two views; images in between are passed over."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
+    patch_distance: PatchDistance = "euclidean"
+    """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
     supervised: Supervised = "auto"
     """Source of poses: the tour's `truth`, its `odometry`, or `auto`: the truth where there is one."""
 
@@ -88,7 +91,7 @@ class ViewComparison(Stage):
         if not views:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
         ctx.doing(f"comparing {len(views)} views")
-        options = ComparisonOptions(self.ratio)
+        options = ComparisonOptions(self.ratio, patch_distance=self.patch_distance)
         colours = np.stack([view.descriptor.values for view in views]).astype(np.float64)
         close = colour_distances(colours[:, None], colours[None]) <= MAX_GLOBAL_DISTANCE
         prepared = [view_features(view.features) for view in views]
@@ -112,6 +115,7 @@ class ViewComparison(Stage):
                     options.max_colour_distance,
                     options.min_matches,
                     options.min_angle,
+                    options.patch_distance,
                 ),
             )
         )

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
-from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, match_patches
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -26,6 +26,8 @@ class MatchFeatures(Stage):
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
     search: Literal["all", "kd_tree"] = "all"
     """Through all descriptors, or by kd-trees, which find the same pairs."""
+    patch_distance: PatchDistance = "euclidean"
+    """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
 
     class Out(Outputs):
         """The pairs; there may be none."""
@@ -34,7 +36,7 @@ class MatchFeatures(Stage):
 
     def step(self, ctx: Context, features: LocalFeatures, target: LocalFeatures) -> Out:
         """Match two views."""
-        options = ComparisonOptions(self.ratio, search=self.search)
+        options = ComparisonOptions(self.ratio, search=self.search, patch_distance=self.patch_distance)
         pairs = match_patches(features.patches(), target.patches(), options)
         first, second, distance = column_ends(features, target, options.segment_ratio)
         return self.Out(

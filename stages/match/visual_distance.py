@@ -8,7 +8,12 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.many_views import ManyViews
-from omninav.stages.geometry.appearance.visual_distance import MAX_GLOBAL_DISTANCE, ComparisonOptions, colour_distances
+from omninav.stages.geometry.appearance.visual_distance import (
+    MAX_GLOBAL_DISTANCE,
+    ComparisonOptions,
+    PatchDistance,
+    colour_distances,
+)
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -24,6 +29,8 @@ class MatchPlaces(Stage):
 
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
+    patch_distance: PatchDistance = "euclidean"
+    """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
 
     class Out(Outputs):
         """Visual distance to each place."""
@@ -52,7 +59,7 @@ class MatchPlaces(Stage):
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make a new map"
             )
         here = view_features(features)
-        options = ComparisonOptions(self.ratio)
+        options = ComparisonOptions(self.ratio, patch_distance=self.patch_distance)
         close = colour_distances(map.views.moments[map.places], descriptor.values) <= MAX_GLOBAL_DISTANCE
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)

@@ -25,9 +25,9 @@ class ProfileComponents(MetricStage):
     approximates without knowing the data. Components are fitted on the segments of the first half of the images, and
     both are measured on those of the second: under `profiles`, of the variance about the first half's mean the shares
     that the first 1 to 6 of 7 coefficients keep (`cosine`), and as many components (`principal`); `least_ratio`, the
-    least of the six ratios of the two. A descriptor's seven coefficients are orthonormal and hold all of a profile
-    without its mean, so that its components follow from them. Gives nothing where either half shows no two segments, or
-    the second none that varies.
+    least of the six ratios of the two. A descriptor's seven coefficients are orthonormal and lack but the finest of a
+    profile of eight points, so that its components follow from them. Gives nothing where either half shows no two
+    segments, or the second none that varies.
     """
 
     def step(self, ctx: Context, vertical_segments: Sequence[VerticalSegments | None]) -> MetricStage.Out:

@@ -27,7 +27,7 @@ class PlaceLikelihood(Stage):
     """
 
     sigma: Annotated[float, Bounds(gt=0)] | None = None
-    """Standard deviation of visual distance; null: the spread that the map was measured to have within its places."""
+    """Standard deviation of visual distance; null: as it was measured on the map's views (`nodes.mapping.spread`)."""
     tail: Literal["gaussian", "heavy"] = "heavy"
     """`gaussian`: the paper's; `heavy`: 1 / (1 + diss^2 / sigma^2)."""
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, ViewFeatures
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, ViewFeatures
 
 from .local_features import GlobalDescriptor, LocalFeatures, view_features
 from .pose import PoseSource
@@ -26,7 +26,7 @@ class ComparedViews(Value):
 
     `distances` (N, N): visual distances, inf where two views have nothing in common. `shares` (N, N): of the features,
     how many match. `options`: the ratios of patches and segments, the largest colour distance, the least number of
-    matches and the smallest mean angle (rad) by which they were compared.
+    matches, the smallest mean angle (rad) and the distance of patches by which they were compared.
     """
 
     features: Annotated[tuple[LocalFeatures, ...], Shape("N")]
@@ -39,7 +39,7 @@ class ComparedViews(Value):
     owners: Annotated[Ints, Shape("N")]
     distances: Annotated[Array, Shape("N", "N", finite=False), Bounds(ge=0)]
     shares: Annotated[Array, Shape("N", "N"), Bounds(ge=0)]
-    options: tuple[float, float, float, int, float]
+    options: tuple[float, float, float, int, float, PatchDistance]
 
     def __len__(self) -> int:
         return len(self.features)
@@ -48,9 +48,20 @@ class ComparedViews(Value):
         """A view prepared for comparison with others."""
         return view_features(self.features[view])
 
+    def deviation(self) -> float:
+        """Standard deviation of the visual distances of each two views that have anything in common; 0 without any."""
+        apart = self.distances[np.triu_indices(len(self), 1)]
+        apart = apart[np.isfinite(apart)]
+        return float(apart.std()) if len(apart) else 0.0
+
     def comparison_options(self) -> ComparisonOptions:
         """Name of the comparison."""
-        ratio, segment_ratio, max_colour_distance, min_matches, min_angle = self.options
+        ratio, segment_ratio, max_colour_distance, min_matches, min_angle, patch_distance = self.options
         return ComparisonOptions(
-            ratio, segment_ratio, max_colour_distance, min_matches=min_matches, min_angle=min_angle
+            ratio,
+            segment_ratio,
+            max_colour_distance,
+            patch_distance=patch_distance,
+            min_matches=min_matches,
+            min_angle=min_angle,
         )

@@ -124,8 +124,8 @@ class TopologicalMap(Value):
     first to the second place, both medoids excluded: driven one after the other they lead there.
     `frames` (V,): numbers of the views' pictures, counted on from tour to tour; `orders` (V,): among those that took
     part, with a gap from tour to tour. `poses` (V, 3): x, y (m), heading (rad) where they were taken, from
-    `pose_source`: for scoring and drawing only. `spread`: the root mean square visual distance of a place's views to
-    its medoid as it is kept: what a distance in the right place is like.
+    `pose_source`: for scoring and drawing only. `spread`: by which the sensor model scales visual distances, as
+    measured on the tour (`TopologicalMapping.spread`).
     """
 
     views: Annotated[StoredViews, Shape("V")]

@@ -28,7 +28,8 @@ def is_printed_map(graph: Graph) -> None:
     assert isinstance(loops, LoopClosure)
     assert isinstance(mapping, TopologicalMapping)
     assert (loops.between, loops.similarity, loops.min_share, loops.accepted) == ("medoids", "ratio", 0.0, "merge")
-    assert mapping.min_path_matches == 0
+    assert (mapping.min_path_matches, mapping.spread) == (0, "all_views")
+    assert graph.nodes["views"].stage.patch_distance == "mahalanobis"
     assert type(graph.nodes["features"].stage) is SiftAndColumns
 
 
@@ -37,7 +38,8 @@ def is_printed_place_filter(whole: Plan) -> None:
     assert [made.name for made in whole.artifacts if made.name == "words"] == []
     sensor = whole.graph.nodes["sensor"].stage
     assert isinstance(sensor, PlaceLikelihood)
-    assert sensor.tail == "gaussian"
+    assert (sensor.tail, sensor.sigma) == ("gaussian", None)
+    assert whole.graph.nodes["match"].stage.patch_distance == "mahalanobis"
     assert type(whole.graph.nodes["features"].stage) is SiftAndColumns
     is_printed_map(map_graph(whole))
 
@@ -51,6 +53,7 @@ def is_printed_homing(graph: Graph) -> None:
     local_map = graph.nodes["local_map"].stage
     assert (local_map.matching, local_map.solver, local_map.refine) == ("at_start", "eight_point", False)
     assert local_map.max_false_alarms > 1e9
+    assert graph.nodes["target_match"].stage.patch_distance == "mahalanobis"
 
 
 def test_a_printed_map_has_prototypes_alone_and_neither_words_nor_merging_nor_straightening():

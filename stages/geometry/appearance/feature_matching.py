@@ -1,6 +1,6 @@
 """Which features of two views belong together, by what they look like."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -132,15 +132,17 @@ def spreads(*parts: Floats) -> Floats:
     return np.where(spread > 1e-9, spread, 1.0).astype(np.float32)
 
 
-def mahalanobis_matches(one: Floats, other: Floats, ratio: float) -> Pairs:
+def mahalanobis_matches(one: Floats, other: Floats, ratio: float, search: Literal["all", "kd_tree"] = "all") -> Pairs:
     """`mutual_nearest` of rows (N, D) and (M, D) in which each element counts by its spread over both.
 
-    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedemé et al. 2007, equation 2 as erratum 26 in docs/papers.md
-    reads it).
+    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedemé et al. 2007, section 3.4, equation 2 as erratum 26 in
+    docs/papers.md reads it). `search`: through all rows, or by kd-trees.
     """
     if not len(one) or not len(other):
         return NO_PAIRS
     sigma = spreads(one, other)
+    if search == "kd_tree":
+        return tree_matches(one / sigma, other / sigma, ratio)
     return mutual_nearest(squared_distances(one / sigma, other / sigma), ratio)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .feature_matching import mutual_nearest_of_each
-from .visual_distance import Comparison, ComparisonOptions, Patches, ViewFeatures, compared
+from .visual_distance import Comparison, ComparisonOptions, Patches, ViewFeatures, compare, compared
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -29,6 +29,8 @@ class ManyViews:
         """`visual_distance.compare` of the chosen views (K,) with another: the same numbers."""
         if self._patches is None or other.patches is None:
             return [compared(self.features[n], other, None, by) for n in chosen]
+        if by.patch_distance == "mahalanobis":  # each two views have spreads of their own
+            return [compare(self.features[n], other, by) for n in chosen]
         rows_before = np.cumsum(self._starts[chosen + 1] - self._starts[chosen])
         found: list[Comparison] = []
         for number in np.unique(rows_before // ROWS):

@@ -14,6 +14,9 @@ Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
+PatchDistance = Literal["euclidean", "mahalanobis"]
+"""Distance of two patches' descriptors: as they are, or each element by its spread over both views (equation 2 of
+Goedemé et al. 2007)."""
 
 
 class ComparisonOptions(NamedTuple):
@@ -21,7 +24,8 @@ class ComparisonOptions(NamedTuple):
 
     `ratio`, `segment_ratio`: a match's distance over that of the second nearest, of patches and of vertical segments.
     `max_colour_distance`: of the colours of two matching patches (Euclidean, three correlations). `search`: through all
-    descriptors, or by kd-trees. `min_matches`: with fewer two views have nothing in common. `min_angle` (rad): the
+    descriptors, or by kd-trees. `patch_distance`: of two patches' descriptors, Euclidean or by equation 2; segments are
+    always compared by equation 2. `min_matches`: with fewer two views have nothing in common. `min_angle` (rad): the
     smallest mean angle between matches that counts.
     """
 
@@ -29,6 +33,7 @@ class ComparisonOptions(NamedTuple):
     segment_ratio: float = 0.8
     max_colour_distance: float = 0.5
     search: Literal["all", "kd_tree"] = "all"
+    patch_distance: PatchDistance = "euclidean"
     min_matches: int = 8
     min_angle: float = math.radians(0.5)
 
@@ -77,7 +82,9 @@ def match_patches(one: Patches, other: Patches, by: ComparisonOptions) -> Pairs:
     """Patches of two views with similar descriptors and colours (Goedemé et al. 2007, sections 3.2 and 3.4)."""
     if not len(one.descriptors) or not len(other.descriptors):
         return NO_PAIRS
-    if by.search == "kd_tree":
+    if by.patch_distance == "mahalanobis":
+        pairs = mahalanobis_matches(one.descriptors, other.descriptors, by.ratio, by.search)
+    elif by.search == "kd_tree":
         pairs = tree_matches(one.descriptors, other.descriptors, by.ratio)
     else:
         squares = one.descriptors @ other.descriptors.T

@@ -46,10 +46,19 @@ def test_segments_lie_between_neighbouring_edges() -> None:
 
 def test_the_profile_is_described_by_seven_coefficients_of_scipys_transform() -> None:
     profile = np.random.default_rng(1).normal(size=8)
-    assert profile_basis() @ profile == pytest.approx(fft.dct(profile, norm="ortho")[1:], abs=1e-6)
+    assert profile_basis() @ profile == pytest.approx(fft.dct(profile, norm="ortho")[:7], abs=1e-6)
 
 
-def test_a_descriptor_does_not_change_with_the_light() -> None:
+def test_the_first_coefficient_is_the_brightness_of_the_profile() -> None:
+    # Grey levels of 100 from the one edge to the other: 100 times the root of 8, and nothing else.
+    pixels = np.full((60, 40, 3), 100, np.uint8)
+    pixels[:20] = pixels[40:] = 240
+    (described,) = np.unique(segments_of(pixels, True, 0.3, 0.1, 8.0, 0.0).descriptors.round(2), axis=0)
+    assert described[3] == pytest.approx(100.0 * math.sqrt(8.0), rel=0.02)
+    assert np.abs(described[4:]).max() < 6.0
+
+
+def test_colours_do_not_change_with_the_light_and_the_profile_does_as_the_light() -> None:
     panorama = look("panorama", 0.0).pixels
     lit = (panorama * 0.5 + 40.0).round().astype(np.uint8)
     one, other = (segments_of(pixels, True, 1.0, 0.1, 8.0, 0.2) for pixels in (panorama, lit))
@@ -57,9 +66,11 @@ def test_a_descriptor_does_not_change_with_the_light() -> None:
     keys = [[tuple(row) for row in np.column_stack([s.lines, s.ends.round()]).tolist()] for s in (one, other)]
     places = {key: row for row, key in enumerate(keys[0])}
     both = np.array([(places[key], row) for row, key in enumerate(keys[1]) if key in places])
-    apart = np.abs(one.descriptors[both[:, 0]] - other.descriptors[both[:, 1]])
+    before, after = one.descriptors[both[:, 0]], other.descriptors[both[:, 1]]
     assert len(both) > 0.7 * len(one.lines)
-    assert np.median(apart) < 0.03
+    assert np.median(np.abs(before[:, :3] - after[:, :3])) < 0.03
+    lighter = 0.5 * before[:, 3:] + 40.0 * math.sqrt(8.0) * (np.arange(7) == 0)
+    assert np.median(np.abs(lighter - after[:, 3:])) < 1.0
 
 
 @both_kinds

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from made_tour import Landmarks, along, mapped, scattered
+from made_views import made_views
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
@@ -30,6 +31,7 @@ from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
 SQUARE = [(8.0, 8.0), (32.0, 8.0), (32.0, 32.0), (8.0, 32.0), (8.0, 8.0)]
+SPREADS = "within_places", "all_views"
 WORLD = Landmarks(scattered(40.0, 40.0))
 
 
@@ -155,6 +157,14 @@ def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: tuple[Topo
         if row != made.frames[made.places[found.place[row]]]:
             apart.append(distances.distances[found.place[row]])
     assert made.spread == pytest.approx(np.sqrt(np.mean(np.square(apart))), rel=0.01)
+
+
+def test_the_paper_s_deviation_is_that_of_all_views_that_have_anything_in_common() -> None:
+    apart = np.array([[0.0, 1.0, 3.0], [1.0, 0.0, math.inf], [3.0, math.inf, 0.0]])
+    assert made_views(apart).deviation() == 1.0  # of 1 and 3
+    assert made_views(np.zeros((1, 1))).deviation() == 0.0
+    within, over_all = (mapped(WORLD, [along(SQUARE[:3], 1.6)], spread=of).map.spread for of in SPREADS)
+    assert over_all > 1.5 * within  # most views are of other places
 
 
 def test_two_maps_of_one_tour_are_the_same_bytes() -> None:

@@ -20,6 +20,8 @@ from omninav.stages.geometry.appearance.visual_distance import (
     alignment,
     compare,
     local_distance,
+    match_patches,
+    patches,
 )
 from omninav.stages.values.local_features import LocalFeatures, view_features
 
@@ -84,6 +86,24 @@ def test_elements_count_by_their_spread_and_one_that_never_varies_not_at_all() -
     sigma = np.concatenate([one, other]).std(axis=0)
     gap = ((one - other[::-1]) / np.where(sigma > 0, sigma, 1.0))[plain.first]
     assert plain.distance == pytest.approx(np.linalg.norm(gap, axis=1), rel=1e-2)  # equation 2
+
+
+def test_patches_are_compared_by_equation_2_where_that_is_asked_for() -> None:
+    # The first element spreads by 100 and the second by 1. As they are, row 0 is nearest to column 0 by the first
+    # element, and by equation 2 to column 1, whose second element is its own: worked out below.
+    one, other = np.float32([[100, 0], [-100, 9]]), np.float32([[101, 3], [90, 0], [-120, 9]])
+    sigma = np.concatenate([one, other]).std(axis=0)
+    assert sigma == pytest.approx([101.68, 4.069], rel=1e-3)
+    squares = (((one[:, None] - other) / sigma) ** 2).sum(axis=-1)
+    assert squares[0] == pytest.approx([0.5436, 0.00967, 9.573], rel=1e-3)
+    colours, around = np.zeros((3, 3), np.float32), np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    first, second = patches(one, colours[:2], around[:2]), patches(other, colours, around)
+    plain = match_patches(first, second, ComparisonOptions())
+    assert dict(zip(plain.first.tolist(), plain.second.tolist(), strict=True)) == {0: 0, 1: 2}
+    for search in ("all", "kd_tree"):
+        scaled = match_patches(first, second, ComparisonOptions(search=search, patch_distance="mahalanobis"))
+        assert dict(zip(scaled.first.tolist(), scaled.second.tolist(), strict=True)) == {0: 1, 1: 2}
+        assert scaled.distance[scaled.first == 0] == pytest.approx(math.sqrt(0.00967), rel=1e-3)
 
 
 def test_the_measure_is_equation_4_worked_by_hand() -> None:

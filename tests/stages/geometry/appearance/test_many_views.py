@@ -1,10 +1,12 @@
 """One view compared with many at once, against one after the other."""
 
 import numpy as np
+import pytest
 
 from omninav.stages.geometry.appearance.many_views import ROWS, ManyViews
 from omninav.stages.geometry.appearance.visual_distance import (
     ComparisonOptions,
+    PatchDistance,
     Segments,
     ViewFeatures,
     compare,
@@ -25,13 +27,14 @@ def a_view(rng: np.random.Generator, looks: np.ndarray, number: int, segments: i
     return ViewFeatures(described, Segments(columns, rng.uniform(-3, 3, segments)))
 
 
-def test_many_views_are_compared_as_one_after_the_other():
+@pytest.mark.parametrize("patch_distance", ["euclidean", "mahalanobis"])
+def test_many_views_are_compared_as_one_after_the_other(patch_distance: PatchDistance):
     rng = np.random.default_rng(0)
     looks = rng.integers(0, 100, (300, 128))
     sizes = [80, 0, 3, 150, 60, 1, *[90] * 40]
     assert sum(sizes) > ROWS  # more than one block
     views = [a_view(rng, looks, number, segments=5 if row % 7 == 0 else None) for row, number in enumerate(sizes)]
-    here, by = a_view(rng, looks, 120, segments=9), ComparisonOptions()
+    here, by = a_view(rng, looks, 120, segments=9), ComparisonOptions(patch_distance=patch_distance)
     chosen = np.array([n for n in range(len(views)) if n % 5 != 4])
     found = ManyViews(views).compare(chosen, here, by)
     assert found == [compare(views[n], here, by) for n in chosen]
