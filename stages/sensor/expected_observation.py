@@ -17,7 +17,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 
-from .near_references import Array, Floats, Ints, NearReferences, Shorts
+from .near_references import Array, Floats, Ints, NearReferences, Shorts, fading
 
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.
@@ -30,7 +30,8 @@ def _similarity(
     histograms: bool,
     whole: bool,
     nearest: Shorts,
-    fade_distance_m: float,
+    min_square: float,
+    decay: float,
     background_level: float,
     network: Ints,
     factors: Floats,
@@ -52,7 +53,7 @@ def _similarity(
         if number == 0:
             continue
         for k in range(number):
-            squares[k] = 1.0 / (squares[k] + 0.25 * closest + 1e-4 * fade_distance_m * fade_distance_m)
+            squares[k] = 1.0 / (squares[k] + 0.25 * closest + min_square)
             mass += squares[k]
         expected[:] = np.float32(0)
         for k in range(number):
@@ -92,7 +93,7 @@ def _similarity(
             best = score if score > best else best
         if whole:
             best = max(np.float32(1) - np.float32(np.sqrt(squared)) / scale, np.float32(0))
-        known = math.exp(-0.5 * closest / (fade_distance_m * fade_distance_m))
+        known = math.exp(decay * closest)
         faded = known * best + (1.0 - known) * background_level
         out[n] = faded if faded > background_level else background_level
     return out
@@ -105,7 +106,7 @@ def similarity_of_expected(
     view: Floats,
     histograms: bool,
     nearest: Shorts,
-    fade_distance_m: float,
+    fade_distance_m: float | None,
     background_level: float,
     exponent: float | None = 0.5,
     colour_scale: float = MAX_COLOUR_DISTANCE,
@@ -129,7 +130,7 @@ def similarity_of_expected(
         histograms,
         exponent is None,
         nearest,
-        fade_distance_m,
+        *fading(fade_distance_m),
         background_level,
         network,
         factors,
@@ -144,8 +145,10 @@ class ExpectedObservation(NearReferences):
     Gross & Koenig 2004, section 2, to the letter: S is the similarity "between the expected observation of the sample
     in its current pose and the actual observation". The features of the nearest references are averaged and turned to
     the particle's heading, then compared; `near_references` interpolates similarities instead, at a tenth of the cost.
-    Everything else is as there. Penalty and scale are those of the `similarities`, and so is the norm of the whole
-    difference (`match=l2`, non-selective). Raises BadInput where these compare otherwise (`match=cosine`).
+    Everything else is as there; with a `power`, and neither a fade nor a background, the weight is S^power (erratum 23a
+    in docs/papers.md), up to a factor that all particles share. Penalty and scale are those of the `similarities`, and
+    so is the paper's non-selective comparison, the L2 norm of the whole difference (`match=l2`). Raises BadInput where
+    these compare otherwise (`match=cosine`).
     """
 
     def step(  # type: ignore[override]
@@ -180,7 +183,7 @@ class ExpectedObservation(NearReferences):
             self._view.values,
             isinstance(self._view, SegmentHistograms),
             np.where(near < 0, -1, rows[near]).astype(np.int32),
-            self.fade_distance * unit,
+            self._fade_m(unit),
             floor,
             self._exponent,
             self._colour_scale,

@@ -29,6 +29,10 @@ Shorts = npt.NDArray[np.int32]
 CELLS_PER_LENGTH_SCALE = 4
 CUTOFF_SIGMAS = 3.0
 """Fading distances beyond which a reference keeps less than 1.2 % of its influence."""
+FAR = 60.0
+"""Distance to the nearest reference beyond which nothing is expected where references do not fade, length scales."""
+MIN_SQUARE_M2 = 1e-4
+"""Least squared distance in a reference's weight where references do not fade: (1 cm)^2."""
 BACKGROUND_DISTANCE = 3.0
 """Distance from the best reference beyond which references are background, length scales."""
 NEIGHBOURS = 4
@@ -42,13 +46,13 @@ def _expected(
     rows: Ints,
     similarity: Floats,
     nearest: Shorts,
-    fade_distance_m: float,
+    min_square: float,
+    decay: float,
     background_level: float,
     out: Array,
 ) -> None:
     headings = similarity.shape[1]
     per_radian = headings / (2 * np.pi)
-    min_square, decay = 1e-4 * fade_distance_m * fade_distance_m, -0.5 / (fade_distance_m * fade_distance_m)
     neighbours = nearest.shape[1]
     row = np.empty(neighbours, np.int64)
     squares = np.empty(neighbours)
@@ -83,25 +87,32 @@ def _expected(
         out[n] = max(background_level, known * total / mass + (1.0 - known) * background_level)
 
 
+def fading(fade_distance_m: float | None) -> tuple[float, float]:
+    """Least squared distance (m^2) in a reference's weight, and the exponent per m^2 by which it fades; None: never."""
+    if fade_distance_m is None:
+        return MIN_SQUARE_M2, 0.0
+    return 1e-4 * fade_distance_m * fade_distance_m, -0.5 / (fade_distance_m * fade_distance_m)
+
+
 def expected_similarity(
     poses: Array,
     references: Array,
     nearest: Shorts,
     rows: Ints,
     similarity: Floats,
-    fade_distance_m: float,
+    fade_distance_m: float | None,
     background_level: float,
 ) -> Array:
     """Similarity of the current view to the one expected at poses: (N, 3) -> (N,).
 
     The references `nearest` (N, k) to each pose (-1: none) have the weights 1 / (d^2 + (d_min / 2)^2), each at the
     pose's heading (linear between the compared headings). With the distance d_min of the nearest one the expectation
-    fades to `background_level` by exp(-d_min^2 / (2 fade_distance^2)); it is never below. `rows` (R,): each reference's
-    row in `similarity`, -1 where it was not compared.
+    fades to `background_level` by exp(-d_min^2 / (2 fade_distance^2)), never where that is None; it is never below.
+    `rows` (R,): each reference's row in `similarity`, -1 where it was not compared.
     """
     poses, similarity = np.ascontiguousarray(poses), np.ascontiguousarray(similarity)
     out = np.empty(len(poses))
-    _expected(poses, references, rows, similarity, nearest, fade_distance_m, background_level, out)
+    _expected(poses, references, rows, similarity, nearest, *fading(fade_distance_m), background_level, out)
     return out
 
 
@@ -182,10 +193,11 @@ class NearReferences(Stage):
     """Exponent of the similarity; null: from `contrast`, since similarity varies differently in each world."""
     contrast: Annotated[float, Bounds(gt=0)] = 3.0
     """Nats of log likelihood per standard deviation of log S over the references at their best headings."""
-    background_quantile: Annotated[float, Bounds(ge=0, le=1)] = 0.8
-    """Quantile of the background references' similarities that an unknown place reaches."""
-    fade_distance: Annotated[float, Bounds(gt=0)] = 1.5
-    """Distance, in length scales, over which a reference loses its influence (sigma of a Gaussian)."""
+    background_quantile: Annotated[float, Bounds(ge=0, le=1)] | None = 0.8
+    """Quantile of the background references' similarities that an unknown place reaches; null: such places reach
+    nothing."""
+    fade_distance: Annotated[float, Bounds(gt=0)] | None = 1.5
+    """Distance, in length scales, over which a reference loses its influence (sigma of a Gaussian); null: none does."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.75
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always. Needs `motion`. With a
     `calibration`, in the distances over which its evidence was measured to lose its correlation."""
@@ -217,7 +229,7 @@ class NearReferences(Stage):
         if not values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
         if map is not self._map or len(map) != self._length:
-            radius = CUTOFF_SIGMAS * self.fade_distance * unit
+            radius = (FAR if self.fade_distance is None else CUTOFF_SIGMAS * self.fade_distance) * unit
             self._cells = NearestCells(map.poses, NEIGHBOURS, unit / CELLS_PER_LENGTH_SCALE, radius)
             self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
@@ -228,8 +240,10 @@ class NearReferences(Stage):
             novelty = evidence_novelty(driven, far)
             return self._calibrated(similarities, particles, map, rows, unit, calibration, novelty)
         best, each = similarities.best, similarities.sampling_weight
-        places, distance = map.poses[candidates], BACKGROUND_DISTANCE * unit
-        floor = background_similarity(best, places, distance, self.background_quantile, each)
+        floor = 0.0
+        if self.background_quantile is not None:
+            places, distance = map.poses[candidates], BACKGROUND_DISTANCE * unit
+            floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
         novelty = evidence_novelty(driven, self.independence_distance * unit)
         top = max(float(np.maximum.reduce(best)), 1e-12)
@@ -251,9 +265,7 @@ class NearReferences(Stage):
         ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
         near = self._cells.of(particles.poses)
-        expected = expected_similarity(
-            particles.poses, map.poses, near, rows, np.log(ratios), self.fade_distance * unit, 0.0
-        )
+        expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), self._fade_m(unit), 0.0)
         field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
         likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty)
         return self.Out(likelihood=likelihood, field=field)
@@ -262,4 +274,7 @@ class NearReferences(Stage):
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
     ) -> Array:
         near = self._cells.of(poses)
-        return expected_similarity(poses, map.poses, near, rows, values, self.fade_distance * unit, floor)
+        return expected_similarity(poses, map.poses, near, rows, values, self._fade_m(unit), floor)
+
+    def _fade_m(self, unit: float) -> float | None:
+        return None if self.fade_distance is None else self.fade_distance * unit

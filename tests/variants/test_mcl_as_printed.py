@@ -1,4 +1,4 @@
-"""What the two papers on Monte Carlo localisation print, and nothing else."""
+"""What the two papers on Monte Carlo localisation print."""
 
 import pytest
 
@@ -38,8 +38,10 @@ def test_gross_and_koenig(printed):
     assert "calibration" not in wired(graph, "sensor")
     assert type(match) is SelectiveMatch
     assert (match.penalty, stages["features"].hue_bins, stages["features"].value_bins) == ("sqrt", 16, 4)
-    # Each image is evidence, and nothing is said of places away from the references.
-    assert (sensor.independence_distance, sensor.background_quantile) == (0.0, 0.0)
+    # The weight is a fixed power of S: no contrast of the image's own, no fade with distance, no floor.
+    assert (sensor.power, sensor.fade_distance, sensor.background_quantile) == (4.0, None, None)
+    # Each image is evidence.
+    assert sensor.independence_distance == 0.0
     # Sampling, importance weights, resampling at each image; no particle comes from anywhere else.
     assert type(fusion) is ImportanceResampling
     assert (fusion.number, fusion.resample_below, fusion.adapt) == (5000, 1.0, "none")

@@ -80,6 +80,28 @@ def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L
     assert likelihood.max() < 1.05
 
 
+def test_a_weight_is_a_power_of_s_however_far_the_references_are_and_whatever_they_reach() -> None:
+    """Gross & Koenig 2004, section 2: S alone determines the weight. Two references of one bin at three segments: seen
+    is half of the one's and a quarter of the other's mass in all segments, so that S is 0.5 and 0.25."""
+    bins = np.zeros((2, 3, 3), np.float32)
+    bins[:, :, 0], bins[0, :, 1], bins[1, :, 1] = [[0.5], [0.25]], 0.5, 0.75
+    references = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
+    map = ReferenceGraph(references, bins, "histograms", np.zeros((0, 2), np.int64), "truth")
+    seen = SegmentHistograms(np.tile(np.float32([1.0, 0.0, 0.0]), (3, 1)))
+    stage, ctx = ExpectedObservation(power=2.0, fade_distance=None, background_quantile=None), Context("sensor")
+    stage.setup(ctx)
+    poses = np.array([[0.0, 0.0, 0.3], [9.0, 0.0, -2.0], [0.0, -9e3, 0.0], [0.0, 30.0, 0.0]])
+    for spread in (0.0, 0.4):  # how S varies over the map is nothing to a weight
+        alike = Similarities(np.float32([[0.5], [0.5 - spread]]), exponent=0.5)
+        values = stage.step(ctx, alike, seen, Particles(poses, np.full(4, 0.25)), map, None, LengthScale(1.0))
+        weights = values.likelihood.values * 0.5**2  # the factor that all share
+        assert weights[:2] == pytest.approx([0.5**2, 0.25**2], rel=1e-3)
+        # 30 m away both are expected, by 1 / (d^2 + (d_min / 2)^2); beyond all of the map there is nothing to expect.
+        shares = 1 / np.array([900 + 225, 981 + 225])
+        assert weights[3] == pytest.approx(((shares @ [0.5, 0.25]) / shares.sum()) ** 2, rel=1e-3)
+        assert weights[2] == 0.0
+
+
 def test_by_the_norm_of_the_whole_difference_a_segment_that_differs_much_counts_more() -> None:
     # Two views, each 40 from the one expected in all: spread over nine segments, and in one of them.
     expected, spread, gathered = (np.full((9, 3), 100.0, np.float32) for _ in range(3))
