@@ -26,12 +26,29 @@ def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
     import pyarrow.csv as csv
     import pyarrow.parquet as parquet
 
-    table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
+    table = pa.table({name: _column(values) for name, values in columns.items()})
     with whole_file(path.with_name(f"{path.name}.csv")) as part, part.open("wb") as file:
         file.write((",".join(columns) + "\n").encode())
         csv.write_csv(table, file, csv.WriteOptions(include_header=False))
     with whole_file(path.with_name(f"{path.name}.parquet")) as part:
         parquet.write_table(table, part)
+
+
+def _column(values: "npt.NDArray[Any]") -> Any:
+    """A column whose NaN or masked cells are empty, of numbers and texts as they lie: `pa.array` imports pandas."""
+    import numpy as np
+    import pyarrow as pa
+
+    plain = np.ascontiguousarray(np.ma.getdata(values))
+    if plain.dtype.kind not in "iufU":
+        return pa.array(values, from_pandas=True)
+    missing = np.ma.getmaskarray(values) | (np.isnan(plain) if plain.dtype.kind == "f" else False)
+    buffers = [pa.py_buffer(np.packbits(~missing, bitorder="little")) if missing.any() else None]
+    if plain.dtype.kind == "U":
+        texts = [text.encode() for text in plain.tolist()]
+        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+        return pa.Array.from_buffers(pa.string(), len(texts), [*buffers, *map(pa.py_buffer, (ends, b"".join(texts)))])
+    return pa.Array.from_buffers(pa.from_numpy_dtype(plain.dtype), len(plain), [*buffers, pa.py_buffer(plain)])
 
 
 def read_table(path: Path, wanted: Callable[[str], bool] = lambda name: True) -> Any:

@@ -67,7 +67,7 @@ def is_group(name: str) -> bool:
 @functools.cache
 def listed_groups() -> tuple[str, ...]:
     """The groups that every configuration is composed of, in the order of `config.yaml`."""
-    listed = (next(iter(item)) for item in _config_file()["defaults"] if isinstance(item, dict))
+    listed = (next(iter(item)) for item in config_file()["defaults"] if isinstance(item, dict))
     return tuple(name for name in listed if not name.startswith("override "))
 
 
@@ -111,11 +111,12 @@ def refuse_null_groups(words: Sequence[str]) -> None:
 
 def settings_left_open() -> list[str]:
     """The settings that are null until they are given: what a run may be of. A variant names those that it takes."""
-    return [name for name, value in _config_file().items() if value is None and name not in ("variant", "objective")]
+    return [name for name, value in config_file().items() if value is None and name not in ("variant", "objective")]
 
 
 @functools.cache
-def _config_file() -> dict[str, Any]:
+def config_file() -> dict[str, Any]:
+    """Reads the top of every configuration, `config.yaml`."""
     return _read("config.yaml")
 
 

@@ -6,7 +6,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from hydra import initialize, version
+from hydra import version
+from hydra._internal.hydra import Hydra
+from hydra._internal.utils import create_config_search_path  # `hydra.initialize` reads the source of its callers first
 from hydra.core.config_loader import ConfigLoader
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
@@ -16,7 +18,7 @@ from hydra.errors import ConfigCompositionException, HydraException
 from hydra.plugins.config_source import ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
-from omegaconf import OmegaConf, open_dict
+from omegaconf import MISSING, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from hydra_plugins.omninav_launcher import OmninavLauncher
@@ -71,10 +73,9 @@ def _finding_in(folders: Sequence[str]) -> Any:
         Plugins.instance().register(plugin)
     _SearchPath.folders = [str(Path(folder).absolute()) for folder in folders]
     try:
-        initialize(config_path=None, job_name="omninav", version_base=VERSION_BASE)
+        started: Any = Hydra.create_main_hydra2("omninav", create_config_search_path(None))
     finally:
         _SearchPath.folders = None
-    started: Any = GlobalHydra.instance().hydra
     started.config_loader = CheckedLoader(started.config_loader)
     return started
 
@@ -194,9 +195,9 @@ def _refuse_search_path(overrides: Sequence[str]) -> None:
 def _foreign(given: Any, own: Any) -> Iterator[Problem]:
     """What stands under `hydra.` and is neither omninav's `own` nor of its flags."""
     free = (*FOLDERS_OF_JOBS, *LAUNCHING, *OF_HYDRA)
-    for key in sorted({*map(str, given), *map(str, own)} - {*free}):
-        skip = OF_A_JOB if key == "job" else ()
-        if _plain(given, key, skip) != _plain(own, key, skip):
+    theirs, ours = (_plain(config) for config in (given, own))
+    for key in sorted({*theirs, *ours} - {*free}):
+        if theirs.get(key) != ours.get(key):
             yield not_settable(f"hydra.{key}")
     for key in LAUNCHING:
         for resolve in (False, True):
@@ -210,12 +211,12 @@ def _foreign(given: Any, own: Any) -> Iterator[Problem]:
             yield from _foreign_classes(part, f"hydra.{key}")
 
 
-def _plain(config: Any, key: str, skip: Sequence[str]) -> Any:
-    if key not in config or OmegaConf.is_missing(config, key):
-        return None
-    whole: Any = OmegaConf.to_container(config, resolve=False)
-    plain = whole[key]
-    return {name: part for name, part in plain.items() if name not in skip} if isinstance(plain, dict) else plain
+def _plain(config: Any) -> dict[str, Any]:
+    """The parts that are there, without what Hydra fills in for a job."""
+    plain: Any = OmegaConf.to_container(config, resolve=False)
+    if isinstance(plain.get("job"), dict):
+        plain["job"] = {name: part for name, part in plain["job"].items() if name not in OF_A_JOB}
+    return {str(key): None if part == MISSING else part for key, part in plain.items()}
 
 
 def not_settable(where: str) -> Problem:

@@ -5,10 +5,9 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Any
 
-import networkx as nx
-
 from .graph import ARTIFACTS, LIFETIMES, Graph, Lifetime, Node, Wire
 from .ground_truth import truth_in_the_loop
+from .ordering import Following
 from .parameters import BadStage
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
@@ -339,18 +338,17 @@ class _Builder:
     # order
 
     def _lifetimes(self) -> dict[str, Lifetime]:
-        flow: nx.DiGraph[str] = nx.DiGraph()
-        flow.add_nodes_from(self.nodes)
+        flow = Following(self.nodes)
         for wire in self.wires:
             if wire.from_node != ARTIFACTS:
-                flow.add_edge(wire.from_node, wire.to_node)
+                flow.add(wire.from_node, wire.to_node)
             if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
-                flow.add_edge(wire.initial.partition(".")[0], wire.to_node)
+                flow.add(wire.initial.partition(".")[0], wire.to_node)
         after_roots = {wire.to_node for wire in self.wires if wire.collect}
         tick_roots = {name for name, node in self.nodes.items() if node.signature.is_source}
         tick_roots |= {wire.to_node for wire in self.wires if wire.delay}
-        after = after_roots | {n for root in after_roots for n in nx.descendants(flow, root)}
-        ticking = tick_roots | {n for root in tick_roots for n in nx.descendants(flow, root)}
+        after = after_roots | flow.after(*after_roots)
+        ticking = tick_roots | flow.after(*tick_roots)
         for wire in self.wires:
             if wire.to_node in after and wire.delay:
                 self._problem(
@@ -366,14 +364,13 @@ class _Builder:
         return {name: "after" if name in after else "tick" if name in ticking else "before" for name in self.nodes}
 
     def _ordered(self, lifetimes: dict[str, Lifetime]) -> Graph:
-        order: nx.DiGraph[str] = nx.DiGraph()
-        order.add_nodes_from(self.nodes)
+        order = Following(self.nodes)
         for wire in self.wires:
             if wire.from_node != ARTIFACTS and not wire.delay:
-                order.add_edge(wire.from_node, wire.to_node)
+                order.add(wire.from_node, wire.to_node)
             if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
-                order.add_edge(wire.initial.partition(".")[0], wire.to_node)
-        cycle = _cycle(order)
+                order.add(wire.initial.partition(".")[0], wire.to_node)
+        cycle = order.circle()
         if cycle:
             path = " -> ".join([*cycle, cycle[0]])
             around = zip(cycle, [*cycle[1:], cycle[0]], strict=True)
@@ -388,17 +385,15 @@ class _Builder:
         def early(name: str) -> tuple[int, bool, int, int]:
             first = listed[name]
             if lifetimes[name] == "tick":  # in time for the first listed of those that wait for it
-                first = min(
-                    listed[later] for later in (name, *nx.descendants(order, name)) if lifetimes[later] == "tick"
-                )
+                first = min(listed[later] for later in (name, *order.after(name)) if lifetimes[later] == "tick")
             own = self.nodes[name].signature
             return LIFETIMES.index(lifetimes[name]), not own.is_source, first, listed[name]
 
-        running = nx.lexicographical_topological_sort(order, key=early)
+        running = order.ordered(early)
         nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
         return Graph(nodes, self.wires, self.artifacts)
 
-    def _order_in_place(self, order: "nx.DiGraph[str]", lifetimes: dict[str, Lifetime]) -> None:
+    def _order_in_place(self, order: Following, lifetimes: dict[str, Lifetime]) -> None:
         """Readers of the delayed value run before the stage that updates it; whatever cannot be so is a problem."""
         firsts: dict[str, str | None] = {}
         for wire in self.wires:
@@ -422,23 +417,16 @@ class _Builder:
                         f"write initial: {firsts[wire.origin]}",
                     )
                 if wire.to_node != wire.from_node:
-                    order.add_edge(wire.to_node, wire.from_node)
-                    cycle = _cycle(order)
+                    order.add(wire.to_node, wire.from_node)
+                    cycle = order.circle()
                     if cycle:
-                        order.remove_edge(wire.to_node, wire.from_node)
+                        order.remove(wire.to_node, wire.from_node)
                         self._problem(
                             wire.where,
                             f"'{wire.to_node}' must read {kind} before '{wire.from_node}' updates it, "
                             f"but runs after it ({' -> '.join(cycle)})",
                             f"read it undelayed: {wire.where}={wire.origin}",
                         )
-
-
-def _cycle(order: "nx.DiGraph[str]") -> list[str] | None:
-    try:
-        return [edge[0] for edge in nx.find_cycle(order)]
-    except nx.NetworkXNoCycle:
-        return None
 
 
 def stages_that_give(kind: Any) -> list[str]:

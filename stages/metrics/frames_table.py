@@ -73,9 +73,7 @@ def columns_of(drive: Drive) -> Columns:
     columns["reference_turn"] = drive.reference_turn
     columns["place"] = drive.place
     columns |= dict(zip(EVIDENCE, drive.evidence.T, strict=True))
-    columns["conflict"] = np.ma.masked_array(
-        np.array((*drive.conflicts, ""), object)[drive.conflict], drive.conflict < 0
-    )
+    columns["conflict"] = np.ma.masked_array(np.array((*drive.conflicts, ""))[drive.conflict], drive.conflict < 0)
     return columns
 
 

@@ -4,17 +4,19 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from .config import Point, Route
 from .layout import Aisle
 from .streams import stream
 from .world import World
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 F64 = npt.NDArray[np.float64]
 
@@ -232,8 +234,10 @@ class _FreeSpace:
         self._cost_factor = 1.0 + 3.0 * np.clip(1.0 - (self._clearance_map - radius) / COMFORT_DISTANCE_M, 0.0, 1.0)
         self._graph = self._edges()
 
-    def _edges(self) -> csr_array:
+    def _edges(self) -> "csr_array":
         """Steps to the eight neighbours, longer close to obstacles."""
+        from scipy.sparse import csr_array  # slow to import: not before a route needs it
+
         rows, columns = self._free.shape
         number = np.arange(rows * columns).reshape(rows, columns)
         starts, ends, costs = [], [], []
@@ -283,6 +287,8 @@ class _FreeSpace:
         """Points (N, 2) of a path between two points, straight where nothing is near."""
         if _straight(self._world, np.stack([start, end]), self._world.config.robot.radius + 2 * CLEARANCE_M):
             return _resampled(np.stack([start, end]), POINT_SPACING_M)
+        from scipy.sparse.csgraph import dijkstra
+
         a, b = self._cell(start), self._cell(end)
         if a == b:
             return np.stack([start, self._middle(np.array([b]))[0]])
@@ -332,6 +338,8 @@ class _FreeSpace:
 
     def distances(self, start: F64) -> F64:
         """Costs of the space from a point to all cells; infinite where there is none."""
+        from scipy.sparse.csgraph import dijkstra
+
         cost: F64 = dijkstra(self._graph, directed=False, indices=self._cell(start))
         return cost
 

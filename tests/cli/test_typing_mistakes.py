@@ -116,6 +116,23 @@ def test_config_dir_stands_before_or_behind_every_command(folder: str, capsys: p
     assert "\nomniview_mcl " in listed
 
 
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("defaults: [mine]", "variant mine: its files include each other"),
+        ("defaults: plain_matching", "mine.yaml: expected names and values"),
+        ("inputs: [log]", "mine.yaml: expected names and values"),
+        ("- 1", "mine.yaml: expected names and values"),
+    ],
+)
+def test_an_own_variant_whose_inputs_cannot_be_read_is_refused(
+    folder: str, text: str, problem: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (Path(folder) / "variant/mine.yaml").write_text(text)
+    assert main(["variants", "--config-dir", folder]) == 2
+    assert problem in capsys.readouterr().err
+
+
 def test_an_own_variant_is_drawn(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["graph", "variant=mine", f"tour={TOUR}", f"log={DRIVE}", f"out={tmp_path}"]
     assert main(["--config-dir", folder, *words]) == 0

@@ -16,14 +16,16 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.commands.simulate import LIVE
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.config_groups import settings_left_open
+from omninav.pipeline.cli.config_groups import config_file, option_content, settings_left_open
 from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
+from omninav.pipeline.cli.variant_inputs import inputs_of
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
+from omninav.pipeline.run.inputs import read_inputs
 from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
@@ -186,6 +188,8 @@ def test_a_variant_declares_the_inputs_that_its_graph_reads():
 
 def declares_its_inputs(variant: str) -> None:
     config = compose([f"variant={variant}"])
+    listed = inputs_of(variant, config_file()["defaults"], option_content)  # as `omninav variants` reads them
+    assert listed == read_inputs({"inputs": OmegaConf.to_container(config.inputs)})
     declared = {name for name, meaning in config.inputs.items() if meaning is not None}
     read = settings_read(config) & {*settings_left_open(), *declared}
     assert read <= declared

@@ -1,17 +1,16 @@
 """`omninav variants`: what `variant=` can be, and what each takes."""
 
+import functools
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from hydra import compose
-from omegaconf import OmegaConf
-
-from omninav.pipeline.cli.composition import offer_plugins, read_words
-from omninav.pipeline.cli.config_groups import group_files, suggest_option
-from omninav.pipeline.cli.hydra_session import hydra_started
+from omninav.pipeline.cli.config_groups import config_file, group_files, option_content, suggest_option
+from omninav.pipeline.cli.variant_inputs import inputs_of
+from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.run.inputs import Input, read_inputs
+from omninav.pipeline.graph.small_files import read_yaml
 
 INDENT = 27
 """Columns before what a variant does."""
@@ -19,20 +18,19 @@ INDENT = 27
 
 def command(arguments: list[str]) -> int:
     """Print what all variants, or those that are named, do and take; what several share is explained once."""
-    arguments, folders = read_words(arguments)
-    offer_plugins()  # a variant of one's own may name a stage of one's own
-    own = [Path(folder) / "variant" for folder in folders]
-    found = [*group_files("variant"), *(file for folder in own for file in sorted(folder.glob("*.yaml")))]
+    flags = read_flags(arguments)
+    arguments, own = flags.overrides, Path(flags.config_dir) if flags.config_dir else None
+    found = [*group_files("variant"), *(sorted((own / "variant").glob("*.yaml")) if own else ())]
     summaries = {file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in found}
     for word in arguments:
         if word not in summaries:
             raise BadInput(
                 f"variants: there is no variant {word}; {suggest_option('variant', word, summaries, 'variants')}"
             )
-    with hydra_started(folders):
-        default = str(compose("config").variant)
-        names = arguments or sorted(summaries, key=lambda name: (name != default, name))
-        inputs = {name: _inputs(name) for name in names}
+    default = next(item["variant"] for item in config_file()["defaults"] if "variant" in item)
+    names = arguments or sorted(summaries, key=lambda name: (name != default, name))
+    read = functools.cache(functools.partial(_option, own))
+    inputs = {name: inputs_of(name, config_file()["defaults"], read) for name in names}
     uses = Counter((setting, given.meaning) for taken in inputs.values() for setting, given in taken.items())
     shared = {setting: meaning for (setting, meaning), number in reversed(uses.most_common()) if number > 1}
     for name, taken in inputs.items():
@@ -55,9 +53,17 @@ def _summary(text: str) -> str:
     return next(comments, "").lstrip("# ")
 
 
-def _inputs(variant: str) -> Mapping[str, Input]:
-    declared = compose("config", overrides=[f"variant={variant}"]).inputs
-    return read_inputs({"inputs": OmegaConf.to_container(declared)})
+def _option(own: Path | None, group: str, option: str) -> Mapping[str, Any]:
+    """The content of an option's file, of omninav's or in the folder of one's own. Raises `BadInput`."""
+    content = option_content(group, option)
+    file = None if content or own is None else own / group / f"{option}.yaml"
+    if file is None or not file.is_file():
+        return content
+    content = read_yaml(file) or {}
+    fits = isinstance(content, dict) and isinstance(content.get("inputs") or {}, dict)
+    if not fits or not isinstance(content.get("defaults", []), list):
+        raise BadInput(f"{file}: expected names and values, with a list as defaults: and names as inputs:")
+    return content
 
 
 def _explain(setting: str, meaning: str, required: bool, indent: int) -> None:

@@ -1,5 +1,6 @@
 """Cached results are stale when code they follow from has changed, and only then."""
 
+import ast
 import itertools
 import shutil
 import subprocess
@@ -69,6 +70,26 @@ def test_a_change_elsewhere_in_its_package_is_not(package: Path) -> None:
     before = version(package)
     (package / "pack/other.py").write_text("w = 2\n")
     assert version(package) == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "if a: import b\ntry: from .c import d; import e.f as g\nfinally: pass",
+        "from . import (h,  # (one of two)\n    i)",
+        "from .import j\nfrom .. k import l",
+        "from m import n, \\\n    o",
+        '"""Poses come\nfrom p import q without a word.\n"""\nimport r',
+    ],
+)
+def test_imports_are_found_however_they_are_written(text: str) -> None:
+    found = set(code_version._imported(text, "pack.deep"))
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            assert {alias.name for alias in node.names} <= found
+        elif isinstance(node, ast.ImportFrom):
+            inside = ["", "pack.deep.", "pack."][node.level] + (node.module or "")
+            assert {f"{inside.rstrip('.')}.{alias.name}" for alias in node.names} <= found
 
 
 DIGEST = """
