@@ -1,6 +1,7 @@
 """What several tests need: the command line, here or in its own process, and the built-in world's features once."""
 
 import fcntl
+import gc
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recor
 
 settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")
+gc.set_threshold(50_000)  # as in `omninav`: what pytest has imported is looked through less often
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
