@@ -25,6 +25,8 @@ from .terminal import show, shown
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
+NO_GRAPH = ("~variant", "~world", "~world_camera", "~source")
+"""Words that leave out what only the conditions of an experiment have: it is read in a third of the time."""
 OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
 
 
@@ -87,17 +89,17 @@ def _experiment_of(path: Path, result: ExperimentResult, config_dirs: Sequence[s
     typed, _ = read_words(shlex.split(result.command)[1:])
     keys = [word.lstrip("+~").partition("=")[0].partition(".")[0] for word in typed]
     words = [word for word, key in zip(typed, keys, strict=True) if key in ("experiment", "profile")]
-    plain = resolved_but_for_the_experiment(_without_variant(words, config_dirs)) if "experiment" in keys else {}
+    plain = resolved_but_for_the_experiment(without_graph(words, config_dirs)) if "experiment" in keys else {}
     if plain.get("experiment", {}).get("name") != result.name:
         raise BadInput(f"{path}: its command, `{result.command}`, is not of the experiment '{result.name}'")
     return read_experiment(plain["experiment"], str(plain.get("profile") or FULL))
 
 
-def _without_variant(words: Sequence[str], config_dirs: Sequence[str]) -> Any:
-    """The configuration of an experiment, without a variant's graph where it can be: that takes half of the time."""
+def without_graph(words: Sequence[str], config_dirs: Sequence[str] = ()) -> Any:
+    """The configuration of an experiment, without a variant's graph and world where it can be."""
     try:
         with suppress(HydraException):
-            return compose(["~variant", *words])
+            return compose([*NO_GRAPH, *words])
         return compose(words)
     except HydraException as error:
         raise ProblemsFound(invalid_overrides(words, list(config_dirs), str(error))) from None

@@ -317,14 +317,11 @@ def test_a_saved_map_gives_the_same_run_as_the_tour_it_was_made_from(
         assert (tmp_path / "runs/latest" / name).read_bytes() == (demo / name).read_bytes(), name
 
 
-def test_another_seed_gives_another_run_and_without_cache_the_same_seed_the_same(
-    omninav, demo: Path, shared_cache: Path, tmp_path: Path
-):
-    omninav("seed=1", f"cache={shared_cache}", check=True)
-    assert (tmp_path / "runs/latest/trajectory.tum").read_bytes() != (demo / "trajectory.tum").read_bytes()
-    omninav("cache=null", check=True)
-    for name in ("trajectory.tum", "metrics.json", "map.omap"):
-        assert (tmp_path / "runs/latest" / name).read_bytes() == (demo / name).read_bytes(), name
+def test_another_seed_gives_another_run(omninav, demo: Path, tmp_path: Path):
+    for seed, same in ((0, True), (1, False)):
+        omninav(f"seed={seed}", f"map={demo / 'map.omap'}", "nodes.source.stop=8", "cache=null", check=True)
+        rows = (tmp_path / "runs/latest/trajectory.tum").read_text().splitlines()
+        assert (rows == (demo / "trajectory.tum").read_text().splitlines()[:8]) is same
 
 
 def test_resume_of_what_is_no_run_or_has_ended_says_so(omninav, demo: Path):

@@ -44,7 +44,7 @@ def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_ca
 
 
 def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
-    omninav_process, shared_cache: Path, demo: Path, tmp_path: Path
+    omninav, omninav_process, shared_cache: Path, tmp_path: Path
 ):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     words = (
@@ -54,13 +54,12 @@ def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
         "hydra.launcher.n_jobs=2",
         f"cache={shared_cache}",
     )
-    ended = omninav_process("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=0,1", *SHORT)
+    ended = omninav_process("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=1", *SHORT)
     assert ended.returncode == 1, ended.stdout + ended.stderr
     (sweep,) = (tmp_path / "runs").glob("*_sweep")
-    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(4)]
-    assert statuses == ["complete", "complete", "complete", "failed"]
-    alone = omninav_process("features=hsv_histogram", "seed=0", *SHORT, f"cache={shared_cache}", check=True)
-    assert alone.returncode == 0
+    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(2)]
+    assert statuses == ["complete", "failed"]
+    omninav("features=hsv_histogram", "seed=1", *SHORT, f"cache={shared_cache}", check=True)
     same = tmp_path / "runs" / "latest" / "trajectory.tum"
     assert (sweep / "0" / "trajectory.tum").read_bytes() == same.read_bytes()
 

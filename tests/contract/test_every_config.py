@@ -17,7 +17,7 @@ from omninav.pipeline.cli.commands.simulate import LIVE
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import config_file, option_content, settings_left_open
-from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
+from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment, without_graph
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.cli.variant_inputs import inputs_of
@@ -97,7 +97,10 @@ def command_composes(path: Path) -> None:
         assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     words = [word for word in command if not word.startswith("-")]
     words = [*LIVE, *words[1:]] if words[:1] == ["simulate"] else words
-    compose(with_unlisted_parameters(words, []))
+    if group(path) == "experiment":  # its conditions are composed with their graphs, in test_every_experiment.py
+        without_graph(words)
+    else:
+        compose(with_unlisted_parameters(words, []))
 
 
 def graphs_of(path: Path) -> set[str]:
@@ -204,7 +207,7 @@ def test_every_experiment_can_be_read():
 
 def can_be_read(path: Path) -> None:
     option = path.relative_to(CONF / "experiment").with_suffix("")
-    config = resolved_but_for_the_experiment(compose(["~variant", f"+experiment={option}"]))
+    config = resolved_but_for_the_experiment(without_graph([f"+experiment={option}"]))
     for profile in ("full", "quick"):
         experiment = read_experiment(config["experiment"], profile)
         measures_alone = path.parent.name == "recordings" or path.stem in ("home_store", "office")  # to start from

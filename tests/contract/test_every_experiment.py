@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
+from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment, without_graph
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.specification import read_experiment
@@ -31,13 +31,8 @@ def hydra():
         yield
 
 
-def experiment_alone(name: str):
-    """The configuration of an experiment without a variant's graph, in half of the time."""
-    return compose(["~variant", f"+experiment={name}"])
-
-
 def experiment(name: str, profile: str):
-    return read_experiment(OmegaConf.to_container(experiment_alone(name).experiment), profile)
+    return read_experiment(OmegaConf.to_container(without_graph([f"+experiment={name}"]).experiment), profile)
 
 
 def typed(found, condition):
@@ -65,9 +60,12 @@ def test_it_is_a_claim_that_odometry_alone_ends_two_metres_off(name):
 
 
 def with_each_level(conditions):
-    """Conditions among which each level of each factor occurs."""
-    chosen = {level: condition for condition in reversed(conditions) for level in condition.labels.items()}
-    return {condition.name: condition for condition in chosen.values()}.values()
+    """Few conditions among which each level of each factor occurs; the only one where there are no factors."""
+    left = {level for condition in conditions for level in condition.labels.items()}
+    chosen = conditions[:1]
+    while left := left - {level for condition in chosen for level in condition.labels.items()}:
+        chosen = [*chosen, max(conditions, key=lambda condition: len(left & condition.labels.items()))]
+    return chosen
 
 
 @pytest.mark.parametrize("folder", sorted({name.partition("/")[0] for name in ALL}))
@@ -97,6 +95,6 @@ def test_at_a_small_scale_no_test_world_is_looked_at():
 
 
 def looks_at_no_test_world(name):
-    config = resolved_but_for_the_experiment(experiment_alone(name))
+    config = resolved_but_for_the_experiment(without_graph([f"+experiment={name}"]))
     for profile in {"quick", "development"} & set(config["experiment"].get("profiles", {})):
         assert "draw" not in " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())

@@ -91,8 +91,8 @@ def test_the_sdist_builds_the_same_wheel(wheel: Path, sdist: Path, tmp_path: Pat
     assert content(build("wheel", source, tmp_path / "wheel")) == content(wheel)
 
 
-def test_an_installed_wheel_runs_the_main_job_in_an_empty_folder(wheel: Path, tmp_path: Path):
-    """In an environment of its own, into which only the dependencies of this one are linked."""
+def test_an_installed_wheel_makes_a_map_and_localises_in_it_in_an_empty_folder(wheel: Path, tmp_path: Path):
+    """In an environment of its own, into which only the dependencies of this one are linked: it compiles anew."""
     venv.create(tmp_path / "environment", with_pip=False)
     (tmp_path / "empty").mkdir()
     (installed,) = (tmp_path / "environment").glob("lib/python*/site-packages")
@@ -114,6 +114,6 @@ def test_an_installed_wheel_runs_the_main_job_in_an_empty_folder(wheel: Path, tm
     python, empty = tmp_path / "environment" / "bin" / "python", tmp_path / "empty"
     where = call(python, "-c", "import omninav; print(omninav.__file__)", cwd=empty, PYTHONPATH="").strip()
     assert Path(where).is_relative_to(installed)
-    call(python, "-m", "omninav", cwd=empty, PYTHONPATH="")
+    call(python, "-m", "omninav", "landmarks=none", "rate=1", cwd=empty, PYTHONPATH="")
     assert (empty / "runs" / "latest" / "report.html").exists()
     assert [path.name for path in empty.iterdir()] == ["runs"]
