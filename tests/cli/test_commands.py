@@ -160,10 +160,11 @@ def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_parameter_that_the_configuration_does_not_list_is_set_like_any_other(omninav_process):
+def test_a_parameter_that_the_configuration_does_not_list_is_set_like_any_other(omninav, monkeypatch):
     plugin = f"features.edges={ROOT / 'examples' / 'edges' / 'omninav_edges.py'}:EdgeHistogram"
-    omninav_process("check", "features=edges", "nodes.features.segments=18", OMNINAV_STAGES=plugin, check=True)
-    ended = omninav_process("check", "features=edges", "nodes.features.segmnts=18", OMNINAV_STAGES=plugin)
+    monkeypatch.setenv("OMNINAV_STAGES", plugin)
+    omninav("check", "features=edges", "nodes.features.segments=18", check=True)
+    ended = omninav("check", "features=edges", "nodes.features.segmnts=18")
     assert "did you mean 'nodes.features.segments=18'?" in ended.stderr
 
 

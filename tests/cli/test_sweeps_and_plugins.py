@@ -114,15 +114,15 @@ def test_a_stage_of_an_installed_package_by_name(omninav_process, tmp_path: Path
     assert "nothing wrong" in omninav_process("check", "features=edges", check=True, PYTHONPATH=str(place)).stdout
 
 
-def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav_process, tmp_path: Path):
+def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "broken.py").write_text("import not_there\n")
-    settings = {"OMNINAV_STAGES": "features.broken=broken.py:Thing"}
-    ended = omninav_process("stages", "features", check=True, **settings)
+    monkeypatch.setenv("OMNINAV_STAGES", "features.broken=broken.py:Thing")
+    ended = omninav("stages", "features", check=True)
     row = next(line for line in ended.stdout.split("\n") if line.startswith("features.broken"))
     assert "[environment] cannot be used: module 'broken.py'" in row
     assert "features.hsv_histogram" in ended.stdout
-    assert omninav_process("check", check=True, **settings).returncode == 0
-    used = omninav_process("check", "features=broken", **settings)
+    assert omninav("check", check=True).returncode == 0
+    used = omninav("check", "features=broken")
     assert used.returncode == 2
     assert "No module named 'not_there'" in used.stderr
 

@@ -25,13 +25,16 @@ def test_the_templates_own_tests_pass():
     assert ended.stdout.startswith(".. ")
 
 
-def test_its_stage_fits_into_a_variant_and_a_variant_with_it_is_listed(omninav_process, tmp_path: Path):
+def test_its_stage_fits_into_a_variant_and_a_variant_with_it_is_listed(
+    omninav, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     named = f"features.brightness={PACKAGE / 'omninav_brightness.py'}:BrightnessHistogram"
-    assert "nothing wrong" in omninav_process("check", "features=brightness", check=True, OMNINAV_STAGES=named).stdout
+    monkeypatch.setenv("OMNINAV_STAGES", named)
+    assert "nothing wrong" in omninav("check", "features=brightness", check=True).stdout
     (tmp_path / "variant").mkdir()
     own = "# @package _global_\n# by brightness\ndefaults: [omniview_mcl, override /features: brightness, _self_]\n"
     (tmp_path / "variant" / "bright.yaml").write_text(own)
-    listed = omninav_process("variants", f"--config-dir={tmp_path}", check=True, OMNINAV_STAGES=named).stdout
+    listed = omninav("variants", f"--config-dir={tmp_path}", check=True).stdout
     assert any(line.startswith("bright ") and "by brightness" in line for line in listed.split("\n"))
 
 
