@@ -21,21 +21,13 @@ from .composition_cache import compose
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .terminal import show, shown
+from .words import condition_words
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
 NO_GRAPH = ("~variant", "~world", "~world_camera", "~source")
 """Words that leave out what only the conditions of an experiment have: it is read in a third of the time."""
-OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
-
-
-def condition_words(words: Sequence[str]) -> list[str]:
-    """Where an experiment is asked for, the words that are for each of its conditions and not for the experiment."""
-    keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
-    if "experiment" not in keys:
-        return []
-    return [word for word, key in zip(words, keys, strict=True) if key not in OF_THE_EXPERIMENT]
 
 
 def run_experiment(config: Any, arguments: Sequence[str]) -> int:

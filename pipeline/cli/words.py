@@ -21,6 +21,8 @@ _LONG_NUMBER = re.compile(rf"(?<![\w.])[-+]?\d{{{MAX_DIGITS},}}")
 INFO = ("all", "config", "defaults", "defaults-tree", "plugins", "searchpath")
 NOT_TAKEN = {"experimental_rerun": (), "config_path": ("-cp",), "config_name": ("-cn",), "shell_completion": ("-sc",)}
 """Flags of Hydra that would read pickles, replace omninav's own configuration or write to a shell's start files."""
+OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
+"""Settings of a whole experiment; all others are for its conditions."""
 
 
 def read_flags(arguments: Sequence[str]) -> Namespace:
@@ -83,6 +85,14 @@ def _refuse(known: Sequence[str], message: str) -> NoReturn:
     if "ignored explicit argument" in message:  # -help is -h with something behind it
         raise BadInput("a short flag stands alone; did you mean --help? `omninav --help` shows what to type")
     raise BadInput(f"{message}; `omninav --help` shows what to type")
+
+
+def condition_words(words: Sequence[str]) -> list[str]:
+    """Where an experiment is asked for, the words that are for each of its conditions and not for the experiment."""
+    keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
+    if "experiment" not in keys:
+        return []
+    return [word for word, key in zip(words, keys, strict=True) if key not in OF_THE_EXPERIMENT]
 
 
 def refuse_unreadable(arguments: Sequence[str]) -> None:

@@ -10,8 +10,13 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
-SHORTER = {"nodes.source.seconds=25": "nodes.source.seconds=8", "range(3)": "range(2)", "n_trials=5": "n_trials=2"}
-"""Seconds of real time and numbers of runs that a reader is shown, and the smaller ones of a test."""
+SHORTER = {
+    "nodes.source.seconds=25": "nodes.source.seconds=8",
+    "range(3)": "range(2)",
+    "n_trials=5": "n_trials=2",
+    r"match=\"l2\", ": r"match=\"l2\", rate=1, ",
+}
+"""Seconds, numbers of runs, and drives at full rate that a reader is shown, and the smaller ones of a test."""
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)

@@ -9,15 +9,12 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete, composed, read_words
-from omninav.pipeline.cli.experiments import condition_words, planned_experiment
 from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.cli.objective import check_objective
+from omninav.pipeline.cli.words import condition_words
 from omninav.pipeline.engine.artifact import check_artifact, read_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import prefix_nodes
-from omninav.pipeline.experiment.conditions import open_inputs
-from omninav.pipeline.experiment.runner import ExperimentRun
-from omninav.pipeline.experiment.specification import DEVELOPMENT
 from omninav.pipeline.graph.graph import LIFETIMES, Graph
 from omninav.pipeline.graph.ground_truth import truth_readers
 from omninav.pipeline.graph.problems import BadInput, counted
@@ -40,7 +37,7 @@ def command(arguments: list[str]) -> int:
     of_conditions = condition_words(words)
     with composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:
-            return _check_experiment(planned_experiment(config, arguments))
+            return _check_experiment(config, arguments)
         read_engine(OmegaConf.to_container(config.engine, resolve=True))
         planned = plan(complete(config))
     check_objective(planned.config.get("objective"), planned.graph)
@@ -115,8 +112,13 @@ def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> 
             raise BadInput(f"{setting}={folder}: {what}; type {setting}=FOLDER") from None
 
 
-def _check_experiment(run: ExperimentRun) -> int:
-    """What an experiment would run. Its conditions are composed and checked by now."""
+def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
+    """What an experiment would run, each of its conditions composed and checked."""
+    from omninav.pipeline.cli.experiments import planned_experiment
+    from omninav.pipeline.experiment.conditions import open_inputs
+    from omninav.pipeline.experiment.specification import DEVELOPMENT
+
+    run = planned_experiment(config, arguments)
     experiment = run.experiment
     open_inputs(run.all_runs)
     _refuse_unwritable(run.all_runs[0].config)

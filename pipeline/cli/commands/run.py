@@ -13,13 +13,12 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import composed, offer_plugins
-from omninav.pipeline.cli.experiments import condition_words, run_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_engine
 from omninav.pipeline.cli.terminal import shown
-from omninav.pipeline.cli.words import flags_parser, read_flags
+from omninav.pipeline.cli.words import condition_words, flags_parser, read_flags
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.plan import Plan, plan
@@ -43,7 +42,7 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
-            return run_job(config, arguments, run_experiment, check)
+            return run_job(config, arguments, _run_experiment, check)
 
         of_conditions = condition_words(listed)
         typed = [word for word in listed if word not in of_conditions]
@@ -52,6 +51,12 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
             return _handed_over(hydra, flags, typed, job)
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
+
+
+def _run_experiment(config: Any, arguments: Sequence[str]) -> int:
+    from omninav.pipeline.cli.experiments import run_experiment  # with pages and plots, which no other job needs
+
+    return run_experiment(config, arguments)
 
 
 def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
