@@ -6,9 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from hydra import version
-from hydra._internal.hydra import Hydra
-from hydra._internal.utils import create_config_search_path  # `hydra.initialize` reads the source of its callers first
+from hydra import initialize, version
 from hydra.core.config_loader import ConfigLoader
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
@@ -73,9 +71,10 @@ def _finding_in(folders: Sequence[str]) -> Any:
         Plugins.instance().register(plugin)
     _SearchPath.folders = [str(Path(folder).absolute()) for folder in folders]
     try:
-        started: Any = Hydra.create_main_hydra2("omninav", create_config_search_path(None))
+        initialize(config_path=None, job_name="omninav", version_base=VERSION_BASE)
     finally:
         _SearchPath.folders = None
+    started: Any = GlobalHydra.instance().hydra
     started.config_loader = CheckedLoader(started.config_loader)
     return started
 
