@@ -2,8 +2,6 @@
 
 import itertools
 import math
-import re
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import cv2
@@ -11,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.files import digest_file, digest_text
 from omninav.pipeline.graph.problems import BadInput, cut
-from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.values.encoded_image import MAX_PIXELS
 from omninav.stages.values.features import SegmentDescriptors
 from omninav.stages.values.image import Panorama, Pixels
 
+from .onnx_network import error_line, loaded, network_digest
 from .segments import segment_edges
 
 Floats = npt.NDArray[np.float32]
@@ -25,27 +22,10 @@ PerChannel = tuple[float, float, float]
 MAX_SIDE = 4096
 Side = Annotated[int, Bounds(ge=1, le=MAX_SIDE)]
 
-MAX_MODEL_BYTES = 1 << 30
-"""Largest accepted model file, bytes."""
-WEIGHTS_ELSEWHERE = b"\x0a\x08location\x12"
-"""Bytes by which an ONNX file (as protobuf writes it) names a file of weights. No hash would cover that one."""
 MAX_MAGNITUDE = 1e15
 """Largest accepted number of a vector."""
 MAX_NUMBERS = 1 << 20
 """Largest accepted vector of an image, numbers."""
-LOOPS, RANDOM = (
-    ("Loop",),
-    (
-        "Bernoulli",
-        "Multinomial",
-        "RandomNormal",
-        "RandomNormalLike",
-        "RandomUniform",
-        "RandomUniformLike",
-    ),
-)
-REFUSED = re.compile(b"|".join(b"\x22%c%s" % (len(name), name.encode()) for name in (*LOOPS, *RANDOM)))
-"""Operators, as protobuf writes their names: with a loop a network may never end, and not even Ctrl-C stops it."""
 IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Red, green, blue, of pixels in [0, 1]: what most networks for images were trained with."""
 
@@ -105,7 +85,7 @@ class OnnxEncoder(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Load the network."""
-        self._session = session = _session(self._file())
+        self._session = session = loaded(self.model)
         self._input, self._size, self._batch = self._read_input(session)
         names = [output.name for output in session.get_outputs()]
         if self.output is not None and self.output not in names:
@@ -115,7 +95,7 @@ class OnnxEncoder(Stage):
 
     def inputs_digest(self) -> str | None:
         """Of the network, and of the version that runs it."""
-        return digest_text(digest_file(self._file()), str(_runtime().__version__))
+        return network_digest(self.model)
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
@@ -126,18 +106,12 @@ class OnnxEncoder(Stage):
         vectors = np.concatenate([self._encoded(images[n : n + step]) for n in range(0, len(images), step)])
         return self.Out(features=SegmentDescriptors.of(vectors))
 
-    def _file(self) -> Path:
-        if self.model is None or not Path(self.model).is_file():
-            raise BadInput(f"model: there is no file {self.model or ''}; type model=ENCODER.onnx")
-        return Path(self.model)
-
     def _encoded(self, images: Floats) -> Floats:
         try:
             given = np.asarray(self._session.run([self._output], {self._input: images})[0])
         except Exception as error:  # onnxruntime's errors are of no common class of its own
-            raise BadInput(
-                f"{self.model}: the network cannot run on images {list(images.shape)} ({self.layout}): {_line(error)}"
-            ) from None
+            shape = f"{list(images.shape)} ({self.layout})"
+            raise BadInput(f"{self.model}: the network cannot run on images {shape}: {error_line(error)}") from None
         if given.ndim < 2 or len(given) != len(images) or given.dtype.kind != "f" or not given.size:
             raise BadInput(
                 f"{self.model}: its output {cut(self._output)} is {list(given.shape)} of {given.dtype} for "
@@ -181,36 +155,3 @@ class OnnxEncoder(Stage):
                 f"{self.model}: it takes {batch} images at once; write nodes.features.segments={batch} or a multiple"
             )
         return first.name, size, batch
-
-
-def _runtime() -> Any:
-    try:
-        import onnxruntime
-    except ImportError:
-        raise BadInput("features=onnx needs onnxruntime, which is not installed; pip install 'omninav[onnx]'") from None
-    return onnxruntime
-
-
-def _session(path: Path) -> Any:
-    """The network of a file, to be run in one thread."""
-    runtime, content = _runtime(), read_small(path, MAX_MODEL_BYTES)
-    if WEIGHTS_ELSEWHERE in content:
-        raise BadInput(f"{path}: its weights lie in another file; save them in this one: onnx.save(onnx.load(…), …)")
-    found = REFUSED.search(content)
-    if found is not None:
-        name = found[0][2:].decode()
-        why = "may run for ever" if name in LOOPS else "gives other vectors each time"
-        raise BadInput(f"{path}: it has the operator {name}, and so {why}; expected a network without it")
-    options = runtime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.use_deterministic_compute = True
-    options.log_severity_level = 4
-    try:
-        return runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's errors are of no common class of its own
-        raise BadInput(f"{path}: this is no network that onnxruntime can run: {_line(error)}") from None
-
-
-def _line(error: Exception) -> str:
-    """Message of onnxruntime, which may name what is in the file."""
-    return " ".join("".join(c if c.isprintable() else " " for c in str(error)[:200]).split())
