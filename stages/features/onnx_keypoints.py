@@ -79,7 +79,7 @@ class OnnxKeypoints(Stage):
         self._camera: Camera | None = None
 
     def inputs_digest(self) -> str | None:
-        """Of the network, and of the version that runs it."""
+        """The digest of the network, and of the version that runs it."""
         return network_digest(self.model)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
@@ -88,7 +88,7 @@ class OnnxKeypoints(Stage):
         read, seam = self._prepared(image if mirror is None else self._unwrapped(image.pixels, mirror), camera)
         points, scores, descriptors = self._found(read.pixels, seam)
         inside = ((points >= 0) & (points <= np.array(read.seen.shape[::-1]) - 1)).all(axis=1)
-        kept = np.flatnonzero(inside & (scores > 0) & descriptors.any(axis=1))
+        kept = np.flatnonzero(inside & (scores > 0) & (np.linalg.norm(descriptors, axis=1) > 0))
         kept = kept[np.lexsort((points[kept, 1], points[kept, 0], -scores[kept]))[: self.max_features]]
         if not len(kept):
             return self.Out(features=none_found(2 * descriptors.shape[1]))
@@ -148,11 +148,12 @@ class OnnxKeypoints(Stage):
     def _checked(self, points: Any, scores: Any, descriptors: Any) -> tuple[Array, Floats, Floats]:
         shapes = ", ".join(str(list(each.shape)) for each in (points, scores, descriptors))
         points, descriptors = (each[0] if each.ndim == 3 and len(each) == 1 else each for each in (points, descriptors))
-        number = len(points)
+        number = scores.size
         if descriptors.ndim == 2 and len(descriptors) != number:
             descriptors = descriptors.T
-        fits = points.shape == (number, 2) and scores.size == number and descriptors.shape[:1] == (number,)
-        if not fits or descriptors.ndim != 2 or not 1 <= descriptors.shape[1] <= MAX_LENGTH:
+        fits = points.shape == (number, 2) and descriptors.ndim == 2 and len(descriptors) == number
+        numbers_alone = all(each.dtype.kind in "fiu" for each in (points, scores, descriptors))
+        if not fits or not numbers_alone or not 1 <= descriptors.shape[1] <= MAX_LENGTH:
             raise BadInput(
                 f"{self.model}: its outputs {cut(', '.join(self._outputs))} are {shapes}, expected keypoints [N, 2], "
                 f"scores [N] and descriptors [N, D] of at most {MAX_LENGTH} numbers"
@@ -164,21 +165,22 @@ class OnnxKeypoints(Stage):
 
     def _read_input(self, session: Any) -> tuple[str, bool, tuple[int, int] | None]:
         """Name of the input, whether it is grey, and rows and columns of an image (None: any)."""
-        first, *more = session.get_inputs()
-        batch, channels, *sides = [size if isinstance(size, int) and size > 0 else None for size in first.shape]
-        if more or first.type != "tensor(float)" or len(sides) != 2 or batch not in (1, None) or channels not in (1, 3):
+        inputs = session.get_inputs()
+        sizes = [size if isinstance(size, int) and size > 0 else None for each in inputs for size in each.shape]
+        batch, channels, rows, columns = sizes if len(sizes) == 4 else [0] * 4
+        if batch not in (1, None) or channels not in (1, 3) or [each.type for each in inputs] != ["tensor(float)"]:
+            shown = ", ".join(f"{list(each.shape)} of {each.type}" for each in inputs)
             raise BadInput(
-                f"{self.model}: its input is {cut(first.shape)} of {first.type}, expected one image of float32: "
-                "[1, 1 or 3, rows, columns]"
+                f"{self.model}: its input is {cut(shown)}, expected one image of float32: [1, 1 or 3, rows, columns]"
             )
-        rows, columns = sides
+        name = str(inputs[0].name)
         if rows is None or columns is None:
-            return first.name, channels == 1, None
+            return name, channels == 1, None
         if not MIN_SIDE <= min(rows, columns) <= max(rows, columns) <= MAX_SIDE:
             raise BadInput(
                 f"{self.model}: its images are {rows} x {columns}, expected {MIN_SIDE} to {MAX_SIDE} pixels a side"
             )
-        return first.name, channels == 1, (rows, columns)
+        return name, channels == 1, (rows, columns)
 
     def _read_outputs(self, session: Any) -> list[str]:
         """Names of the keypoints, the scores and the descriptors."""
