@@ -8,7 +8,7 @@ from omninav.stages.values.stretches import Stretches
 
 from .causes import stretches
 from .frames_table import columns_of
-from .stretches import Log, in_short, row_of
+from .stretches import Log, row_of, summaries
 
 COLUMNS = ("images", "time (s)", "driven (m)", "state", "what happened", "what says so", "what to do")
 
@@ -35,7 +35,7 @@ class ExplainDrive(Stage):
         columns = [columns_of(log) for log in drive.by_log]
         found = [stretch for log in columns for stretch in stretches(log, self.lost_m)]
         rows = tuple(row_of(stretch, len(columns) > 1) for stretch in found)
-        caption = " ".join(in_short(Log(log)) for log in columns)
+        caption = " ".join(summaries([Log(log) for log in columns]))
         return self.Out(
             stretches=Stretches(tuple(found)),
             table=Table("explanation", "What happened, stretch by stretch", caption, COLUMNS, rows, order=5),

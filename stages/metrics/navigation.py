@@ -38,12 +38,14 @@ HEADLINES = tuple(
     f"navigation.{name}"
     for name in ("reached_rate", "end_error_m", "collisions", "time_s", "path_length_ratio", "routes", "reason")
 )
+ENDS = ("arrived", "gave up")
+"""States of a route after which the robot does not drive on."""
 WITHIN_M = 0.5
 """Largest distance from the goal at which it is reached, metres."""
 
 
 class Navigation(MetricStage):
-    """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
+    """Measures how a drive to a goal ended: the entry `navigation` of metrics.json. Of several goals it is the last.
 
     `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken, or to
     the point that is its goal; `end_error_m`: how far from there it ended. `collisions`, in a simulated world;
@@ -64,17 +66,20 @@ class Navigation(MetricStage):
         map: TopologicalMap | ReferenceGraph,
     ) -> MetricStage.Out:
         """The whole drive at once."""
-        planned = [route for route in routes if route is not None]
-        spots = drive.truth[known(drive.truth)][:, :2]
+        begun = first_of_last_goal(routes)
+        planned = [route for route in routes[begun:] if route is not None]
+        spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]
         if not planned or not len(spots):
             return self.Out()
-        last = planned[-1]
-        ends = (k for k, route in enumerate(routes) if route is not None and route.state in ("arrived", "gave up"))
+        last, former = planned[-1], routes[begun - 1] if begun else None
+        ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
         ended = next(ends, len(drive) - 1)
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         collisions = int(drive.collisions[tallied[-1]]) if len(tallied) else None
-        by_odometry = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
-        driven = float(drive.distance[tallied[-1]]) if len(tallied) else by_odometry
+        driven = float(np.nansum(np.hypot(drive.motion[begun:, 0], drive.motion[begun:, 1])))
+        if len(tallied):
+            before = tallied[tallied < begun][-1:]
+            driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
         goal = int(last.places[-1]) if len(last.places) else None
         apart = shortest = None
         if map.pose_source == "truth" and isinstance(map, ReferenceGraph) and last.goal is not None:
@@ -88,8 +93,8 @@ class Navigation(MetricStage):
             "end_error_m": apart,
             "path_length_m": driven,
             "shortest_m": shortest,
-            "time_s": float(drive.seconds[ended]),
-            "routes": last.number + 1,
+            "time_s": float(drive.seconds[ended] - (drive.seconds[begun] if begun else 0.0)),
+            "routes": last.number - (former.number if former else -1),
             "goal": goal,
             "state": last.state,
             "reason": last.why,
@@ -105,6 +110,20 @@ class Navigation(MetricStage):
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
+
+
+def first_of_last_goal(routes: Sequence[PlannedRoute | None]) -> int:
+    """The tick from which on all routes lead to the goal of the last one: 0, where there was no other."""
+    last: Any = None
+    for k in range(len(routes) - 1, -1, -1):
+        route = routes[k]
+        if route is None or (route.goal is None and not len(route.places)):
+            continue
+        goal = int(route.places[-1]) if route.goal is None else route.goal
+        if last is not None and goal != last:
+            return k + 1
+        last = goal
+    return 0
 
 
 def metres_of_first(map: ReferenceGraph, start: Array, routes: Sequence[PlannedRoute]) -> float | None:

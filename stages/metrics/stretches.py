@@ -1,7 +1,7 @@
 """Stretches of a drive in which the estimate was not to be trusted, by its columns of `frames.csv`."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -209,6 +209,12 @@ def in_short(log: Log) -> str:
     if not all_on:
         words = f"Sure of the estimate in {100 * len(sure) / len(log):.0f} % of {images}, from image {start} on."
     return words if log.known("nearest_m") else f"{words} {NOT_RECORDED}"
+
+
+def summaries(logs: Sequence[Log]) -> list[str]:
+    """A summary of each log; of several, each with its number."""
+    texts = [in_short(log) for log in logs]
+    return [f"Log {number}: {text}" for number, text in enumerate(texts)] if len(texts) > 1 else texts
 
 
 def row_of(stretch: Stretch, several: bool) -> tuple[str, str, str, str, str, str, str]:

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import field
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
@@ -37,6 +38,9 @@ class MeasureEvidence(Stage):
     Best matches and leads are those of `ConfidenceMonitor`, landmarks those of `LandmarkPose`.
     """
 
+    within_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Distance (m) by which an estimate may be off: `ConfidenceMonitor`'s."""
+
     class Out(Outputs):
         """The evidence of one image."""
 
@@ -62,7 +66,7 @@ class MeasureEvidence(Stage):
             found["nearest_m"] = float(np.hypot(*(map.poses[:, :2] - pose[:2]).T).min())
             found["nearest_scales"] = found["nearest_m"] / length_scale.metres
         if similarities is not None and similarities.values.size:
-            gate = ELSEWHERE * length_scale.metres
+            gate = ELSEWHERE * max(self.within_m, length_scale.metres)
             found["match_away_m"] = math.dist(best_place(similarities, map)[:2], pose[:2])
             found["match_lead"] = lead_of_best(similarities, map, gate)
             found["lead_against"] = max(0.0, lead_over_pose(similarities, map, pose, gate))

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -76,11 +77,16 @@ class ChangedLight(Stage):
         if image is not None:
             if camera is None:
                 raise BadInput("changed_light: an image needs its camera: wire camera: source.camera beside it")
-            rays, _ = camera.unproject(camera.grid())
-            azimuths = np.nan_to_num(np.arctan2(rays[..., 1], rays[..., 0]))
-            out = replace(out, image=Image(self._changed(image.pixels, azimuths)))
+            out = replace(out, image=Image(self._changed(image.pixels, _azimuths(camera))))
         return out
 
     def _changed(self, pixels: Pixels, azimuths: Array) -> Pixels:
         gains = (self.gain * self.blue, self.gain, self.gain * self.red)
         return changed_light(pixels, self.gamma, gains, self.side, math.radians(self.direction_deg), azimuths)
+
+
+@lru_cache(1)  # of a drive's one camera
+def _azimuths(camera: Camera) -> Array:
+    rays, _ = camera.unproject(camera.grid())
+    azimuths: Array = np.nan_to_num(np.arctan2(rays[..., 1], rays[..., 0]))
+    return azimuths

@@ -126,7 +126,8 @@ class RoadmapPlanner(Stage):
             self._plan(state, map)
             places, new = self._path(state, map, here), True
         if places is None or state.blocked > MAX_BLOCKED:
-            state.ended, state.why = "gave up", state.why or "no path leads to the goal"
+            state.ended = "gave up"
+            state.why = "no path leads to the goal" if places is None else state.why
             return _stopped(state)
         if new:
             state.number, state.places = state.number + 1, places
@@ -156,7 +157,7 @@ class RoadmapPlanner(Stage):
         return self.Out(vector=vector, progress=progress, route=_route(state, "under way" if sure else "locating"))
 
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
-        state.goal, state.extra = goal, np.zeros(len(map))
+        state.goal, state.extra, state.places = goal, np.zeros(len(map)), np.zeros(0, np.int64)
         state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
         state.lost_since = None
         self._plan(state, map)

@@ -178,6 +178,8 @@ class ShowTick(Stage):
         if route is not None and map is not None and route.number != before.route:
             before.route = route.number
             places = map_poses(map)[map.places[route.places] if isinstance(map, TopologicalMap) else route.places]
+            if route.goal is not None:  # a point beside the references
+                places = np.vstack([places, (route.goal.x, route.goal.y, 0.0)])
             path = path_bytes(np.full(len(places), tick.stamp), places, tick.stamp)
             made.append(("/plan", "nav_msgs/msg/Path", path))
         return RosMessages.of(tick.stamp, made) if made else None

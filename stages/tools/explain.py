@@ -8,7 +8,7 @@ from omninav.pipeline import BadInput, Context, Tool
 from omninav.pipeline.api.run import Run
 from omninav.pipeline.files import user_path
 from omninav.stages.metrics.causes import stretches
-from omninav.stages.metrics.stretches import in_short, logs_of, row_of
+from omninav.stages.metrics.stretches import logs_of, row_of, summaries
 
 
 class ExplainRun(Tool):
@@ -32,8 +32,7 @@ class ExplainRun(Tool):
                 " `omninav variants` shows what localises"
             )
         found, logs = stretches(columns, lost_m), logs_of(columns)
-        for number, log in enumerate(logs):
-            print((f"log {number}: " if len(logs) > 1 else "") + in_short(log))
+        print("\n".join(summaries(logs)))
         for stretch in found:
             images, seconds, metres, state, cause, evidence, advice = row_of(stretch, len(logs) > 1)
             print(f"\nimages {images:<9} {seconds:>12} s {metres:>6} m   {state:<10} {cause}\n  {evidence}")

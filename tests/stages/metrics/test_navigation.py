@@ -27,7 +27,7 @@ def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
     ]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
-    tallies = [DriveTally(collisions, driven)] * len(spots)
+    tallies = [DriveTally(collisions, metres) for metres in np.broadcast_to(driven, len(spots))]
     drive = collected(ticks, truth, tallies=tallies if tallied else None)
     metrics = Navigation().step(Context("navigation"), drive, ways, map).metrics
     return metrics.values["navigation"]
@@ -103,7 +103,7 @@ def test_the_time_of_a_drive_that_has_not_ended_is_all_of_it():
 
 def test_the_last_route_that_was_planned_counts_and_it_is_the_third():
     spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 0.0)]
-    ways = [PlannedRoute(PLACES, "under way", 0), PlannedRoute(np.array([0, 1]), "arrived", 2), None]
+    ways = [PlannedRoute(np.array([2, 1]), "under way", 0), PlannedRoute(np.array([0, 1]), "arrived", 2), None]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(3)]
     drive = collected(ticks, [Pose(x, y, 0.0) for x, y in spots], [None, Motion(3.0, 4.0, 0.1), Motion(0.5, 0.0, 0.0)])
     found = Navigation().step(Context("navigation"), drive, ways, CORNER).metrics.values["navigation"]
@@ -155,3 +155,13 @@ def test_on_a_map_of_references_the_goal_is_a_point_beside_them():
     assert found["end_error_m"] == pytest.approx(0.1)
     assert found["shortest_m"] == pytest.approx(1.0 + 4.0 + 1.0)
     assert found["path_length_ratio"] == pytest.approx(1.1)
+
+
+def test_after_a_new_goal_on_the_way_all_figures_are_of_that_one():
+    spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 0.0), (3.0, 4.0)]
+    first, other = np.array([0, 1]), np.array([1, 2])
+    ways = [PlannedRoute(first, "under way", 0), PlannedRoute(first, "arrived", 0)]
+    ways += [PlannedRoute(other, "under way", 1), PlannedRoute(other, "arrived", 1)]
+    found = ended(spots, ways, driven=[0.0, 3.0, 3.0, 7.5])
+    assert (found["goal"], found["routes"], found["time_s"]) == (2, 1, 1.0)
+    assert (found["shortest_m"], found["path_length_m"]) == pytest.approx((4.0, 4.5))

@@ -120,6 +120,8 @@ def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
     out = drive.step(point=GoalPoint(2.0, 2.5))
     assert out.route.state == "under way"
     assert (out.route.goal.x, out.route.number, out.vector.turn) == (2.0, 1, 0.0)
+    lost = drive.step(point=GoalPoint(3.0, 2.5), confidence=0.1)
+    assert (lost.route.state, lost.route.places.tolist()) == ("locating", [])
 
 
 def test_an_image_of_elsewhere_is_refused_with_what_was_seen() -> None:

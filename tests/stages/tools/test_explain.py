@@ -11,7 +11,7 @@ def test_a_run_is_explained_log_by_log_from_its_frames(tmp_path, capsys):
     run_folder(tmp_path, small_run(frames=60, logs=2).drive)
     ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
     said = capsys.readouterr().out
-    assert "log 0: Sure of the estimate" in said
+    assert "Log 0: Sure of the estimate" in said
     assert "nodes.evidence" in said
     assert "images 1:0-" in said
     assert "searching" in said
