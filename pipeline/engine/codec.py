@@ -6,8 +6,10 @@ import json
 import struct
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import MISSING
 from enum import Enum
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -196,13 +198,19 @@ def _value_class(name: str, fields: int) -> tuple[type[Value], tuple[str, ...]]:
     if cls is None:
         raise BadEncoding(f"unknown value type '{name}': is the module that defines it loaded?")
     names = field_names(cls)
-    if len(names) != fields:
+    if not len(names) - _defaults(cls) <= fields <= len(names):
         raise BadEncoding(f"'{name}' has {len(names)} fields now, {fields} in the file")
-    return cls, names
+    return cls, names[:fields]  # a field that an older file does not have takes its default
 
 
 def _field_names(cls: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls))
+
+
+def _defaults(cls: Any) -> int:
+    """How many of its last fields have a default."""
+    known = [field.default is not MISSING or field.default_factory is not MISSING for field in dataclasses.fields(cls)]
+    return len(list(takewhile(bool, reversed(known))))
 
 
 field_names: Callable[[Any], tuple[str, ...]] = cache(_field_names)

@@ -51,6 +51,7 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         math.sqrt(float(np.average(variances, weights=[len(each) + 1 for each in given]))),
         _joined_words([each.words for each in parts]) or _words_of_landmarks(given, descriptors, ends, seen),
         min(each.found_rate for each in given),
+        variance_factor=max(each.variance_factor for each in given),
     )
 
 

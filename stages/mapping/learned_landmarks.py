@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.landmarks.left_out import found_rate, other_references, samples_of
+from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import AdjustedMap, adjusted_drive, adjusted_to_given
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
@@ -38,6 +38,7 @@ QUANTITIES = {
     "landmarks.sightings": Quantity(title="References that see a landmark, mean", context=True),
     "landmarks.sigma_deg": Quantity(title="Standard deviation of a bearing", unit="deg", context=True),
     "landmarks.found_rate": Quantity(title="Map's own images found by landmarks", unit="%", context=True),
+    "landmarks.variance_factor": Quantity(title="Errors of poses squared, over what bearings say", context=True),
     "landmarks.moved_median_m": Quantity(title="References moved by, median", context=True),
     "landmarks.moved_max_m": Quantity(title="References moved by, largest", context=True),
     **CAMERA_QUANTITIES,
@@ -96,7 +97,7 @@ class LearnLandmarks(Stage):
         starts, seen = sightings_by_reference(views, sightings)
         sigma = bearing_sigma(views, sightings, poses)
         looks = mean_descriptors(views, sightings)
-        rate = found_rate(views, sightings, looks, poses, sigma, _candidates(words))
+        left_out = left_out_poses(views, sightings, looks, poses, sigma, _candidates(words))
         landmarks = Landmarks(
             sightings.points.astype(np.float32),
             stored_descriptors(looks),
@@ -104,9 +105,10 @@ class LearnLandmarks(Stage):
             seen,
             sigma,
             words,
-            rate,
+            left_out.found_rate,
             # Poses as they came: those adjusted to a wrong horizon were bent by it.
             check.told(ctx, adjusted.camera) or check.elevations_told(ctx, camera, views, matches, map.poses),
+            left_out.variance_factor,
         )
         ctx.fact("landmarks", len(landmarks))
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
@@ -115,7 +117,8 @@ class LearnLandmarks(Stage):
             "number": len(landmarks),
             "sightings": len(seen) / max(1, len(landmarks)),
             "sigma_deg": float(np.degrees(sigma)),
-            "found_rate": rate,
+            "found_rate": left_out.found_rate,
+            "variance_factor": left_out.variance_factor,
         }
         if not adjusted.problem:
             values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}

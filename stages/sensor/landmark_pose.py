@@ -27,15 +27,13 @@ BELIEF_SAMPLES = 5
 """Particles, drawn evenly by weight, around which references are candidates too."""
 NEAR_EACH = 2
 """References that are candidates around each of them."""
-COVARIANCE_FACTOR = 2.5
-"""Factor of the variance of a bearing: errors of landmarks are shared by images that see the same ones."""
 SECTOR = math.radians(15.0)
 """Width of a sector of the view (rad)."""
 ODDS_PER_SECTOR, EVEN_SECTORS, MAX_LOG_ODDS = 0.75, 7.5, 8.0
 """Log odds (nats) that a pose is right, by the sectors in which landmarks agree: what misleads is one wall or one shelf
 that repeats itself, so that of 40 landmarks that agree on a wrong pose all lie in three to seven sectors of 24, and 16
 that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
-SIGMA_FLOOR = (0.001, 0.001, math.radians(0.01))
+SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 WITHOUT_LANDMARKS = (
     "the map was saved without landmarks, so that images are compared as a whole, to decimetres: "
@@ -98,7 +96,7 @@ class LandmarkPose(Stage):
         return self.Out(
             fix=LandmarkFix(
                 np.array([each.pose for each in found]),
-                np.array([covariance_of(each, landmarks.sigma_rad) for each in found]),
+                np.array([covariance_of(each, landmarks.sigma_rad, landmarks.variance_factor) for each in found]),
                 inliers,
                 probabilities_of(sectors),
                 len(points),
@@ -128,9 +126,9 @@ def agreeing(poses: list[BearingPose]) -> npt.NDArray[np.int8]:
     return agree
 
 
-def covariance_of(pose: BearingPose, sigma: float) -> Array:
-    """Covariance (3, 3) of a pose from bearings of this standard deviation (rad)."""
-    variance = COVARIANCE_FACTOR * max(sigma, pose.sigma) ** 2
+def covariance_of(pose: BearingPose, sigma: float, factor: float) -> Array:
+    """Covariance (3, 3) of a pose from bearings of this standard deviation (rad), times the map's variance factor."""
+    variance = factor * max(sigma, pose.sigma) ** 2
     covariance: Array = variance * pose.covariance + np.diag(np.square(SIGMA_FLOOR))
     return covariance
 

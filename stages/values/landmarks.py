@@ -29,6 +29,7 @@ class Landmarks(Value):
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
     `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
     `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
+    `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings say.
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -39,6 +40,7 @@ class Landmarks(Value):
     words: Annotated[VisualWords, Shape("R")]
     found_rate: Annotated[float, Bounds(ge=0, le=1)]
     camera: str = ""
+    variance_factor: Annotated[float, Bounds(ge=1, le=1e9)] = 2.5
 
     def __len__(self) -> int:
         return len(self.points)

@@ -1,5 +1,6 @@
 """Values as bytes and back, and files that notice damage."""
 
+import json
 from collections import Counter
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from omninav.pipeline.engine.artifact import read_artifact, read_header, write_a
 from omninav.pipeline.engine.codec import BadEncoding, decode, decode_all, encode, encode_all, seal, unseal
 from omninav.pipeline.engine.disk_sequence import DiskSequence, Present
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.value import Value, value_name
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),
@@ -70,6 +72,24 @@ def test_arrays_of_one_form_are_written_together_and_come_back_apart():
     assert content.count(b"toys.Number") == 1
     with pytest.raises(BadEncoding):
         decode_all(content, 49)
+
+
+class Marked(Value):
+    name: str
+    number: int = 7
+
+
+def test_a_value_of_an_older_file_takes_the_defaults_of_fields_that_are_new():
+    def of_fields(*fields):
+        header = json.dumps(["value", value_name(Marked), *fields]).encode()
+        return len(header).to_bytes(8, "little") + header
+
+    for fields, number in ((["a", 3], 3), (["a"], 7)):
+        found = decode(of_fields(*fields))
+        assert (found.name, found.number) == ("a", number)
+    for wrong in ([], ["a", 3, 4]):
+        with pytest.raises(BadEncoding, match=f"has 2 fields now, {len(wrong)} in the file"):
+            decode(of_fields(*wrong))
 
 
 def test_values_counters_paths_and_scalars_come_back():
