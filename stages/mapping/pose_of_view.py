@@ -22,7 +22,7 @@ def pose_of_view(
     if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source in ("odometry", "guess"):
         raise BadInput(
             "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
-            "one map; give one tour, or tours with ground truth"
+            "one map; learn a map of each tour, and type: omninav map join one.omap other.omap out=both.omap"
         )
     if not len(map):
         known = truth is not None and supervised != "odometry"

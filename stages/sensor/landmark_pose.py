@@ -83,9 +83,10 @@ class LandmarkPose(Stage):
             )
         rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
         theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
-        pairs = matched(root_descriptors(features.descriptors), theirs)
+        points = landmarks.points[rows].astype(np.float64)
+        pairs = matched(root_descriptors(features.descriptors), theirs, points)
         bearings = np.ascontiguousarray(features.bearings[pairs.first])
-        points = landmarks.points[rows[pairs.second]].astype(np.float64)
+        points = points[pairs.second]
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
         if not found:
             return self.Out()

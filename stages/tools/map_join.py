@@ -6,6 +6,7 @@ import numpy as np
 
 from omninav.pipeline import BadInput, Context, Tool
 from omninav.stages.map_files.aligned import aligned
+from omninav.stages.map_files.aligned_by_landmarks import aligned_by_landmarks
 from omninav.stages.map_files.places import joined_places
 from omninav.stages.map_files.references import joined_references
 from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target, write_saved
@@ -19,7 +20,8 @@ class JoinMaps(Tool):
     """Writes one map of the references, or places, of several.
 
     All must be of one kind, with views made in the same way. Maps of references whose poses are in frames of their own
-    are aligned by references that look alike, and straightened together (`aligned`). No edge or link is added between
+    are aligned by the landmarks that they share, or else by references that look alike, and then straightened together
+    (`aligned`). No edge or link is added between
     maps. Raises BadInput where a map does not fit the first, and where too little that looks alike joins it to the
     others.
     """
@@ -43,7 +45,7 @@ class JoinMaps(Tool):
         frame: PoseSource = next((source for source in given if source != "truth"), "truth")
         map = joined([source.map for source in sources], frame)
         if frame != "truth" and not self.same_frame:
-            map = _in_one_frame(sources, map)
+            map = _in_one_frame(sources, map, ctx.rng)
         write_saved(path, map, sources, "join")
         what = "references" if isinstance(map, ReferenceGraph) else "places"
         print(f"{path}: {len(map)} {what} of {len(sources)} maps ({' + '.join(str(len(one.map)) for one in sources)})")
@@ -62,11 +64,14 @@ def _of_landmarks(sources: Sequence[SavedMap], landmarks: Landmarks) -> Iterator
         yield f"none from {' and '.join(without)}, where images are compared as a whole"
 
 
-def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:
+def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces, rng: np.random.Generator) -> MapOfPlaces:
     """The joined map with the poses of all in the frame of the first. Raises BadInput where nothing tells them."""
-    found = None
+    found, by = None, "landmarks that are in several maps"
     if isinstance(map, ReferenceGraph):
-        found = aligned([source.map for source in sources if isinstance(source.map, ReferenceGraph)])
+        graphs = [source.map for source in sources if isinstance(source.map, ReferenceGraph)]
+        found = aligned_by_landmarks(graphs, rng)
+        if found is None:
+            found, by = aligned(graphs), "pairs of references that look alike"
     left = [source for source, fits in zip(sources, found.joined, strict=True) if not fits] if found else sources[1:]
     if found is None or left:
         raise BadInput(
@@ -75,7 +80,7 @@ def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:
         )
     assert isinstance(map, ReferenceGraph)
     moved = np.hypot(*(found.poses - map.poses)[:, :2].T)
-    print(f"aligned by {found.closures} pairs of references that look alike; moved by {moved.max():.2f} m at most")
+    print(f"aligned by {found.closures} {by}; moved by {moved.max():.2f} m at most")
     return map.moved(found.poses)
 
 

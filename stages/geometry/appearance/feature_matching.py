@@ -29,11 +29,17 @@ class Pairs(NamedTuple):
         return Pairs(self.first[kept], self.second[kept], self.distance[kept], self.ratio[kept])
 
 
+SAME_M = 0.1
+"""Distance within which two points are taken for one that was mapped twice (m)."""
+NOWHERE = np.empty((0, 3))
+"""Points of views whose features are each their own."""
 NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
 @compiled(nogil=True)
-def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: Array, unclear: Array) -> int:
+def _mutual(
+    squares: Floats, ratio: float, points: Array, first: Ints, second: Ints, distance: Array, unclear: Array
+) -> int:
     rows, columns = squares.shape
     nearest_row = np.zeros(columns, np.int64)
     least = np.full(columns, np.inf, np.float32)
@@ -56,6 +62,13 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
     for i in range(rows):
         j = nearest[i]
         d = max(one[i], np.float32(0.0))
+        if len(points) and nearest_row[j] == i:  # the second nearest of those elsewhere
+            two[i] = np.inf
+            for k in range(columns):
+                if squares[i, k] < two[i]:
+                    x, y, z = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1], points[k, 2] - points[j, 2]
+                    if x * x + y * y + z * z > SAME_M * SAME_M:
+                        two[i] = squares[i, k]
         if nearest_row[j] == i and d < ratio * ratio * two[i] and d < ratio * ratio * next_least[j]:
             first[found], second[found], distance[found] = i, j, np.sqrt(d)
             rival = min(two[i], next_least[j])
@@ -64,28 +77,29 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
     return found
 
 
-def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
+def mutual_nearest(squares: Floats, ratio: float, points: Array = NOWHERE) -> Pairs:
     """Pairs of which each is the other's nearest, and by `ratio` nearer than the second nearest of either.
 
-    `squares` (N, M) float32: squared distances. A row or column without a second nearest passes the ratio. (Goedemé et
-    al. 2007, section 3.4.)
+    `squares` (N, M) float32: squared distances. `points` (M, 3): where the second view's features lie (m), where it is
+    known; then the second nearest is one that lies elsewhere. A row or column without a second nearest passes the
+    ratio. (Goedemé et al. 2007, section 3.4.)
     """
     rows, columns = squares.shape
     if not rows or not columns:
         return NO_PAIRS
     first, second = np.empty((2, rows), np.int64)
     distance, unclear = np.empty((2, rows))
-    found = _mutual(squares, ratio, first, second, distance, unclear)
+    found = _mutual(squares, ratio, points, first, second, distance, unclear)
     order = np.argsort(unclear[:found], kind="stable")
     return Pairs(first[order], second[order], distance[order], unclear[order])
 
 
-def mutual_nearest_units(one: Floats, other: Floats, ratio: float) -> Pairs:
+def mutual_nearest_units(one: Floats, other: Floats, ratio: float, points: Array = NOWHERE) -> Pairs:
     """`mutual_nearest` of descriptors (N, D) and (M, D) of length 1."""
     squares: Floats = one @ other.T
     squares *= -2.0
     squares += 2.0
-    return mutual_nearest(squares, ratio)
+    return mutual_nearest(squares, ratio, points)
 
 
 @compiled(nogil=True)
@@ -95,7 +109,7 @@ def _mutual_of_each(
     distance = np.empty(len(squares))
     for n in range(len(starts) - 1):
         a, b = starts[n], starts[n + 1]
-        found[n] = _mutual(squares[a:b], ratio, first[a:b], second[a:b], distance[a:b], unclear[a:b])
+        found[n] = _mutual(squares[a:b], ratio, NOWHERE, first[a:b], second[a:b], distance[a:b], unclear[a:b])
 
 
 def mutual_nearest_of_each(squares: Floats, starts: Ints, ratio: float) -> tuple[Ints, Ints, Ints]:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.appearance.feature_matching import Pairs, mutual_nearest_units
+from omninav.stages.geometry.appearance.feature_matching import NOWHERE, Pairs, mutual_nearest_units
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.small_systems import rotated_by, solve
 
@@ -84,9 +84,9 @@ def pose_of_bearings(
     return BearingPose(pose, covariance, spread, inliers, tilt)
 
 
-def matched(descriptors: Floats, landmarks: Floats) -> Pairs:
-    """Pairs of features and landmarks, by their descriptors (N, D) and (L, D) of length 1."""
-    return mutual_nearest_units(descriptors, landmarks, RATIO)
+def matched(descriptors: Floats, landmarks: Floats, points: Array = NOWHERE) -> Pairs:
+    """Pairs of features and landmarks, by their descriptors (N, D) and (L, D) of length 1; `points` (L, 3)."""
+    return mutual_nearest_units(descriptors, landmarks, RATIO, points)
 
 
 def poses_of(bearings: Array, points: Array, sigma: float, min_inliers: int) -> list[BearingPose]:

@@ -66,7 +66,7 @@ def left_out_poses(
             tracks, centres[sighted], bearings[sighted], MISS, MIN_PARALLAX, MAX_DISTANCE_M
         ).points
         known = np.isfinite(points[:, 0])
-        pairs = matched(views.compared(views.rows(reference)), descriptors[shown[known]])
+        pairs = matched(views.compared(views.rows(reference)), descriptors[shown[known]], points[known])
         own = np.ascontiguousarray(views.bearings[views.rows(reference)][pairs.first])
         made = poses_of(own, points[known][pairs.second], sigma, MIN_INLIERS)
         away = made[0].pose - poses[reference] if made else np.full(3, np.inf)

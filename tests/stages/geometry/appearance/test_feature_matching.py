@@ -73,6 +73,13 @@ def test_who_has_two_partners_that_look_the_same_has_none() -> None:
         assert list(zip(found.first.tolist(), found.second.tolist(), strict=True)) == [(1, 2)]
 
 
+def test_a_partner_that_was_mapped_twice_is_one_and_a_second_one_elsewhere_is_a_rival() -> None:
+    squares = np.array([[0.1, 0.1, 0.9], [0.8, 0.7, 0.1]], np.float32)
+    for rival, found in (((0.05, 0.0, 0.0), [(0, 0), (1, 2)]), ((0.2, 0.0, 0.0), [(1, 2)])):
+        pairs = mutual_nearest(squares, 0.8, np.array([(0.0, 0.0, 0.0), rival, (3.0, 0.0, 0.0)]))
+        assert sorted(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)) == found
+
+
 def test_elements_count_by_their_spread_and_one_that_never_varies_not_at_all() -> None:
     rng = np.random.default_rng(2)
     one = rng.normal(size=(30, 4)).astype(np.float32)
