@@ -21,6 +21,7 @@ from omninav.stages.plots.pose_messages import (
 )
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.command import Command
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
@@ -46,7 +47,8 @@ class Publish(Stage):
     The command is published as it was computed in this tick, zero where there was none, once more zero when the run
     ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
     published; one whose type the transport does not have is left out and said in diagnostics, as are inputs that do not
-    fit each other, for as long as they do not.
+    fit each other, for as long as they do not. A robot that searches or is lost has no pose: none is published, and
+    with the old transform a navigation stack stops.
     """
 
     transport: TransportName = "dds"
@@ -55,6 +57,8 @@ class Publish(Stage):
     """As the source's."""
     pose: str | None = "/estimate/pose"
     """The estimate (PoseWithCovarianceStamped, latched); `/amcl_pose` takes AMCL's place."""
+    unsure: bool = False
+    """Publishes the pose and the transform of a robot that searches or is lost too: the best guess."""
     tf: str | None = "/tf"
     """Topic of the transform `map_frame -> odom_frame`: the estimate over the odometry as the robot reports it, which
     starts over where it is reset."""
@@ -85,13 +89,16 @@ class Publish(Stage):
         odometry: Pose | None = None,
         command: Command | None = None,
         conflicts: Conflicts | None = None,
+        confidence: PoseConfidence | None = None,
     ) -> None:
         """Publish what there is. Nothing while a record is made again."""
         if not self._transport.status.live:
             return
         if self.command is not None and (command is not None or self._watchdog is not None):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
-        if estimate is not None:
+        if confidence is not None:
+            self._transport.status.note("state", "" if confidence.state == "tracking" else confidence.state)
+        if estimate is not None and (self.unsure or confidence is None or confidence.is_sure):
             self._publish_estimate(tick.stamp, estimate, odometry)
         if conflicts is not None:
             self._transport.status.note("conflicts", "; ".join(conflicts.standing))

@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
 from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.evidence import ImageEvidence
@@ -66,12 +66,13 @@ class CollectDrive(Stage):
             looked = (None,) * 3 if match is None else (match.similarity, match.distance, match.turn)
             parts.extend(math.nan if value is None else value for value in looked)
             parts.append(math.nan if confidence is None else confidence.probability)
+            whole.append(-1 if confidence is None else TRACKING_STATES.index(confidence.state))
             numbers = (None if measured is None else getattr(measured, name) for name in EVIDENCE)
             parts.extend(math.nan if value is None else value for value in numbers)
             said = "" if measured is None else measured.conflict
             whole.append(conflicts.setdefault(said, len(conflicts)) if said else -1)
-        counts = np.array(whole, np.int64).reshape(-1, 8).T.copy()
-        row_of, log, frames, stamps, collisions, place, reference, conflict_of = counts
+        counts = np.array(whole, np.int64).reshape(-1, 9).T.copy()
+        row_of, log, frames, stamps, collisions, place, reference, state, conflict_of = counts
         columns = np.array(parts, np.float64).reshape(-1, 27 + len(EVIDENCE))
         estimated, covariance, weight, mean, true_pose, motions, distance, looks, trusted, numbers_of = (
             np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23, 26, 27), axis=1)
@@ -98,6 +99,7 @@ class CollectDrive(Stage):
                 reference_turn=turn,
                 confidence=trusted.ravel(),
                 evidence=numbers_of,
+                state=state,
                 conflict=conflict_of,
                 conflicts=tuple(conflicts),
             )

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.tables import write_table
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.values.confidence import TRACKING_STATES
 from omninav.stages.values.drive import EVIDENCE, Array, Drive, known
 
 from .confidence import confident
@@ -31,6 +32,7 @@ class FramesTable(Stage):
     | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
     | `confident` | 1 where the estimate is confident (see `Confidence`), else 0 |
     | `confidence` | probability that the estimate is right (see `ConfidenceMonitor`), where a monitor tells it |
+    | `state` | `searching`, `tracking`, `lost` or `blind`, by that confidence (see `TrackingState`) |
     | `mean_x`, `_y`, `_heading` | the mean of the whole belief |
     | `truth_x`, `_y`, `_heading` | the ground truth |
     | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
@@ -63,6 +65,7 @@ def columns_of(drive: Drive) -> Columns:
     columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
     columns["confident"] = np.where(known(drive.estimate), confident(drive), -1)
     columns["confidence"] = drive.confidence
+    columns["state"] = np.ma.masked_array(np.array((*TRACKING_STATES, ""), object)[drive.state], drive.state < 0)
     columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)
     columns["position_error_m"] = np.where(both, position_errors(drive.estimate, drive.truth), np.nan)
     columns["heading_error_deg"] = np.where(both, heading_errors_deg(drive.estimate, drive.truth), np.nan)

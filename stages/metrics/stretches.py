@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.values.confidence import MIN_SURE
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch, StretchState
 
@@ -19,9 +20,6 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Columns = Mapping[str, npt.NDArray[Any]]
 
-MIN_CONFIDENCE = 0.5
-"""Confidence below which the estimate is more probably wrong than right: the dotted line of the report, and from where
-on `WidenCovariance` spreads the covariance over the map."""
 MIN_BLIND, BLIND_CORRELATION, MIN_CONTRAST, MIN_FEATURES = 3, 0.15, 1.0 / 255.0, 8
 """So many images in a row say nothing whose correlation with the ones before is below `InputConflicts`'s limit, whose
 parts differ by less than a grey level, or that have fewer features than `LandmarkPose` needs for a pose."""
@@ -81,7 +79,7 @@ class Log:
     @cached_property
     def sure(self) -> Flags:
         """Which estimates are sure: by the confidence, or without a monitor by the belief's concentration."""
-        stated = self["confidence"] >= MIN_CONFIDENCE if self.known("confidence") else self["confident"] == 1.0
+        stated = self["confidence"] >= MIN_SURE if self.known("confidence") else self["confident"] == 1.0
         return np.asarray(np.isfinite(self["estimate_x"]) & stated)
 
     @cached_property

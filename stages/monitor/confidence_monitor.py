@@ -13,7 +13,7 @@ from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
-from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
+from omninav.stages.values.confidence import MIN_SURE, PoseConfidence, TrackingState, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.landmarks import LandmarkFix
@@ -63,6 +63,8 @@ SURE_TOGETHER = 4.6
 """Log odds of an estimate on which poses of fewer landmarks agree, from which on the same is known: 99 %."""
 MIN_FEATURES = 100
 """Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
+MIN_SEEN, MIN_EMPTY = 8, 3
+"""Features below which an image shows no landmarks at all, and such images in a row of a robot that is blind."""
 MAX_AGAINST = (1.0, 6.0)
 """Log odds that images without landmarks speak against an estimate, at most: on the map, where some of it has changed;
 and before any was found, in what may be another building."""
@@ -75,6 +77,7 @@ class ConfidenceMonitorState(State):
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
+    `sure`: the estimate was since the robot began; `empty`: images in a row that say nothing.
     `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
     then, how surely the images so far would have shown some there, 0 to 1."""
 
@@ -87,12 +90,22 @@ class ConfidenceMonitorState(State):
     geometry: float = 0.0
     found: bool = False
     missed: float = 0.0
+    sure: bool = False
+    empty: int = 0
 
     def forget(self) -> None:
         """Begin anew: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
         self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
+        self.sure, self.empty = False, 0
+
+    def state(self, probability: float) -> TrackingState:
+        """The state that follows from the confidence."""
+        if probability < MIN_SURE:
+            return "lost" if self.sure else "searching"
+        self.sure = True
+        return "blind" if self.empty >= MIN_EMPTY else "tracking"
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
@@ -204,7 +217,9 @@ class ConfidenceMonitor(Stage):
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
             probability *= self.right_in_conflict
-        return self.Out(confidence=PoseConfidence(probability))
+        seen = similarities is not None and (features is None or len(features) >= MIN_SEEN)
+        recent.empty = 0 if seen else recent.empty + 1
+        return self.Out(confidence=PoseConfidence(probability, recent.state(probability)))
 
 
 def by_landmarks(

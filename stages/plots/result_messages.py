@@ -20,6 +20,7 @@ class ResultMessages(Stage):
     | `/estimate/pose` | PoseWithCovarianceStamped | the estimate; 6 x 6 covariance, plane entries only |
     | `/estimate/path` | Path | the estimates so far, every 16 ticks; all of a log's at its end |
     | `/estimate/confidence` | Float64 | probability that the estimate is right, in [0, 1] |
+    | `/estimate/state` | String | `searching`, `tracking`, `lost` or `blind` (see `TrackingState`), when it changes |
     | `/belief/markers` | MarkerArray | a mixture's ellipses by their axes (one sigma), or the likely places |
     | `/belief` | PoseArray | few particles, a mixture's means, or the likely places |
     | `/similarity/best` | Float64 | the largest similarity, in [0, 1] |
@@ -33,7 +34,9 @@ class ResultMessages(Stage):
     images' header stamps.
     """
 
-    topics: tuple[str, ...] = ("/estimate/path", "/estimate/confidence", "/map", "/grid", "/plan", "/homing")
+    topics: tuple[str, ...] = (
+        "/estimate/path", "/estimate/confidence", "/estimate/state", "/map", "/grid", "/plan", "/homing",
+    )  # fmt: skip
     """Topics of `result.mcap` of which messages are made."""
 
     class Out(Outputs):

@@ -81,10 +81,11 @@ class ShownTick(Value):
 
 
 class ShowTickState(State):
-    """Size of the map and number of the route that were shown last; the `ticks` so far."""
+    """Size of the map, number of the route and tracking state that were shown last; the `ticks` so far."""
 
     map_size: int = 0
     route: int = -1
+    state: str = ""
     ticks: int = 0
 
 
@@ -92,7 +93,8 @@ class ShowTick(Stage):
     """Keeps what `result.mcap` and whoever watches show of each tick, from the inputs that are wired.
 
     No message is made here but the few that come seldom: `/grid` at a log's first frame, `/map` there and whenever the
-    map has grown by a tenth, `/plan` with each new route. `ResultMessages` lists them all.
+    map has grown by a tenth, `/plan` with each new route, `/estimate/state` with each new one. `ResultMessages` lists
+    them all.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 100
@@ -148,7 +150,7 @@ class ShowTick(Stage):
             *self._belief(belief, estimate),
             similar,
             None if panorama is None else panorama.jpeg,
-            self._seldom(before, tick, map, plan if grid is None else grid, route),
+            self._seldom(before, tick, map, plan if grid is None else grid, route, confidence),
             1 << (before.ticks // self.max_views).bit_length(),
         )
         kept = shown.without_views() if before.ticks % shown.views_every else shown
@@ -162,6 +164,7 @@ class ShowTick(Stage):
         map: AnyMap | None,
         floor: FloorPlan | OccupancyGrid | None,
         route: PlannedRoute | None,
+        confidence: PoseConfidence | None,
     ) -> RosMessages | None:
         made: list[tuple[str, str, bytes]] = []
 
@@ -169,12 +172,15 @@ class ShowTick(Stage):
             made.append((topic, msgtype, encode_message(msgtype, fields)))
 
         if tick.first_of_log:
-            before.map_size = 0
+            before.map_size, before.state = 0, ""
             if floor is not None:
                 add("/grid", "nav_msgs/msg/OccupancyGrid", grid_message(floor, tick.stamp))
         if map is not None and len(map) > 1.1 * before.map_size:
             before.map_size = len(map)
             add("/map", "visualization_msgs/msg/MarkerArray", map_markers(map, tick.stamp))
+        if confidence is not None and confidence.state != before.state:
+            before.state = confidence.state
+            add("/estimate/state", "std_msgs/msg/String", {"data": confidence.state})
         if route is not None and map is not None and route.number != before.route:
             before.route = route.number
             places = map_poses(map)[map.places[route.places] if isinstance(map, TopologicalMap) else route.places]

@@ -37,8 +37,8 @@ SHAPES = 256
 MARKERS = "visualization_msgs/msg/MarkerArray"
 ORDER = (
     "/grid", "/map", "/tf", "/odom", "/ground_truth/pose", "/estimate/pose", "/estimate/path", "/estimate/confidence",
-    "/belief/markers", "/belief", "/similarity/best", "/similarity", "/panorama/compressed", "/plan", "/homing",
-    "/command",
+    "/estimate/state", "/belief/markers", "/belief", "/similarity/best", "/similarity", "/panorama/compressed",
+    "/plan", "/homing", "/command",
 )  # fmt: skip
 """Topics in the order in which a tick's messages are written."""
 

@@ -1,6 +1,6 @@
 """Confidence in an estimate."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,25 @@ from omninav.pipeline.graph.contents import Shape
 Probability = Annotated[float, Bounds(ge=0, le=1)]
 
 
+TrackingState = Literal["searching", "tracking", "lost", "blind"]
+"""Whether a robot knows where it is: `searching`, not since it began; `tracking`; `lost`, it did; `blind`, it does by
+odometry alone, as images say nothing."""
+TRACKING_STATES: tuple[TrackingState, ...] = get_args(TrackingState)
+"""All of them."""
+MIN_SURE = 0.5
+"""Probability from which on an estimate is rather right than wrong."""
+
+
 class PoseConfidence(Value):
-    """The probability that the estimate is right, within a tolerance in position and heading."""
+    """The probability that the estimate is right, within a tolerance in position and heading, and what follows."""
 
     probability: Probability
+    state: TrackingState = "tracking"
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the robot knows where it is."""
+        return self.state in ("tracking", "blind")
 
 
 class WrongPoseAgreement(Value):

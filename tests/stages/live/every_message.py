@@ -37,6 +37,7 @@ GRID = OccupancyGrid(np.array([[0, 1, 2]], np.uint8), 0.5, (1.0, -2.0))
 SHOWN = {
     "/estimate/path": ("nav_msgs/msg/Path", path_bytes([STAMP], np.array([[3.0, 1.0, np.pi / 2]]), STAMP)),
     "/estimate/confidence": ("std_msgs/msg/Float64", {"data": 0.875}),
+    "/estimate/state": ("std_msgs/msg/String", {"data": "lost"}),
     "/map": ("visualization_msgs/msg/MarkerArray", map_markers(MAP, STAMP)),
     "/grid": ("nav_msgs/msg/OccupancyGrid", grid_message(GRID, STAMP)),
     "/plan": ("nav_msgs/msg/Path", path_bytes([STAMP] * 2, MAP.poses, STAMP)),

@@ -117,6 +117,11 @@ class Float64(IdlStruct):
 
 
 @dataclass
+class String(IdlStruct):
+    data: str
+
+
+@dataclass
 class MapMetaData(IdlStruct):
     map_load_time: Time
     resolution: float32

@@ -130,6 +130,7 @@ POSES = {
     "/cmd_vel_bare": TWIST,
     "/estimate/path": {"header": HEADER, "poses": [{"header": HEADER, "pose": AT}]},
     "/estimate/confidence": {"data": 0.875},
+    "/estimate/state": {"data": "lost"},
     "/plan": {"header": HEADER, "poses": [{"pose": pose(0.5, 1.5, 0.0)}, {"pose": pose(2.5, 3.5, 0.0)}]},
     "/grid": GRID,
     "/homing": {"markers": [{"ns": "homing", "scale": {"x": 1.5}, "pose": {"orientation": {"z": math.sin(0.25)}}}]},

@@ -18,6 +18,7 @@ from omninav.stages.live import publish
 from omninav.stages.live.publish import Publish
 from omninav.stages.live.transport import Arrival
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
 from omninav.stages.values.pose import Pose
 
 from .conftest import ROOT, Wire, decode
@@ -55,6 +56,25 @@ def test_map_to_odom_is_the_estimate_over_the_odometry_dated_ahead(monkeypatch: 
     assert (pose.position.x, pose.position.y) == (3.0, 1.0)
 
 
+def test_a_robot_that_searches_or_is_lost_publishes_no_pose_unless_it_is_asked_to(monkeypatch: pytest.MonkeyPatch):
+    estimate = PoseEstimate(Pose(3.0, 1.0, 0.0), np.eye(3), 0.8, Pose(3.0, 1.0, 0.0))
+    for unsure, published in ((False, ["tracking", "blind"]), (True, list(TRACKING_STATES))):
+        wire = Wire()
+        wire.status.live = True
+        monkeypatch.setattr(publish, "connect", lambda name, domain, wire=wire: wire)
+        stage, ctx, told = Publish(unsure=unsure), Context("publish"), []
+        stage.setup(ctx)
+        for n, state in enumerate(TRACKING_STATES):
+            confidence = PoseConfidence(0.7 if state in ("tracking", "blind") else 0.2, state)
+            before = len(wire.on("/estimate/pose")), len(wire.on("/tf"))
+            stage.step(ctx, Tick(n, n * 10**9), estimate, Pose(1.0, 2.0, 0.0), confidence=confidence)
+            after = len(wire.on("/estimate/pose")), len(wire.on("/tf"))
+            assert after in (before, (before[0] + 1, before[1] + 1))
+            told += [state] if after != before else []
+            assert wire.status.troubles.get("state", "tracking") == state
+        assert sorted(told) == sorted(published)
+
+
 @pytest.mark.parametrize("taken", ["mode", "mean"])
 def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Path, taken: str
@@ -64,7 +84,12 @@ def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
         monkeypatch.setattr(module, "connect", lambda name, domain: robot)
     monkeypatch.setattr(live, "disconnect", lambda: None)
     settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=8"]
-    settings += [f"nodes.belief_estimate.taken={taken}", "nodes.publish.tf_tolerance_s=0.3", "nodes.prior.number=300"]
+    settings += [
+        f"nodes.belief_estimate.taken={taken}",
+        "nodes.publish.unsure=true",
+        "nodes.publish.tf_tolerance_s=0.3",
+        "nodes.prior.number=300",
+    ]
     words = {"camera": CAMERA, "cache": shared_cache, "progress": False, "plots": "none", "tour": TOUR}
     run = omninav.run("omniview_mcl", *settings, folder=tmp_path / "run", **words)
     with (run.folder / "frames.csv").open() as file:
@@ -122,6 +147,7 @@ def test_after_odometry_began_anew_map_to_odom_is_over_what_the_robot_reports_no
         monkeypatch.setattr(module, "connect", lambda name, domain: robot)
     monkeypatch.setattr(live, "disconnect", lambda: None)
     settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=9", "nodes.prior.number=300"]
+    settings += ["nodes.publish.unsure=true"]
     words = {"camera": CAMERA, "cache": shared_cache, "progress": False, "plots": "none", "tour": TOUR}
     omninav.run("omniview_mcl", *settings, folder=tmp_path / "run", **words)
     stamps = np.array(list(robot.reported))

@@ -49,7 +49,7 @@ def test_every_column_holds_what_the_tick_brought():
         [estimate],
         [DriveTally(6, 8.5)],
         [match],
-        [PoseConfidence(0.25)],
+        [PoseConfidence(0.25, "lost")],
     )
     ints = (drive.row, drive.log, drive.frames, drive.stamps, drive.collisions, drive.place, drive.reference)
     assert [each.tolist() for each in ints] == [[0], [2], [4], [10], [6], [3], [7]]
@@ -61,11 +61,13 @@ def test_every_column_holds_what_the_tick_brought():
     floats = (drive.mode_weight, drive.distance, drive.similarity, drive.visual_distance, drive.reference_turn)
     assert [each.tolist() for each in floats] == [[0.75], [8.5], [0.9], [1.25], [0.5]]
     assert drive.confidence.tolist() == [0.25]
+    assert drive.state.tolist() == [2]
 
 
 def test_what_a_tick_did_not_bring_is_not_a_number_or_less_than_none():
     drive = collected([Tick(0, 0)], [None])
     assert (drive.collisions[0], drive.place[0], drive.reference[0], drive.mode_weight[0]) == (0, -1, -1, 0.0)
+    assert drive.state.tolist() == [-1]
     for each in (drive.estimate, drive.covariance, drive.mean, drive.truth, drive.motion, drive.distance):
         assert np.isnan(each).all()
     for each in (drive.similarity, drive.visual_distance, drive.reference_turn, drive.confidence):

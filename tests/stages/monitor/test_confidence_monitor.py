@@ -18,7 +18,7 @@ from omninav.stages.monitor.confidence_monitor import (
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
-from omninav.stages.values.confidence import WrongPoseAgreement
+from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks
 from omninav.stages.values.length_scale import LengthScale
@@ -52,6 +52,23 @@ def drive(
 ) -> list[float]:
     """Confidences along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
     all references or of every so-many-th, and the estimate follows odometry."""
+    return [
+        each.probability for each in stated(matches, at, step, spread, novelty, elsewhere, every, map, features, fixes)
+    ]
+
+
+def stated(
+    matches: list[int | None],
+    at: float = 0.0,
+    step: float = 1.0,
+    spread: float = 0.05,
+    novelty: float = 1.0,
+    elsewhere: float = 0.0,
+    every: int = 2,
+    map: ReferenceGraph = LINE,
+    features: LocalFeatures | None = None,
+    fixes: Sequence[LandmarkFix | None] = (),
+) -> list[PoseConfidence]:
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
     told = []
     for n, match in enumerate(matches):
@@ -71,7 +88,7 @@ def drive(
             ctx, recent, belief, belief.estimate(), map, SCALE, wrong, seen, likelihood, motion,
             features=None if match is None else features, fix=fix,
         )  # fmt: skip
-        told.append(out.confidence.probability)
+        told.append(out.confidence)
     return told
 
 
@@ -80,6 +97,16 @@ def test_matches_along_the_estimated_path_make_it_sure_and_scattered_ones_do_not
     assert drive(list(range(20)))[-1] > 0.95
     assert drive(scattered)[-1] < 0.5
     assert drive([n + 20 for n in range(20)])[-1] < 0.5  # consistent, but elsewhere
+
+
+def test_a_robot_searches_until_it_is_sure_is_lost_when_it_no_longer_is_and_blind_without_images():
+    scattered = np.random.default_rng(2).permutation(40)[:12].tolist()
+    assert {each.state for each in stated(scattered)[3:]} == {"searching"}
+    kidnapped = [each.state for each in stated([*range(15), *range(25, 29), *range(19, 21)])]
+    assert kidnapped[14] == kidnapped[-1] == "tracking"
+    assert kidnapped[18] == "lost"
+    blind = [each.state for each in stated([*range(15), None, None, None, None, 19])]
+    assert blind[14:] == ["tracking", "tracking", "tracking", "blind", "blind", "tracking"]
 
 
 def test_it_falls_when_images_stop_to_agree_and_more_with_each():
