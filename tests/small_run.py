@@ -11,6 +11,7 @@ from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimat
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
@@ -44,10 +45,11 @@ def collected(
     tallies: list[DriveTally | None] | None = None,
     matches: list[BestMatch | None] | None = None,
     confidences: list[PoseConfidence | None] | None = None,
+    evidence: list[ImageEvidence | None] | None = None,
 ) -> Drive:
     """Sequences as a graph would collect them."""
     still = [None] * len(ticks)
-    given = estimates, tallies, matches, confidences
+    given = estimates, tallies, matches, confidences, evidence
     return CollectDrive().step(Context("drive"), ticks, truth, motion or still, *given).drive
 
 

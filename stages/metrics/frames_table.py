@@ -49,7 +49,8 @@ class FramesTable(Stage):
         """The whole run at once."""
         if ctx.folder is not None:
             logs = [columns_of(log) for log in drive.by_log] or [columns_of(drive)]
-            table = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
+            whole: Any = np.ma.concatenate  # the plain one forgets masks
+            table = {name: whole([log[name] for log in logs]) for name in logs[0]}
             for name in ("reference", "place", "confident"):
                 table[name] = np.ma.masked_less(table[name], 0)
             write_table(ctx.folder / "frames", table)
@@ -65,7 +66,7 @@ def columns_of(drive: Drive) -> Columns:
     columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
     columns["confident"] = np.where(known(drive.estimate), confident(drive), -1)
     columns["confidence"] = drive.confidence
-    columns["state"] = np.ma.masked_array(np.array((*TRACKING_STATES, ""), object)[drive.state], drive.state < 0)
+    columns["state"] = np.ma.masked_array(np.array((*TRACKING_STATES, ""))[drive.state], drive.state < 0)
     columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)
     columns["position_error_m"] = np.where(both, position_errors(drive.estimate, drive.truth), np.nan)
     columns["heading_error_deg"] = np.where(both, heading_errors_deg(drive.estimate, drive.truth), np.nan)

@@ -8,6 +8,8 @@ from small_run import collected, small_run
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.frames_table import FramesTable, columns_of
 from omninav.stages.values.belief import PlaceBelief, PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
 
@@ -47,6 +49,17 @@ def test_a_match_says_what_looked_most_like_the_image(tmp_path):
     first, second = written(tmp_path, drive)
     assert (first["reference"], first["similarity"], first["reference_turn"]) == ("7", "0.9", "0.5")
     assert (second["reference"], second["similarity"], first["visual_distance"]) == ("", "", "")
+
+
+def test_of_several_logs_too_a_state_or_conflict_that_is_not_known_is_an_empty_cell(tmp_path):
+    ticks = [Tick(k, k, log=k // 2) for k in range(4)]
+    told = [None, PoseConfidence(0.2, "lost"), PoseConfidence(0.9), None]
+    found = [ImageEvidence(), None, ImageEvidence(conflict="a clock"), None]
+    rows = written(tmp_path, collected(ticks, [None] * 4, confidences=told, evidence=found))
+    assert [row["state"] for row in rows] == ["", "lost", "tracking", ""]
+    table = parquet.read_table(tmp_path / "frames.parquet").to_pydict()
+    assert table["state"] == [None, "lost", "tracking", None]
+    assert table["conflict"] == [None, None, "a clock", None]
 
 
 def test_a_run_without_frames_has_a_table_without_rows(tmp_path):
