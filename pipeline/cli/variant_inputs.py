@@ -1,4 +1,4 @@
-"""What variants take, read off their files alone: to compose each of them as Hydra does takes seconds."""
+"""Reads what variants take off their files alone: to compose each of them as Hydra does takes seconds."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -16,14 +16,14 @@ def inputs_of(variant: str, defaults: Sequence[Any], read: Read) -> dict[str, In
     Raises as `read_inputs`, and `BadInput` where its files include each other.
     """
     chosen = {"variant": variant}
+    declared: dict[str, Any] = {}
     try:
         _choose("variant", variant, read, chosen)
+        for group, option in (next(iter(item.items())) for item in defaults if isinstance(item, dict)):
+            for inputs in _declared(group, chosen.get(group, option), read):
+                declared |= inputs
     except RecursionError:
         raise BadInput(f"variant {variant}: its files include each other in their defaults") from None
-    declared: dict[str, Any] = {}
-    for group, option in (next(iter(item.items())) for item in defaults if isinstance(item, dict)):
-        for inputs in _declared(group, chosen.get(group, option), read):
-            declared |= inputs
     return read_inputs({"inputs": declared})
 
 

@@ -88,7 +88,7 @@ def _refuse(known: Sequence[str], message: str) -> NoReturn:
 
 
 def condition_words(words: Sequence[str]) -> list[str]:
-    """Where an experiment is asked for, the words that are for each of its conditions and not for the experiment."""
+    """Gives the words that are for each condition of an experiment and not for the experiment itself."""
     keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
     if "experiment" not in keys:
         return []

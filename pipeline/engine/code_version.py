@@ -112,7 +112,6 @@ def module_version(module: str, without: str = "") -> str:
     return digest_text(*(text for name in sorted(found) for text in (name[len(outer) :], found[name])))
 
 
-@functools.cache
 def _file_of(package: Path, name: str) -> Path | None:
     path = package.joinpath(*name.split(".")) if name else package
     files = (path / "__init__.py", path.with_name(f"{path.name}.py"))

@@ -208,7 +208,7 @@ def _field_names(cls: Any) -> tuple[str, ...]:
 
 
 def _defaults(cls: Any) -> int:
-    """How many of its last fields have a default."""
+    """Counts the last fields of a class that have a default."""
     known = [field.default is not MISSING or field.default_factory is not MISSING for field in dataclasses.fields(cls)]
     return len(list(takewhile(bool, reversed(known))))
 

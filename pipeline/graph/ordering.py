@@ -1,4 +1,4 @@
-"""Which nodes wait for which: what follows from a node, circles, and the order in which they run."""
+"""Orders nodes by what they wait for: what follows from a node, circles, and the order in which they run."""
 
 import heapq
 import itertools

@@ -14,12 +14,12 @@ class Value:
     """Base of everything that travels on a wire. A subclass becomes a frozen dataclass by itself.
 
     Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
-    `codec.py` can write. `in_place` marks a large value that one stage updates in place; it is then not
-    frozen, and the engine sees to it that nobody reads it too late. `grows` names array fields of such a value to which
-    rows are added and nothing else is done: a checkpoint writes the new ones only. `bulky` marks what is too large to
-    be kept over a whole log: it is never cached. `costly` marks what takes long to make: where it is made before the
-    loop it is kept in the cache. `is_truth` marks what cannot be measured in the field. `reported` marks a result of
-    the run, though no other stage reads it.
+    `codec.py` can write. A field that files of before do not have comes last and has a default. `in_place` marks a
+    large value that one stage updates in place; it is then not frozen, and the engine sees to it that nobody reads it
+    too late. `grows` names array fields of such a value to which rows are added and nothing else is done: a checkpoint
+    writes the new ones only. `bulky` marks what is too large to be kept over a whole log: it is never cached. `costly`
+    marks what takes long to make: where it is made before the loop it is kept in the cache. `is_truth` marks what
+    cannot be measured in the field. `reported` marks a result of the run, though no other stage reads it.
     """
 
     in_place: ClassVar[bool] = False

@@ -76,6 +76,8 @@ class OnnxKeypoints(Stage):
         self._session = session = loaded(self.model)
         self._input, self._grey, self._sides = self._read_input(session)
         self._outputs = self._read_outputs(session)
+        shape = next(each.shape for each in session.get_outputs() if each.name == self._outputs[2])
+        self._columns = [isinstance(size, int) for size in shape[-2:]] == [True, False]  # one descriptor each
         self._camera: Camera | None = None
 
     def inputs_digest(self) -> str | None:
@@ -87,7 +89,8 @@ class OnnxKeypoints(Stage):
         mirror = camera if isinstance(image, Image) and camera is not None and camera.ring is not None else None
         read, seam = self._prepared(image if mirror is None else self._unwrapped(image.pixels, mirror), camera)
         points, scores, descriptors = self._found(read.pixels, seam)
-        inside = ((points >= 0) & (points <= np.array(read.seen.shape[::-1]) - 1)).all(axis=1)
+        edge = np.array([0.5 if read.circle else 0.0, 0.0])  # a circle's last column borders on its first
+        inside = ((points >= -edge) & (points < np.array(read.seen.shape[::-1]) - 1 + edge + 1e-9)).all(axis=1)
         kept = np.flatnonzero(inside & (scores > 0) & (np.linalg.norm(descriptors, axis=1) > 0))
         kept = kept[np.lexsort((points[kept, 1], points[kept, 0], -scores[kept]))[: self.max_features]]
         if not len(kept):
@@ -149,7 +152,7 @@ class OnnxKeypoints(Stage):
         shapes = ", ".join(str(list(each.shape)) for each in (points, scores, descriptors))
         points, descriptors = (each[0] if each.ndim == 3 and len(each) == 1 else each for each in (points, descriptors))
         number = scores.size
-        if descriptors.ndim == 2 and len(descriptors) != number:
+        if descriptors.ndim == 2 and (len(descriptors) != number or (self._columns and descriptors.shape[1] == number)):
             descriptors = descriptors.T
         fits = points.shape == (number, 2) and descriptors.ndim == 2 and len(descriptors) == number
         numbers_alone = all(each.dtype.kind in "fiu" for each in (points, scores, descriptors))

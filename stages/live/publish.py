@@ -96,6 +96,8 @@ class Publish(Stage):
             return
         if self.command is not None and (command is not None or self._watchdog is not None):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
+        if estimate is not None:
+            self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
         if confidence is not None:
             self._transport.status.note("state", "" if confidence.state == "tracking" else confidence.state)
         if estimate is not None and (self.unsure or confidence is None or confidence.is_sure):
@@ -105,7 +107,6 @@ class Publish(Stage):
         self._transport.status.published(tick.stamp)
 
     def _publish_estimate(self, stamp: int, estimate: PoseEstimate, odometry: Pose | None) -> None:
-        self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
         at = _row(estimate.pose)
         if self.pose is not None:
             pose = {"pose": ros_pose(at), "covariance": covariance_6x6(estimate.covariance)}

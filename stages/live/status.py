@@ -47,7 +47,7 @@ class LiveStatus:
         self._taken = stamp, received
 
     def published(self, stamp: int) -> None:
-        """The tick of an image with that stamp (ns) has led to a pose, now."""
+        """The tick of an image with that stamp (ns) has ended, and what it led to is published, now."""
         now = time.time_ns()
         if self._taken[0] == stamp:
             self._latencies.append((now - self._taken[1]) / 1e6)

@@ -14,8 +14,10 @@ from omninav.stages.values.maps import ReferenceGraph
 from .aligned import Alignment
 
 Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
 
-MAX_COMPARED = 20_000
+MAX_COMPARED = 8_000
 """Landmarks of a map that are compared, evenly spaced: of more, enough are the same among these."""
 RATIO = 0.8
 """Largest ratio of a match's distance to that of the second nearest elsewhere."""
@@ -44,8 +46,8 @@ def aligned_by_landmarks(maps: Sequence[ReferenceGraph], rng: np.random.Generato
         for one in motions:
             for other in set(range(len(maps))) - set(motions):
                 if (one, other) not in tried:
-                    pairs = mutual_nearest_units(looks[one], looks[other], RATIO, points[other])
-                    tried[one, other] = _motion(points[one][pairs.first], points[other][pairs.second], rng)
+                    pairs = _pairs(looks[one], looks[other], points[one], points[other])
+                    tried[one, other] = _motion(points[one][pairs[:, 0]], points[other][pairs[:, 1]], rng)
         number, one, other = max((tried[a, b][0], a, b) for a, b in tried if b not in motions)
         if number < MIN_AGREEING:
             return None
@@ -55,14 +57,22 @@ def aligned_by_landmarks(maps: Sequence[ReferenceGraph], rng: np.random.Generato
     return Alignment(np.concatenate(poses), agreeing, (True,) * len(maps))
 
 
-def _compared(landmarks: Landmarks) -> tuple[Array, npt.NDArray[np.float32]]:
+def _compared(landmarks: Landmarks) -> tuple[Array, Floats]:
     rows = np.linspace(0, max(len(landmarks) - 1, 0), min(len(landmarks), MAX_COMPARED)).astype(np.int64)
     looks = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
     return landmarks.points[rows].astype(np.float64), looks
 
 
+def _pairs(looks: Floats, other_looks: Floats, points: Array, others: Array) -> Ints:
+    """Rows (M, 2) of landmarks that look alike; either map may hold a point twice, as one that was joined does."""
+    there = mutual_nearest_units(looks, other_looks, RATIO, others)
+    back = mutual_nearest_units(other_looks, looks, RATIO, points)
+    both = np.concatenate([np.stack([there.first, there.second]), np.stack([back.second, back.first])], axis=1)
+    return np.asarray(np.unique(both.T, axis=0), np.int64)
+
+
 def _motion(points: Array, others: Array, rng: np.random.Generator) -> tuple[int, Array]:
-    """How many matched points (M, 3) agree on one motion (3,) of the others' frame, and that motion."""
+    """Finds the motion (3,) of the others' frame on which most matched points (M, 3) agree, and how many do."""
     level = np.abs(points[:, 2] - others[:, 2]) < TOLERANCE_M
     a, b = points[level, :2] @ [1.0, 1j], others[level, :2] @ [1.0, 1j]
     if len(a) < MIN_AGREEING:

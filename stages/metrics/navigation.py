@@ -75,10 +75,11 @@ class Navigation(MetricStage):
         ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
         ended = next(ends, len(drive) - 1)
         tallied = np.flatnonzero(np.isfinite(drive.distance))
-        collisions = int(drive.collisions[tallied[-1]]) if len(tallied) else None
-        driven = float(np.nansum(np.hypot(drive.motion[begun:, 0], drive.motion[begun:, 1])))
+        before = tallied[tallied <= begun][-1:] if begun else tallied[:0]
+        collisions = None
+        driven = float(np.nansum(np.hypot(*drive.motion[begun + 1 if begun else 0 :, :2].T)))
         if len(tallied):
-            before = tallied[tallied < begun][-1:]
+            collisions = int(drive.collisions[tallied[-1]] - drive.collisions[before].sum())
             driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
         goal = int(last.places[-1]) if len(last.places) else None
         apart = shortest = None
@@ -119,7 +120,7 @@ def first_of_last_goal(routes: Sequence[PlannedRoute | None]) -> int:
         route = routes[k]
         if route is None or (route.goal is None and not len(route.places)):
             continue
-        goal = int(route.places[-1]) if route.goal is None else route.goal
+        goal = int(route.places[-1]) if route.goal is None else (route.goal.x, route.goal.y)
         if last is not None and goal != last:
             return k + 1
         last = goal

@@ -100,8 +100,8 @@ class ConfidenceMonitorState(State):
         self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
         self.sure, self.empty = False, 0
 
-    def state(self, probability: float) -> TrackingState:
-        """The state that follows from the confidence."""
+    def told(self, probability: float) -> TrackingState:
+        """The state that follows from the confidence; remembers that the robot was sure."""
         if probability < MIN_SURE:
             return "lost" if self.sure else "searching"
         self.sure = True
@@ -219,7 +219,7 @@ class ConfidenceMonitor(Stage):
             probability *= self.right_in_conflict
         seen = similarities is not None and (features is None or len(features) >= MIN_SEEN)
         recent.empty = 0 if seen else recent.empty + 1
-        return self.Out(confidence=PoseConfidence(probability, recent.state(probability)))
+        return self.Out(confidence=PoseConfidence(probability, recent.told(probability)))
 
 
 def by_landmarks(

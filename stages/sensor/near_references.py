@@ -174,14 +174,14 @@ class NearReferences(Stage):
     """Weights particles by their expected similarity, interpolated between the nearest references, to a power.
 
     Gross & Koenig 2004, section 2, do not say how S becomes a weight (erratum 23a in docs/papers.md): w = S^power. The
-    expected similarity is interpolated between references and compared headings and fades with distance to that of
-    background references. Lower values count as background too, so that a robot off the mapped paths, which resembles
-    no reference, is not pulled to the least dissimilar one. Images taken at one place are not independent evidence: the
-    power is scaled by the novelty of the image. Distances are in appearance length scales, so that one configuration
-    serves a room, a field and a lawn. Where only some references were compared, sums use their sampling weights, so
-    that power, background and mean likelihood are estimates for the whole map. The mean likelihood is that of a robot
-    kidnapped just now, to which the image is new: it takes the full power. Defaults:
-    docs/experiments/omniview_mcl_defaults.md.
+    expected similarity is interpolated between references and compared headings and, with a `fade_distance`, fades to
+    that of background references. With a `background_quantile` lower values count as background too, so that a robot
+    off the mapped paths, which resembles no reference, is not pulled to the least dissimilar one. Images taken at one
+    place are not independent evidence: the power is scaled by the novelty of the image. Distances are in appearance
+    length scales, so that one configuration serves a room, a field and a lawn. Where only some references were
+    compared, sums use their sampling weights, so that power, background and mean likelihood are estimates for the whole
+    map. The mean likelihood is that of a robot kidnapped just now, to which the image is new: it takes the full power.
+    Defaults: docs/experiments/omniview_mcl_defaults.md.
 
     With a `calibration` (likelihood=calibrated) the weight is the likelihood ratio of the right against a wrong place,
     which the map's own views have shown, in place of a power; `power`, `contrast` and the background's are not used.

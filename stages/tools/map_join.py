@@ -20,10 +20,9 @@ class JoinMaps(Tool):
     """Writes one map of the references, or places, of several.
 
     All must be of one kind, with views made in the same way. Maps of references whose poses are in frames of their own
-    are aligned by the landmarks that they share, or else by references that look alike, and then straightened together
-    (`aligned`). No edge or link is added between
-    maps. Raises BadInput where a map does not fit the first, and where too little that looks alike joins it to the
-    others.
+    are moved as a whole to where the landmarks that they share agree, or else aligned by references that look alike,
+    which also straightens them (`aligned`). No edge or link is added between maps. Raises BadInput where a map does not
+    fit the first, and where too little that looks alike joins it to the others.
     """
 
     example = "a.omap b.omap out=joined.omap"

@@ -12,8 +12,9 @@ Probability = Annotated[float, Bounds(ge=0, le=1)]
 
 
 TrackingState = Literal["searching", "tracking", "lost", "blind"]
-"""Whether a robot knows where it is: `searching`, not since it began; `tracking`; `lost`, it did; `blind`, it does by
-odometry alone, as images say nothing."""
+"""States of a robot: `searching`, it does not know where it is since it began; `tracking`, it does; `lost`, it did;
+`blind`, it does by odometry alone, as three images in a row are missing or show fewer than eight features (where
+landmarks are looked for)."""
 TRACKING_STATES: tuple[TrackingState, ...] = get_args(TrackingState)
 """All of them."""
 MIN_SURE = 0.5
@@ -28,7 +29,7 @@ class PoseConfidence(Value):
 
     @property
     def is_sure(self) -> bool:
-        """Whether the robot knows where it is."""
+        """Tells whether the robot knows where it is."""
         return self.state in ("tracking", "blind")
 
 

@@ -1,4 +1,4 @@
-"""What the two papers on Monte Carlo localisation print."""
+"""The two filters that the papers on Monte Carlo localisation print."""
 
 import pytest
 

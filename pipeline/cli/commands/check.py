@@ -113,7 +113,7 @@ def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> 
 
 
 def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
-    """What an experiment would run, each of its conditions composed and checked."""
+    """Composes and checks each condition that an experiment would run."""
     from omninav.pipeline.cli.experiments import planned_experiment
     from omninav.pipeline.experiment.conditions import open_inputs
     from omninav.pipeline.experiment.specification import DEVELOPMENT

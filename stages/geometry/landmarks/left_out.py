@@ -33,8 +33,9 @@ MIN_FOUND = 10
 
 
 class LeftOut(NamedTuple):
-    """`found_rate`: share of sample references whose pose the landmarks of others give, in [0, 1]; `variance_factor`:
-    by which the squares of their errors exceed what independent bearings would leave, at least 1."""
+    """Errors of left-out images. `found_rate`: share of sample references whose pose the landmarks of others give, in
+    [0, 1]; `variance_factor`: by which the squares of their errors exceed what independent bearings would leave, at
+    least 1."""
 
     found_rate: float
     variance_factor: float
@@ -46,7 +47,8 @@ def left_out_poses(
     """Locates sample references by landmarks that are triangulated without them and their neighbours on the tour.
 
     Errors of landmarks are shared by all bearings to what a wrong pose or a coarse texture put beside, and by the map's
-    own poses where these are wrong, so that a pose is off by more than its bearings say.
+    own poses where these are wrong, so that a pose is off by more than its bearings say. Descriptors are those of all
+    sightings, the left-out image's among them, so that rather more are found than of a later drive.
     `descriptors` (L, D): of the landmarks; `poses` (R, 3): of the references; `sigma` (rad): of a bearing;
     `candidates`: of each of the `samples_of` references, the others to look at.
     """

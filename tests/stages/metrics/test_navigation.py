@@ -27,7 +27,8 @@ def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
     ]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
-    tallies = [DriveTally(collisions, metres) for metres in np.broadcast_to(driven, len(spots))]
+    counts, metres = (np.broadcast_to(each, len(spots)).tolist() for each in (collisions, driven))
+    tallies = [DriveTally(*each) for each in zip(counts, metres, strict=True)]
     drive = collected(ticks, truth, tallies=tallies if tallied else None)
     metrics = Navigation().step(Context("navigation"), drive, ways, map).metrics
     return metrics.values["navigation"]
@@ -142,7 +143,7 @@ def test_a_way_along_path_images_is_as_long_as_they_lie_apart():
 
 
 def test_on_a_map_of_references_the_goal_is_a_point_beside_them():
-    route = PlannedRoute(np.array([0, 1]), "arrived", 0, goal=GoalPoint(4.0, 1.0))
+    routes = [PlannedRoute(np.array([0, 1]), "arrived", 0, goal=GoalPoint(4.0, 1.0)) for _ in range(2)]
     graph = ReferenceGraph(
         np.array([(0.0, 0.0, 0.0), (4.0, 0.0, 0.0)]),
         np.zeros((2, 1, 1), np.float32),
@@ -150,7 +151,7 @@ def test_on_a_map_of_references_the_goal_is_a_point_beside_them():
         np.array([(0, 1)], np.int64),
         "truth",
     )
-    found = ended([(0.0, 1.0), (4.0, 0.9)], [route, route], driven=6.6, map=graph)
+    found = ended([(0.0, 1.0), (4.0, 0.9)], routes, driven=6.6, map=graph)
     assert found["reached"]
     assert found["end_error_m"] == pytest.approx(0.1)
     assert found["shortest_m"] == pytest.approx(1.0 + 4.0 + 1.0)
@@ -162,6 +163,6 @@ def test_after_a_new_goal_on_the_way_all_figures_are_of_that_one():
     first, other = np.array([0, 1]), np.array([1, 2])
     ways = [PlannedRoute(first, "under way", 0), PlannedRoute(first, "arrived", 0)]
     ways += [PlannedRoute(other, "under way", 1), PlannedRoute(other, "arrived", 1)]
-    found = ended(spots, ways, driven=[0.0, 3.0, 3.0, 7.5])
-    assert (found["goal"], found["routes"], found["time_s"]) == (2, 1, 1.0)
+    found = ended(spots, ways, collisions=[0, 1, 1, 1], driven=[0.0, 3.0, 3.0, 7.5])
+    assert (found["goal"], found["routes"], found["time_s"], found["collisions"]) == (2, 1, 1.0, 0)
     assert (found["shortest_m"], found["path_length_m"]) == pytest.approx((4.0, 4.5))

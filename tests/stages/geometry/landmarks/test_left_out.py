@@ -1,4 +1,4 @@
-"""How far a map's own images are off, each located by the landmarks of the others."""
+"""A map's own images, each located by the landmarks of the others."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ SIGMA = np.radians(0.1)
 
 
 def left_out(noise_m: float, number: int | None = None):
-    """Of a tour whose bearings are off by `SIGMA` in each direction, and whose references by `noise_m`."""
+    """A tour whose bearings are off by `SIGMA` in each direction, and whose references by `noise_m`."""
     true, rng = tour_poses()[:number], np.random.default_rng(0)
     features = [seen_from(room(), pose) for pose in true]
     bearings = [each.bearings + SIGMA * rng.normal(size=each.bearings.shape) for each in features]
