@@ -273,7 +273,7 @@ def test_views_are_a_second_apart_and_compared_up_to_half_in_colours_by_eight_ma
 
 def test_views_are_compared_by_the_numbers_of_the_system() -> None:
     nothing = ViewComparison().step(CTX, [Tick(0, 0)], [NO_FEATURES], [GlobalDescriptor(np.zeros(3, np.float32))]).views
-    assert nothing.options == (0.8, 0.8, 0.5, 8, pytest.approx(np.radians(0.5)))
+    assert nothing.options == (0.8, 0.8, 0.5, 8, pytest.approx(np.radians(0.5)), "euclidean")
 
 
 def test_places_are_half_a_turn_wide_and_hypotheses_a_quarter_ignorant_up_to_twenty_views() -> None:
