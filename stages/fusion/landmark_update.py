@@ -10,12 +10,15 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.evidence import evidence_novelty
+from omninav.stages.geometry.probability.gaussians import intersected
 from omninav.stages.geometry.probability.particles import are_within, share_within, systematic, weighted_moments
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.requests import Restart
+
+from .covariance_intersection import alpha_of_min_determinant
 
 Array = npt.NDArray[np.float64]
 
@@ -45,11 +48,12 @@ class LandmarkUpdate(Stage):
     """Updates a belief by the poses from which an image may have been taken.
 
     Each Gaussian of the fix is right with its probability, and then the belief's mass around it counts as far as both
-    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is one too, so
-    that the product is one (a Kalman update), from which particles are drawn: a particle filter alone, with particles
-    decimetres apart, could not take in millimetres. With `kidnapping_probability` the robot may be anywhere, so that a
-    fix where the belief is not draws particles too, if it is rather right than wrong; they are its recovery particles
-    until further images agree.
+    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is one too: the
+    mean of both is that of a Kalman update, from which particles are drawn, as a particle filter alone, with particles
+    decimetres apart, could not take in millimetres; the covariance is that of their intersection, since images in a row
+    share the errors of the same landmarks, and a robot that stands sees nothing new. With `kidnapping_probability` the
+    robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
+    they are its recovery particles until further images agree.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """
@@ -98,8 +102,10 @@ class LandmarkUpdate(Stage):
                 away[2] = wrap(away[2])
                 both = spread + covariance
                 agreement = probability * math.exp(-0.5 * float(away @ np.linalg.solve(both, away)))
-                gain = covariance @ np.linalg.inv(both)
-                centre, product = mean + gain @ away, covariance - gain @ covariance
+                spread = spread + np.diag([1e-12] * 3)
+                alpha = alpha_of_min_determinant(spread, covariance)
+                centre = mean + covariance @ np.linalg.solve(both, away)
+                _, product = intersected(there, spread, mean, covariance, alpha)
                 # What the place has of both counts by its novelty, and is shared out as they stand to each other.
                 counted = (unsaid + agreement) ** (novelty - 1.0)
                 old[near] = belief.weights[near] * unsaid * counted
@@ -119,7 +125,11 @@ class LandmarkUpdate(Stage):
 
     def _drawn(self, ctx: Context, mean: Array, covariance: Array) -> Array:
         root = np.linalg.cholesky(0.5 * (covariance + covariance.T) + np.diag([1e-12] * 3))
-        poses = mean + ctx.rng.standard_normal((self.particles, 3)) @ root.T
+        normal = ctx.rng.standard_normal((self.particles, 3))
+        normal -= normal.mean(axis=0)
+        # Chance in the particles' covariance would shrink that of a robot that stands, image by image.
+        normal = np.linalg.solve(np.linalg.cholesky(normal.T @ normal / self.particles), normal.T).T
+        poses = mean + normal @ root.T
         poses[:, 2] = wrap(poses[:, 2])
         return poses
 

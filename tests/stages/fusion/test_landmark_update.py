@@ -52,7 +52,14 @@ def test_a_sharp_belief_and_a_fix_as_sharp_meet_half_way() -> None:
     )
     found = updated(sharp, fix_at(HERE + np.array([0.01, 0.0, 0.0]))).estimate()
     assert found.pose.x == pytest.approx(HERE[0] + 0.005, abs=0.001)
-    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(0.005 / math.sqrt(2.0), rel=0.3)
+    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(
+        0.005, rel=0.2
+    )  # not 1 / sqrt(2) of it: their errors are shared
+
+
+def test_a_robot_that_stands_is_no_surer_after_fifty_images_than_after_one() -> None:
+    once, often = (updated(belief(HERE), *[fix_at(HERE)] * times).estimate() for times in (1, 50))
+    assert np.sqrt(np.diag(often.covariance)) == pytest.approx(np.sqrt(np.diag(once.covariance)), rel=0.5)
 
 
 def test_headings_meet_across_the_seam_of_the_circle() -> None:
