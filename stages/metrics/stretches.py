@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.confidence import MIN_SURE
+from omninav.stages.values.confidence import MIN_EMPTY, MIN_SEEN, MIN_SURE
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch, StretchState
 
@@ -20,9 +20,9 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Columns = Mapping[str, npt.NDArray[Any]]
 
-MIN_BLIND, BLIND_CORRELATION, MIN_CONTRAST, MIN_FEATURES = 3, 0.15, 1.0 / 255.0, 8
-"""So many images in a row say nothing whose correlation with the ones before is below `InputConflicts`'s limit, whose
-parts differ by less than a grey level, or that have fewer features than `LandmarkPose` needs for a pose."""
+BLIND_CORRELATION, MIN_CONTRAST = 0.15, 1.0 / 255.0
+"""Images say nothing whose correlation with the ones before is below `InputConflicts`'s limit, or whose parts differ by
+less than a grey level."""
 OFF_MAP_SCALES, OFF_MAP_SCALES_BY_APPEARANCE = 5.0, 2.0
 """Distance from the nearest reference, in length scales, at which half of the images have a pose by landmarks
 (`ConfidenceMonitor`), and beyond which a best match is of another place (without landmarks)."""
@@ -84,12 +84,12 @@ class Log:
 
     @cached_property
     def blind(self) -> Flags:
-        """Which images say nothing, in rows of `MIN_BLIND` and more."""
+        """Which images say nothing, in rows of `MIN_EMPTY` and more."""
         empty = (self["correlation"] < BLIND_CORRELATION) | (self["contrast"] < MIN_CONTRAST)
-        empty |= self["features"] < MIN_FEATURES
+        empty |= self["features"] < MIN_SEEN
         if self.known("similarity"):
             empty |= ~np.isfinite(self["similarity"])
-        return without_short(empty, MIN_BLIND)
+        return without_short(empty, MIN_EMPTY)
 
     @cached_property
     def off_map(self) -> Flags:

@@ -13,7 +13,14 @@ from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
-from omninav.stages.values.confidence import MIN_SURE, PoseConfidence, TrackingState, WrongPoseAgreement
+from omninav.stages.values.confidence import (
+    MIN_EMPTY,
+    MIN_SEEN,
+    MIN_SURE,
+    PoseConfidence,
+    TrackingState,
+    WrongPoseAgreement,
+)
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.landmarks import LandmarkFix
@@ -63,8 +70,6 @@ SURE_TOGETHER = 4.6
 """Log odds of an estimate on which poses of fewer landmarks agree, from which on the same is known: 99 %."""
 MIN_FEATURES = 100
 """Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
-MIN_SEEN, MIN_EMPTY = 8, 3
-"""Features below which an image shows no landmarks at all, and such images in a row of a robot that is blind."""
 MAX_AGAINST = (1.0, 6.0)
 """Log odds that images without landmarks speak against an estimate, at most: on the map, where some of it has changed;
 and before any was found, in what may be another building."""

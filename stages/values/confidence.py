@@ -20,6 +20,9 @@ TRACKING_STATES: tuple[TrackingState, ...] = get_args(TrackingState)
 MIN_SURE = 0.5
 """Probability from which on an estimate is rather right than wrong."""
 
+MIN_SEEN, MIN_EMPTY = 8, 3
+"""Features below which an image shows no landmarks at all, and such images in a row that make a robot blind."""
+
 
 class PoseConfidence(Value):
     """The probability that the estimate is right, within a tolerance in position and heading, and what follows."""

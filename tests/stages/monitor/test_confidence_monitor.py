@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,23 +39,9 @@ LINE = ReferenceGraph(
 )
 
 
-def drive(
-    matches: list[int | None],
-    at: float = 0.0,
-    step: float = 1.0,
-    spread: float = 0.05,
-    novelty: float = 1.0,
-    elsewhere: float = 0.0,
-    every: int = 2,
-    map: ReferenceGraph = LINE,
-    features: LocalFeatures | None = None,
-    fixes: Sequence[LandmarkFix | None] = (),
-) -> list[float]:
-    """Confidences along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
-    all references or of every so-many-th, and the estimate follows odometry."""
-    return [
-        each.probability for each in stated(matches, at, step, spread, novelty, elsewhere, every, map, features, fixes)
-    ]
+def drive(matches: list[int | None], **more: Any) -> list[float]:
+    """Confidences along a line, as `stated`."""
+    return [each.probability for each in stated(matches, **more)]
 
 
 def stated(
@@ -69,6 +56,8 @@ def stated(
     features: LocalFeatures | None = None,
     fixes: Sequence[LandmarkFix | None] = (),
 ) -> list[PoseConfidence]:
+    """What is said along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
+    all references or of every so-many-th, and the estimate follows odometry."""
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
     told = []
     for n, match in enumerate(matches):
