@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks
+from omninav.stages.values.landmarks import Landmarks, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 
 from .aligned import Alignment
@@ -59,8 +59,7 @@ def aligned_by_landmarks(maps: Sequence[ReferenceGraph], rng: np.random.Generato
 
 def _compared(landmarks: Landmarks) -> tuple[Array, Floats]:
     rows = np.linspace(0, max(len(landmarks) - 1, 0), min(len(landmarks), MAX_COMPARED)).astype(np.int64)
-    looks = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
-    return landmarks.points[rows].astype(np.float64), looks
+    return landmarks.points[rows].astype(np.float64), restored_descriptors(landmarks.descriptors[rows])
 
 
 def _pairs(looks: Floats, other_looks: Floats, points: Array, others: Array) -> Ints:

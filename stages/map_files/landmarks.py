@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.appearance.visual_words import learned_words
-from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks
+from omninav.stages.values.landmarks import Landmarks, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords, words_of_roots
 
@@ -84,7 +84,7 @@ def _words_of_landmarks(
     given: Sequence[Landmarks], descriptors: npt.NDArray[np.uint8], starts: Ints, seen: npt.NDArray[np.int32]
 ) -> VisualWords:
     number = max(len(each.words.centres) for each in given)
-    values = descriptors.astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
+    values = restored_descriptors(descriptors)
     sample = np.linspace(0, max(len(values) - 1, 0), min(len(values), number * DESCRIPTORS_PER_WORD)).astype(np.int64)
     centres = learned_words(values[sample], number)
     return words_of_roots((values[seen[a:b]] for a, b in pairwise(starts.tolist())), centres)

@@ -42,8 +42,8 @@ class TopologicalMapping(Stage):
     max_segments: Annotated[int, Bounds(ge=0)] = 60
     """Vertical segments of a view that the map keeps."""
     spread: Literal["within_places", "all_views"] = "within_places"
-    """By what the sensor model scales visual distances: their root mean square from a place's views to its medoid, or
-    the paper's "standard deviation of it, measured on the data" (section 5.3): of all views of the tour."""
+    """Scale of visual distances in the sensor model: their root mean square from a place's views to its medoid, or the
+    paper's "standard deviation of it, measured on the data" (section 5.3): of all views of the tour."""
 
     class Out(Outputs):
         map: TopologicalMap

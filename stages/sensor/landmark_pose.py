@@ -13,7 +13,7 @@ from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched,
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, LandmarkFix
+from omninav.stages.values.landmarks import LandmarkFix, restored_descriptors
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
@@ -82,7 +82,7 @@ class LandmarkPose(Stage):
                 f"{features.descriptors.shape[1]}; use the features the map was learned with, or learn it again"
             )
         rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
-        theirs = landmarks.descriptors[rows].astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
+        theirs = restored_descriptors(landmarks.descriptors[rows])
         points = landmarks.points[rows].astype(np.float64)
         pairs = matched(root_descriptors(features.descriptors), theirs, points)
         bearings = np.ascontiguousarray(features.bearings[pairs.first])

@@ -104,6 +104,12 @@ def stored_descriptors(values: Floats) -> Bytes:
     return np.asarray(np.clip(np.rint(values * np.float32(DESCRIPTOR_SCALE)), 0, 255).astype(np.uint8), np.uint8)
 
 
+def restored_descriptors(stored: Bytes) -> Floats:
+    """Rows (N, D) of length 1, as they are compared, of those that `stored_descriptors` made."""
+    values: Floats = stored.astype(np.float32) / np.float32(DESCRIPTOR_SCALE)
+    return values
+
+
 class LandmarkFix(Value):
     """Poses from which an image may have been taken, each by the landmarks that it saw from there, the best first.
 

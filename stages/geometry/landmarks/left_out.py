@@ -46,9 +46,10 @@ def left_out_poses(
 ) -> LeftOut:
     """Locates sample references by landmarks that are triangulated without them and their neighbours on the tour.
 
-    Errors of landmarks are shared by all bearings to what a wrong pose or a coarse texture put beside, and by the map's
-    own poses where these are wrong, so that a pose is off by more than its bearings say. Descriptors are those of all
-    sightings, the left-out image's among them, so that rather more are found than of a later drive.
+    Landmarks have errors too, from coarse textures and wrong poses of the map, and those of neighbouring landmarks are
+    alike: more bearings to them do not average these out, and a pose is off by more than its bearings say.
+    Descriptors are those of all sightings, the left-out image's among them, so that rather more are found than of a
+    later drive.
     `descriptors` (L, D): of the landmarks; `poses` (R, 3): of the references; `sigma` (rad): of a bearing;
     `candidates`: of each of the `samples_of` references, the others to look at.
     """

@@ -56,8 +56,8 @@ def stated(
     features: LocalFeatures | None = None,
     fixes: Sequence[LandmarkFix | None] = (),
 ) -> list[PoseConfidence]:
-    """What is said along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
-    all references or of every so-many-th, and the estimate follows odometry."""
+    """Confidences and states along a line; the best match of each image is given (None: no image), `elsewhere` the
+    similarity of all references or of every so-many-th, and the estimate follows odometry."""
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
     told = []
     for n, match in enumerate(matches):
