@@ -25,11 +25,12 @@ COMMANDS = (
     "compare",
     "resume",
     "experiments",
+    "data",
     "doctor",
 )
 """Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
 
-WITHOUT_CONFIGURATION = ("stages", "report", "explain", "compare", "resume", "experiments", "doctor")
+WITHOUT_CONFIGURATION = ("stages", "report", "explain", "compare", "resume", "experiments", "data", "doctor")
 """Those that compose none, and have no use for flags of it."""
 
 

@@ -29,6 +29,7 @@ _SINGLE = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]")
 _REPEAT = re.compile(r"[*+?][+?]?|\{\d*,\d*\}[+?]?")
 _REPEATED_GROUP = re.compile(r"\)\s*[*+?{]")
 _MANY_TIMES = re.compile(r"\{\d{3,}|,\d{3,}\}")
+Axis = Literal["x", "-x", "y", "-y", "z", "-z"]
 
 
 @dataclass(frozen=True)
@@ -80,12 +81,29 @@ class Frames:
 
     csv: str | None = None
     header: bool = True
+    """False: columns have numbers, from 0, and lines that begin with # are comments. So it is with a .json that maps
+    names to rows or matrices of numbers: column 0 is the name."""
     delimiter: Delimiter = ","
     file: str | int | None = None
+    """A column, or a name made of columns: '{0}.png', or '{0:010}.png' for a number with zeros to 10 digits."""
+    name: str | None = None
+    """Values in the names of the `images`, as in t{time}_x{x}_y{y}, without the suffix: columns named time, x and y."""
     images: str = ""
     rename: tuple[Rename, ...] = ()
+    right: Rename | None = None
+    """A second image belongs to the right of each one, as of two fisheyes: this makes its path of the first one's."""
     time: Time | None = None
+    index: str | int | None = None
+    """The column with each image's number, or its name with a number at its end: it counts periods, with gaps."""
     period: Annotated[float, Bounds(ge=1e-6, le=3600)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.name is not None:
+            parts = re.split(r"\{(\w+)\}", self.name)
+            if len(parts) < 3 or len({*parts[1::2]}) < len(parts[1::2]) or "" in parts[2:-1:2]:
+                raise ValueError(f"'name' is {shown(self.name)}, expected different {{columns}} with text between them")
+            if self.csv is not None:
+                raise ValueError("'name' makes a table of the images' names: leave out 'csv'")
 
 
 @dataclass(frozen=True)
@@ -111,13 +129,25 @@ class Positions:
 
 @dataclass(frozen=True)
 class Heading:
-    """A column of headings in the positions' table: where it counts from, which way, and what is added (radians)."""
+    """Headings measured, in the positions' table: a column of angles, or the columns of a rotation."""
 
-    column: str | int
-    unit: Literal["deg", "rad"]
+    column: str | int | None = None
+    unit: Literal["deg", "rad"] | None = None
     zero: Literal["x", "y"] = "x"
     sense: Literal["clockwise", "counter_clockwise"] = "counter_clockwise"
+    rotation: tuple[str | int, ...] = ()
+    """Columns of a unit quaternion, in the order x, y, z, w, or the nine of a matrix, row by row. It turns a frame of
+    the robot into the world, whose z is up."""
+    forward: Axis = "x"
+    """The axis of that frame that points ahead of the robot: x of most robots and IMUs, z of a camera."""
     offset: Offset = 0.0
+    """Radians, counter-clockwise, that are added."""
+
+    def __post_init__(self) -> None:
+        if (self.column is None) == (not self.rotation) or (self.column is not None and self.unit is None):
+            raise ValueError("needs a 'column' and its 'unit', or a 'rotation'")
+        if len(self.rotation) not in (0, 4, 9):
+            raise ValueError(f"'rotation' has {len(self.rotation)} columns, expected 4 (x, y, z, w) or 9 (a matrix)")
 
 
 @dataclass(frozen=True)
@@ -136,11 +166,26 @@ class Tangent:
 
 
 @dataclass(frozen=True)
+class DataSet:
+    """Facts about a public data set, which `omninav data` lists."""
+
+    what: str
+    site: str
+    """Address to get it from."""
+    run: str
+    """What to type behind `omninav`."""
+    size: str = "see its site"
+    licence: str = "see its site"
+    published: str = ""
+    """Results of others on it, with their source."""
+
+
+@dataclass(frozen=True)
 class Description:
     """A folder of images, described. `which` fills `{which}` in file names; by default it stands for anything.
 
     `positions` null: the images are all there is. `camera`: what a camera.yaml holds (the image's size may be left
-    out); null: the folder's camera.yaml.
+    out); null: the folder's camera.yaml; a projection of which an image's size says enough: that, where there is none.
     """
 
     frames: Frames
@@ -149,7 +194,8 @@ class Description:
     which: str = "*"
     heading: Heading | None = None
     tangent: Tangent = field(default_factory=Tangent)
-    camera: dict[str, Any] | None = None
+    camera: dict[str, Any] | str | None = None
+    about: DataSet | None = field(default=None, repr=False)  # so that words about it do not change a log's digest
 
 
 def known_layouts(layouts: Sequence[str] = ()) -> dict[str, Path]:

@@ -4,7 +4,7 @@ import hashlib
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -22,18 +22,20 @@ from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
 from .decode_ahead import DecodeAhead
-from .description import MAX_PATTERN, Description, find_layout, known_layouts, read_description
+from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, known_layouts, read_description
 from .messages import is_blank
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending, lone
-from .tables import NO_TIME, CsvTable, Delimiter, read_table
+from .tables import NO_TIME, CsvTable, Delimiter, read_table, table_of
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 MAX_STARS = 8
 """Wildcards in the name of a file."""
+MAX_DIGITS = 10
+"""Digits of an image's number."""
 
 
 class ImageFolder:
@@ -60,6 +62,8 @@ class ImageFolder:
         self._rows: list[str] = []
         frames = self._table(description.frames.csv, description.frames.header, description.frames.delimiter)
         paths = self._paths(frames)
+        if description.frames.name is not None:
+            frames = names_table(paths, description.frames.name)
         times = self._times(frames, len(paths))
         truth, positions = None, description.positions
         if positions is not None:
@@ -71,7 +75,7 @@ class ImageFolder:
         self._paths_kept = [paths[row] for row in keep]
         self.turned = sum(map(_is_turned, self._paths_kept))
         """How many of its images are turned as their EXIF orientation says."""
-        self._images = DecodeAhead(lambda frame: partial(_image_at, self._paths_kept[frame]))
+        self._images = DecodeAhead(lambda frame: partial(self._read, self._paths_kept[frame]))
         self.stamps: Stamps = times[keep]
         self.truth: Array | None = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
@@ -99,20 +103,21 @@ class ImageFolder:
     def digest(self) -> str:
         """sha256 over the tables, the description and every image that is used."""
         whole = hashlib.sha256(repr(self._description).encode())
-        for path in [*self._sources, *self._paths_kept]:
-            whole.update(digest_file(path).encode())
+        for file in [*self._sources, *(file for path in self._paths_kept for file in self._files(path))]:
+            whole.update(digest_file(file).encode())
         return whole.hexdigest()
 
     def _drop(self, kind: str, detail: str) -> None:
         self.dropped[kind] += 1
         self.details.setdefault(kind, f"{self.name}: {detail}")
 
-    def _find(self, pattern: str) -> Path:
-        """The one file that a pattern names."""
+    def _find(self, pattern: str, kind: Callable[[Path], bool] = Path.is_file) -> Path:
+        """The one file, or folder, that a pattern names."""
         pattern = pattern.replace("{which}", self._description.which)
-        found = sorted(self._matching(pattern))
+        found = sorted(self._matching(pattern, kind))
         if not found:
-            raise UnreadableRecording(f"{self._folder}: no file {pattern} ({self._where} asks for it)")
+            what = "file" if kind is Path.is_file else "folder"
+            raise UnreadableRecording(f"{self._folder}: no {what} {pattern} ({self._where} asks for it)")
         if len(found) > 1:
             names = ", ".join(str(path.relative_to(self._folder)) for path in found)
             raise UnreadableRecording(
@@ -120,8 +125,8 @@ class ImageFolder:
             )
         return found[0]
 
-    def _matching(self, pattern: str) -> list[Path]:
-        """The files in the folder that a pattern names."""
+    def _matching(self, pattern: str, kind: Callable[[Path], bool] = Path.is_file) -> list[Path]:
+        """The files in the folder that a pattern names, or the folders."""
         parts = Path(pattern).parts
         if "\0" in pattern or len(pattern) > MAX_PATTERN or pattern.count("*") > MAX_STARS or pattern.count("**") > 1:
             what = f"at most {MAX_PATTERN} characters, {MAX_STARS} stars and one **"
@@ -129,7 +134,7 @@ class ImageFolder:
         if not parts or Path(pattern).is_absolute() or ".." in parts:
             raise UnreadableRecording(f"{self._where}: {shown(pattern)} names no file within the recording's folder")
         try:
-            return [path for path in _glob(self._folder, parts) if path.is_file()]
+            return [path for path in _glob(self._folder, parts) if kind(path)]
         except (OSError, ValueError) as error:
             raise UnreadableRecording(f"{self._folder}: {shown(pattern)} cannot be looked for ({error})") from None
 
@@ -155,9 +160,14 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
         base = self._folder if frames.images.startswith("/") else table.path.parent
         base /= frames.images.lstrip("/")
-        names = table.texts(frames.file)
+        if "{which}" in frames.images:
+            base = self._find(str(base.relative_to(self._folder)), Path.is_dir)
+        names = _file_names(table, frames.file)
         self._rows = [f"{table.path.name}, line {line}" for line in table.lines]
-        return [self._inside(base / self._renamed(name, row), row) for name, row in zip(names, self._rows, strict=True)]
+        return [
+            self._inside(base / self._renamed(name, row, *frames.rename), row)
+            for name, row in zip(names, self._rows, strict=True)
+        ]
 
     def _inside(self, path: Path, row: str) -> Path:
         """A path that a table names. Raises `UnreadableRecording` where it leads out of the recording's folder."""
@@ -165,13 +175,28 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._folder}: {row}: {shown(str(path))} is not within the recording's folder")
         return path
 
-    def _renamed(self, name: str, row: str) -> str:
+    def _renamed(self, name: str, row: str, *renames: Rename) -> str:
         try:
-            for rename in self._description.frames.rename:
+            for rename in renames:
                 name = rename(name)
         except ValueError as error:
             raise UnreadableRecording(f"{self._folder}: {row}: {error}") from None
         return name
+
+    def _files(self, path: Path) -> list[Path]:
+        """A frame's image, and the one that belongs to the right of it."""
+        right = self._description.frames.right
+        if right is None:
+            return [path]
+        second = self._renamed(str(path.relative_to(self._folder)), path.name, right)
+        return [path, self._inside(self._folder / second, path.name)]
+
+    def _read(self, path: Path) -> Pixels:
+        """The image of a frame, of one file or of two side by side."""
+        images = [_image_at(file) for file in self._files(path)]
+        if len({len(image) for image in images}) > 1:
+            raise Undecodable(f"{len(images[0])} rows, but the image beside it has {len(images[1])}")
+        return images[0] if len(images) == 1 else np.hstack(images)
 
     def _times(self, table: CsvTable | None, count: int) -> Stamps:
         frames = self._description.frames
@@ -179,15 +204,18 @@ class ImageFolder:
             return table.nanoseconds(frames.time)
         if frames.period is None:
             raise UnreadableRecording(f"{self._where}: frames need a time column or a period (frames.period: seconds)")
-        return np.array([round(number * frames.period * 1e9) for number in range(count)], dtype=np.int64)
+        numbers: Iterable[int] = range(count)
+        if table is not None and frames.index is not None:
+            numbers = map(_last_number, table.texts(frames.index), self._rows)
+        return np.array([round(min(number * frames.period, FAR) * 1e9) for number in numbers], dtype=np.int64)
 
     def _usable(self, paths: list[Path], times: Stamps, truth: Array | None) -> npt.NDArray[np.int64]:
         rows = []
         for row, path in enumerate(paths):
             if times[row] == NO_TIME:
                 self._drop("no_time", f"{self._rows[row]}: no time")
-            elif not _is_file(path):
-                self._drop("missing_image", f"{self._rows[row]}: no file {path}")
+            elif missing := [file for file in self._files(path) if not _is_file(file)]:
+                self._drop("missing_image", f"{self._rows[row]}: no file {missing[0]}")
             elif truth is not None and not np.isfinite(truth[row]).all():
                 self._drop("no_position", f"{self._rows[row]} ({path.name}): no position")
             else:
@@ -208,26 +236,74 @@ class ImageFolder:
         return np.array([rows[number] for number in kept], dtype=np.int64)
 
     def _find_camera(self, named: str | None) -> Camera:
+        described, beside = self._description.camera, self._folder / "camera.yaml"
+        if named is None and not isinstance(described, dict) and beside.is_file():
+            self._sources.append(beside)
+            return read_camera(beside)
+        if isinstance(described, str):
+            named = named or described
         if named is not None:
             camera, files = named_camera(named, lambda: self._first_picture().shape[1::-1])
             self._sources += files
             return camera
-        beside = self._folder / "camera.yaml"
-        if self._description.camera is None and beside.is_file():
-            self._sources.append(beside)
-            return read_camera(beside)
         first = self._first_picture()
-        if self._description.camera is None:
+        if not isinstance(described, dict):
             camera, sentence = assumed_camera(self.name, first)
             self.assumed = (*self.assumed, sentence)
             return camera
-        return camera_from(self._description.camera, f"{self._where}: camera", first.shape[1::-1])
+        return camera_from(described, f"{self._where}: camera", first.shape[1::-1])
 
     def _first_picture(self) -> Pixels:
         for path in self._paths_kept:
             with suppress(Undecodable, BadInput):
-                return _image_at(path)
+                return self._read(path)
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
+
+
+def names_table(paths: Sequence[Path], form: str) -> CsvTable:
+    """The values in images' names of a form such as t{time}_x{x}: a row per image, a column per value.
+
+    Raises `UnreadableRecording` for a name of another form.
+    """
+    texts = re.split(r"\{\w+\}", form)
+    rows = []
+    for number, path in enumerate(paths, 1):
+        first, *middle = texts[:-1]
+        rest, end = path.stem, texts[-1]
+        fits = len(rest) <= MAX_NAME and rest.startswith(first) and rest.endswith(end)
+        rest, values = rest[len(first) : len(rest) - len(end)], []
+        for text in middle:
+            value, found, rest = rest.partition(text)
+            fits = fits and bool(found)
+            values.append(value)
+        if not fits or "" in (*values, rest):
+            raise UnreadableRecording(f"{path}: the image's name is not of the form {shown(form)}")
+        rows.append((number, [*values, rest]))
+    return table_of(paths[0].parent, tuple(re.findall(r"\{(\w+)\}", form)), rows)
+
+
+def _file_names(table: CsvTable, file: str | int) -> list[str]:
+    """Names of images: the cells of a column, or made of cells by a form such as {0:010}.png."""
+    if isinstance(file, int) or "{" not in file:
+        return table.texts(file)
+    columns = {
+        one[0]: table.texts(int(one[1]) if one[1].isdecimal() else one[1])
+        for one in re.finditer(r"\{([^{}:]+)(?::0(\d\d?))?\}", file)
+    }
+    names = [file] * len(table.lines)
+    for placeholder, cells in columns.items():
+        width = re.search(r":0(\d+)\}$", placeholder)
+        for row, cell in enumerate(cells):
+            names[row] = names[row].replace(placeholder, cell.zfill(int(width[1]) if width else 0))
+    return names
+
+
+def _last_number(text: str, row: str) -> int:
+    """The last whole number in a cell. Raises `UnreadableRecording` naming the row where there is none."""
+    numbers = re.findall(r"\d+", text)
+    if not numbers or len(numbers[-1]) > MAX_DIGITS:
+        raise UnreadableRecording(f"{row}: {shown(text)} has no number, expected the image's (frames.index)")
+    return int(numbers[-1])
 
 
 def _glob(folder: Path, parts: Sequence[str]) -> Iterator[Path]:

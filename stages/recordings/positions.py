@@ -1,20 +1,26 @@
 """Poses of a folder's images, from a table of positions: joined by time, with headings measured or of the track."""
 
+import math
 from math import pi
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from omninav.stages.geometry.plane.se2 import wrap
 
-from .description import Description
+from .description import Description, Heading
 from .plausibility import MotionLimits, believed
 from .recording import UnreadableRecording
 from .stamps import ascending_rows, poses_near
-from .tables import NO_TIME, Angle, CsvTable
+from .tables import NO_TIME, Angle, CsvTable, Length
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+MAX_SKEW = 0.1
+"""Difference of a rotation's cells from those of a rotation; files round to three digits."""
+MAX_STEEP_DEG = 60.0
+"""Slope of what points ahead of a robot, in the median (degrees)."""
 MAX_FITTED = 1000
 """Positions that the direction at a point is fitted to: of eight seconds at 125 Hz."""
 
@@ -74,7 +80,11 @@ def headings(
 ) -> Array:
     """Headings (K,) at rows of a table, of which stamps (ns) and positions (m) are given."""
     heading, tangent = description.heading, description.tangent
+    if heading is not None and heading.rotation:
+        return wrap(np.arctan2(*_forward(heading, table, rows)[:, 1::-1].T) + heading.offset)
     if heading is not None:
+        assert heading.column is not None
+        assert heading.unit is not None
         measured = table.numbers(Angle(heading.column, heading.unit))[rows]
         turned = measured if heading.sense == "counter_clockwise" else -measured
         return wrap(turned + (pi / 2 if heading.zero == "y" else 0.0) + heading.offset)
@@ -82,6 +92,39 @@ def headings(
     if tangent.unit == "m":
         along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     return track_directions(along, np.column_stack([x, y]), tangent.window, tangent.lag)
+
+
+def _forward(heading: Heading, table: CsvTable, rows: npt.NDArray[np.int64]) -> Array:
+    """Directions (K, 3) in the world of the axis that points ahead, at rows of a table.
+
+    Raises `UnreadableRecording` for a row that holds no rotation, and where most of the directions are steep.
+    """
+    cells = np.column_stack([table.numbers(Length(column, "m"))[rows] for column in heading.rotation])
+    if len(heading.rotation) == 4:
+        wrong = abs(np.linalg.norm(cells, axis=1) - 1.0) > MAX_SKEW
+        turns = Rotation.from_quat(np.where((wrong | ~np.isfinite(cells).all(axis=1))[:, None], 1.0, cells)).as_matrix()
+        expected = "a unit quaternion (x, y, z, w)"
+    else:
+        turns = cells.reshape(-1, 3, 3)
+        wrong = abs(turns @ turns.mT - np.eye(3)).max(axis=(1, 2)) > MAX_SKEW
+        wrong |= np.linalg.det(turns) < 0.0
+        expected = "a rotation matrix"
+    wrong |= ~np.isfinite(cells).all(axis=1)
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        found = ", ".join("no number" if np.isnan(cell) else f"{cell:g}" for cell in cells[row])
+        where = f"{table.path}, line {table.lines[rows[row]]}"
+        raise UnreadableRecording(f"{where}: its rotation is ({found}), expected {expected}")
+    axis = "xyz".index(heading.forward[-1])
+    ahead: Array = turns[:, :, axis] * (-1.0 if heading.forward[0] == "-" else 1.0)
+    steep = math.degrees(np.median(np.arcsin(np.clip(abs(ahead[:, 2]), 0.0, 1.0))))
+    if steep > MAX_STEEP_DEG:
+        raise UnreadableRecording(
+            f"{table.path}: the axis {heading.forward} of its rotations is {steep:.0f} degrees from level (median), "
+            "expected the one that points ahead, in a world whose z is up: heading.forward, and the order of "
+            "heading.rotation"
+        )
+    return ahead
 
 
 def track_directions(along: Array, positions: Array, window: float, lag: float = 0.0) -> Array:

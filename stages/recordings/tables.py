@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -175,8 +176,13 @@ class CsvTable:
 
 
 def read_table(path: Path, header: bool = True, delimiter: Delimiter = ",") -> CsvTable:
-    """A CSV file; empty lines are skipped. Raises `BadInput`."""
-    rows = _csv_rows(path, delimiter)
+    """A CSV file, or a .json of rows by their names. Skips empty lines, and comments (#) where there is no header.
+
+    Raises `BadInput`.
+    """
+    rows = _json_rows(path) if path.suffix == ".json" else _csv_rows(path, delimiter)
+    if not header:
+        rows = ((line, row) for line, row in rows if row and not row[0].startswith("#"))
     first = next(((line, row) for line, row in rows if any(map(str.strip, row))), None)
     if first is None:
         raise UnreadableRecording(f"{path}: an empty table")
@@ -234,6 +240,17 @@ def _csv_rows(path: Path, delimiter: Delimiter) -> Iterator[tuple[int, list[str]
     for row in reader:
         read = 0
         yield reader.line_num, row
+
+
+def _json_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """The entries of a JSON object of numbers in lists, sorted by name: their places, and their names and numbers."""
+    try:
+        content = json.loads(read_small(path, MAX_TABLE_BYTES))
+        for number, name in enumerate(sorted(content), 1):
+            numbers = np.asarray(content[name], np.float64).ravel()
+            yield number, [name, *map(repr, numbers.tolist())]
+    except (ValueError, TypeError, RecursionError) as error:
+        raise UnreadableRecording(f"{path}: expected an object of names and matrices of numbers ({error})") from None
 
 
 def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:

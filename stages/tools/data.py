@@ -1,0 +1,46 @@
+"""Lists the public data sets for which there is a layout."""
+
+from omninav.pipeline import BadInput, Context, Tool
+from omninav.pipeline.graph.problems import nearest
+from omninav.stages.recordings.description import DataSet, known_layouts, read_description
+
+
+class ListData(Tool):
+    """Prints the data sets that are read as they are downloaded: where to get them, and how to run them.
+
+    Raises BadInput for a name of which there is none.
+    """
+
+    example = "cold"
+
+    name: str = ""
+    """One of them, for all about it."""
+    layout_folders: tuple[str, ...] = ()
+    """Folders with further layouts (`nodes.source.layout_folders`)."""
+
+    def run(self, ctx: Context) -> None:
+        """List them."""
+        layouts = known_layouts(self.layout_folders)
+        described = {name: read_description(path, self.layout_folders).about for name, path in layouts.items()}
+        known = {name: about for name, about in described.items() if about is not None}
+        if not self.name:
+            print("\n".join(f"{name:<16} {about.what}\n{'':<16} {about.site}" for name, about in known.items()))
+        elif self.name in known:
+            print("\n".join(f"{name:<10} {value}" for name, value in facts(known[self.name])))
+        else:
+            near = nearest(self.name, known)
+            hint = f"did you mean '{near}'?" if near else f"there are {', '.join(known)}"
+            raise BadInput(f"name={self.name:.60}: no such data set; {hint}")
+
+
+def facts(about: DataSet) -> list[tuple[str, str]]:
+    """What is known of a data set, by name."""
+    found = [
+        ("what", about.what),
+        ("from", about.site),
+        ("size", about.size),
+        ("licence", about.licence),
+        ("run", f"omninav {about.run}"),
+        ("published", about.published),
+    ]
+    return [(name, value) for name, value in found if value]
