@@ -108,10 +108,11 @@ def module_version(module: str, without: str = "") -> str:
             found[name], imported = _read(place, name)
             to_read += [name.rpartition(".")[0], *imported]  # a package's own file runs before its modules
     if not found:  # a file that was given by its path: it has no package, and no name of its own
-        found[inside[-1]] = file.read_text(encoding="utf-8")
+        found[inside[-1]] = digest_text(file.read_text(encoding="utf-8"))
     return digest_text(*(text for name in sorted(found) for text in (name[len(outer) :], found[name])))
 
 
+@functools.cache
 def _file_of(package: Path, name: str) -> Path | None:
     path = package.joinpath(*name.split(".")) if name else package
     files = (path / "__init__.py", path.with_name(f"{path.name}.py"))
@@ -120,8 +121,9 @@ def _file_of(package: Path, name: str) -> Path | None:
 
 @functools.cache
 def _read(file: Path, name: str) -> tuple[str, tuple[str, ...]]:
+    """Hash of a module's source, and the names that it imports."""
     text = file.read_text(encoding="utf-8")
-    return text, tuple(_imported(text, name if file.name == "__init__.py" else name.rpartition(".")[0]))
+    return digest_text(text), tuple(_imported(text, name if file.name == "__init__.py" else name.rpartition(".")[0]))
 
 
 IMPORT = re.compile(

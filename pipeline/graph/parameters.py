@@ -5,7 +5,7 @@ import dataclasses
 import functools
 import inspect
 import itertools
-import textwrap
+import sys
 import types
 import typing
 from typing import Any, Union, get_args, get_origin
@@ -77,16 +77,33 @@ def attribute_docs(cls: type) -> dict[str, str]:
 
 def _docs_in(cls: type) -> dict[str, str]:
     try:
-        source = inspect.getsource(cls)
-    except (OSError, TypeError):
+        source = inspect.getsource(sys.modules[cls.__module__])
+    except (OSError, TypeError, KeyError):
         return {}
-    body = ast.parse(textwrap.dedent(source)).body[0]
     found = {}
-    for field, below in itertools.pairwise(body.body if isinstance(body, ast.ClassDef) else []):
+    for field, below in itertools.pairwise(_class_bodies(source).get(cls.__qualname__, ())):
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
             text = below.value.value if isinstance(below.value, ast.Constant) else None
             if isinstance(text, str):
                 found[field.target.id] = " ".join(text.split())
+    return found
+
+
+@functools.lru_cache(maxsize=16)
+def _class_bodies(source: str) -> dict[str, list[ast.stmt]]:
+    """The statements in each class of a module, by the class's qualified name."""
+    found: dict[str, list[ast.stmt]] = {}
+    waiting: list[tuple[str, ast.AST]] = [("", ast.parse(source))]
+    while waiting:
+        within, node = waiting.pop()
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.ClassDef):
+                found.setdefault(f"{within}{child.name}", child.body)
+                waiting.append((f"{within}{child.name}.", child))
+            elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+                waiting.append((f"{within}{child.name}.<locals>.", child))
+            elif isinstance(child, ast.stmt):
+                waiting.append((within, child))
     return found
 
 

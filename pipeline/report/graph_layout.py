@@ -4,8 +4,12 @@ Wires go from left to right: layers by the longest path, ordered by barycentres.
 of what runs every tick. A wire that is longer than a layer passes between the boxes of those that it crosses.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
 
 from .drawn_graph import DrawnGraph, DrawnNode, DrawnWire, class_name, is_truth, node_of, origins_of
 
@@ -39,7 +43,7 @@ class Box:
     y: float = 0.0
     width: float = 0.0
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Number of its rows of ports."""
         return (
@@ -48,7 +52,7 @@ class Box:
             else max(len(self.inputs), len(self.outputs))
         )
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Its height in pixels."""
         return TITLE + ROW * self.rows + (PAD if self.rows else 0)
@@ -213,56 +217,72 @@ def _layers(graph: DrawnGraph, boxes: dict[str, Box], flow: list[Box]) -> tuple[
 
 def _order(layers: list[list[Item]], links: list[Link]) -> None:
     """Order each layer by the barycentre of its neighbours, sweeping there and back; the best order seen is kept."""
-    best, fewest = [list(layer) for layer in layers], _crossings(layers, links)
+    entering, leaving = _by_item(links)
+    for layer in layers:
+        _stack(layer)
+    best, fewest = [list(layer) for layer in layers], _crossings(layers, leaving)
     for sweep in range(24):
         forward = sweep % 2 == 0
         sequence = range(1, len(layers)) if forward else range(len(layers) - 2, -1, -1)
         for number in sequence:
-            _stack(layers)
-            centre = {id(item): _barycentre(item, links, forward) for item in layers[number]}
+            around = entering if forward else leaving
+            centre = {id(item): _barycentre(item, around[id(item)], forward) for item in layers[number]}
             layers[number].sort(key=lambda item: (centre[id(item)], item.y))
-        now = _crossings(layers, links)
+            _stack(layers[number])
+        now = _crossings(layers, leaving)
         if now < fewest:
             best, fewest = [list(layer) for layer in layers], now
     for number, layer in enumerate(best):
         layers[number] = layer
 
 
-def _stack(layers: list[list[Item]]) -> None:
-    for layer in layers:
-        y = -sum(item.height + GAP for item in layer) / 2
-        for item in layer:
-            item.y = y
-            y += item.height + GAP
+Links = dict[int, list[Link]]
+"""Links by the `id` of an item."""
+
+
+def _by_item(links: Iterable[Link]) -> tuple[Links, Links]:
+    """The links that enter each item, and those that leave it."""
+    entering: Links = defaultdict(list)
+    leaving: Links = defaultdict(list)
+    for link in links:
+        entering[id(link.end)].append(link)
+        leaving[id(link.start)].append(link)
+    return entering, leaving
+
+
+def _stack(layer: list[Item]) -> None:
+    y = -sum(item.height + GAP for item in layer) / 2
+    for item in layer:
+        item.y = y
+        y += item.height + GAP
 
 
 def _barycentre(item: Item, links: Iterable[Link], forward: bool) -> float:
-    if forward:
-        around = [link.start_y for link in links if link.end is item]
-    else:
-        around = [link.end_y for link in links if link.start is item]
+    around = [link.start_y if forward else link.end_y for link in links]
     return sum(around) / len(around) if around else item.y + item.height / 2
 
 
-def _crossings(layers: list[list[Item]], links: list[Link]) -> int:
-    _stack(layers)
+def _crossings(layers: list[list[Item]], leaving: Links) -> int:
     count = 0
     for layer in layers:
-        leaving = [(link.start_y, link.end_y) for item in layer for link in links if link.start is item]
-        for number, (start, end) in enumerate(leaving):
-            count += sum((start - s) * (end - e) < 0 for s, e in leaving[:number])
+        ends = [(link.start_y, link.end_y) for item in layer for link in leaving[id(item)]]
+        start, end = np.array(ends).reshape(-1, 2).T
+        crossed = np.subtract.outer(start, start) * np.subtract.outer(end, end) < 0
+        count += int(np.count_nonzero(crossed)) // 2
     return count
 
 
 def _place(layers: list[list[Item]], links: list[Link]) -> None:
     """Heights at which wires run as straight as the order of the boxes allows."""
-    _stack(layers)
+    entering, leaving = _by_item(links)
+    for layer in layers:
+        _stack(layer)
     for sweep in range(16):
         for layer in layers if sweep % 2 == 0 else layers[::-1]:
             wishes = []
             for item in layer:
-                pulls = [link.start_y - (link.end_y - item.y) for link in links if link.end is item]
-                pulls += [link.end_y - (link.start_y - item.y) for link in links if link.start is item]
+                pulls = [link.start_y - (link.end_y - item.y) for link in entering[id(item)]]
+                pulls += [link.end_y - (link.start_y - item.y) for link in leaving[id(item)]]
                 wishes.append(sum(pulls) / len(pulls) if pulls else item.y)
             for item, y in zip(layer, _spaced(wishes, [item.height + GAP for item in layer]), strict=True):
                 item.y = y

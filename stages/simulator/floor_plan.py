@@ -9,7 +9,6 @@ from omninav.stages.recordings.occupancy_grid import grid_beside, grid_digest, r
 from omninav.stages.values.floor_plan import FloorPlan
 
 from .config import WorldConfig
-from .world import World, outline
 
 
 class WorldPlan(Stage):
@@ -65,6 +64,8 @@ class DrivenPlan(Stage):
 
 def plan_of(world: WorldConfig, day: int) -> FloorPlan:
     """A simulated world's plan on a day."""
+    from .world import World, outline  # slow to import, and not needed for recorded logs
+
     outlines = np.array([outline(box) for box in World(world, day).obstacles]).reshape(-1, 4, 2)
     width, depth = world.size
     return FloorPlan(outlines, float(width), float(depth))
