@@ -1,13 +1,12 @@
-"""A run, watched while it goes on: a WebSocket server that Foxglove connects to."""
+"""The WebSocket server that Foxglove connects to."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from omninav.pipeline import BadInput, Bounds, Context, Stage
+from omninav.pipeline import BadInput
 from omninav.pipeline.mcap.message_types import standard_types
 
-from .show_tick import ShownTick
-from .tick_messages import PathSoFar, TopicMessages, tick_messages
+from .tick_messages import TopicMessages
 
 if TYPE_CHECKING:
     import foxglove
@@ -16,34 +15,8 @@ PORT = 8765
 """Foxglove's own default."""
 
 
-class FoxgloveServer(Stage):
-    """Sends the messages of each tick to Foxglove: open connection, ws://localhost:8765.
-
-    The topics are those of `result.mcap` (see `ResultMessages`), and `foxglove_layout.json` of any run shows them. Who
-    connects late gets the last message of each topic; of topics that nobody watches no message is made. Nothing that a
-    run writes depends on it. A later run of the same process goes on with the same server. Raises `BadInput` where
-    foxglove-sdk is missing or the port is taken.
-    """
-
-    port: bool | Annotated[int, Bounds(ge=1, le=65535)] = False
-    """Port to listen on; true: 8765; false: nothing is served."""
-    host: str = "127.0.0.1"
-    """Address to listen on: this machine alone; 0.0.0.0: every machine that reaches this one may watch."""
-
-    def setup(self, ctx: Context) -> None:
-        """Start the server, or clear what it showed of an earlier run."""
-        if self.port is not False:
-            self._server = _server(self.host, PORT if self.port is True else int(self.port))
-            self._server.clear()
-
-    def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> None:
-        """One tick."""
-        if self.port is not False:
-            self._server.send(shown.tick.stamp, tick_messages([shown], before))
-
-
 @dataclass
-class _Server:
+class FoxgloveServer:
     """A running server, its channels, and the stamp of the last message on each with what makes it."""
 
     context: Any
@@ -52,10 +25,12 @@ class _Server:
     server: Any = None
 
     def clear(self) -> None:
+        """Forget what was shown of an earlier run."""
         self.last.clear()
         self.server.clear_session()
 
     def send(self, stamp: int, messages: list[TopicMessages]) -> None:
+        """Send messages at a time (ns) to whoever watches their topics."""
         for each in messages:
             channel = self.channels.get(each.topic) or self._open(each.topic, each.msgtype)
             self.last[channel.id()] = channel, stamp, each
@@ -82,17 +57,18 @@ class _Server:
             known.log(messages.encode()[0], log_time=stamp)
 
 
-_servers: dict[tuple[str, int], _Server] = {}
+_servers: dict[tuple[str, int], FoxgloveServer] = {}
 
 
-def _server(host: str, port: int) -> _Server:
+def foxglove_server(host: str, port: int) -> FoxgloveServer:
+    """The server at an address; a later run of the same process goes on with the same one. Raises `BadInput`."""
     if (host, port) in _servers:
         return _servers[host, port]
     try:
         import foxglove
     except ImportError:
         raise BadInput("watch: foxglove-sdk is not installed: pip install 'omninav[live]'") from None
-    made = _Server(foxglove.Context())
+    made = FoxgloveServer(foxglove.Context())
     try:
         made.server = foxglove.start_server(
             name="omninav",

@@ -77,6 +77,7 @@ TESTS = {
         "tests/foxglove/test_foxglove.py",
         "test_foxgloves_client_watches_a_run_and_gets_what_was_sent_before_it_came",
     ),
+    "Rerun": ("tests/stages/plots/test_rerun_view.py", "test_only_this_computer_is_served"),
 }
 """The beginning of an item of the page -> file and name of its test."""
 

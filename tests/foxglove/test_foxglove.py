@@ -14,9 +14,9 @@ from result_of import shown_of, write_result
 from small_run import mixture_run, small_run
 
 from omninav.pipeline import BadInput, Context
-from omninav.stages.plots.foxglove_server import FoxgloveServer
 from omninav.stages.plots.small_panorama import SmallPanorama
 from omninav.stages.plots.tick_messages import PathSoFar
+from omninav.stages.plots.watch_run import WatchRun
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence
@@ -99,7 +99,7 @@ def test_the_layout_shows_the_topics_that_runs_write(logs):
 @needs_node
 def test_foxgloves_client_watches_a_run_and_gets_what_was_sent_before_it_came():
     run, port = small_run(frames=4), free_port()
-    server, ctx = FoxgloveServer(port=port), Context("watch")
+    server, ctx = WatchRun(viewer=port), Context("watch")
     server.setup(ctx)
     first, *others = shown_of(run, plan=PLAN)
     before = PathSoFar()
@@ -120,7 +120,7 @@ def test_a_missing_library_and_a_taken_port_are_one_line(monkeypatch):
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(BadInput, match=rf"^watch: 127.0.0.1:{port} cannot be listened on .*watch=PORT[^\n]*$"):
-            FoxgloveServer(port=port).setup(Context("watch"))
+            WatchRun(viewer=port).setup(Context("watch"))
         monkeypatch.setitem(sys.modules, "foxglove", None)
         with pytest.raises(BadInput, match="foxglove-sdk is not installed: pip install 'omninav"):
-            FoxgloveServer(port=port + 1).setup(Context("watch"))
+            WatchRun(viewer=port + 1).setup(Context("watch"))

@@ -5,7 +5,7 @@ from small_run import mixture_run, small_run
 
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.plots.foxglove_server import _Server
+from omninav.stages.plots.foxglove_server import FoxgloveServer
 from omninav.stages.plots.markers import GREEN, PINK, gaussian_markers, homing_arrow, weighted_points
 from omninav.stages.plots.panorama_snapshot import EncodedPanorama
 from omninav.stages.plots.pose_messages import covariance_6x6, header, pose_messages, ros_pose, transform
@@ -148,7 +148,7 @@ def test_no_message_is_made_of_a_topic_that_nobody_watches(run):
     messages, encoded = tick_messages([shown], PathSoFar()), []
     for each in messages:
         each.encode = lambda topic=each.topic, encode=each.encode: encoded.append(topic) or encode()
-    server = _Server(None, server=Listener())
+    server = FoxgloveServer(None, server=Listener())
     server.channels = {each.topic: Channel(n, each.topic == "/tf") for n, each in enumerate(messages)}
     server.send(7, messages)
     assert encoded == ["/tf"]
