@@ -17,6 +17,7 @@ from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.requests import Restart
+from omninav.stages.values.track import Track
 
 from .covariance_intersection import alpha_of_min_determinant
 
@@ -32,16 +33,22 @@ OUTLIER_SHARE = 1e-3
 MIN_PROPOSED = 0.5
 """Probability of a pose from which on it proposes a place where the belief is not: beside the mapped way, where no pose
 is right, one in six images has one that is metres off."""
+CARRIED, MIN_PROPOSED_CARRIED = 0.5, 0.1
+"""Probability that a robot that was surely carried is elsewhere, and `MIN_PROPOSED` until it is found there."""
 INDEPENDENT = 4.0
 """Distance driven, in length scales, after which a pose against the belief is new evidence: until then images show the
 same things, and in a store's unmapped aisle twelve in a row over 2.6 m agreed on one wrong place."""
 
 
 class LandmarkUpdateState(State):
-    """The poses (K, 3) of the last fix, carried to where the robot is now, and the way driven since (m)."""
+    """The poses (K, 3) of the last fix, carried to where the robot is now, and the way driven since (m).
+
+    `elsewhere`: probability that it was carried to where no pose has been proposed since.
+    """
 
     poses: Array = field(default_factory=lambda: np.empty((0, 3)))
     driven: float = 0.0
+    elsewhere: float = 0.0
 
 
 class LandmarkUpdate(Stage):
@@ -77,15 +84,21 @@ class LandmarkUpdate(Stage):
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
         restart: Restart | None = None,
+        track: Track | None = None,
     ) -> Out:
         """Fuse belief and fix."""
         if motion is None or ctx.tick.first_of_log or restart is not None:
-            last.poses, last.driven = np.empty((0, 3)), 0.0
+            last.poses, last.driven, last.elsewhere = np.empty((0, 3)), 0.0, 0.0
         else:
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
             last.driven += math.hypot(motion.x, motion.y)
+        if track is not None and track.carried:
+            last.elsewhere = CARRIED
         if fix is None or not len(fix):
             return self.Out(belief=belief)
+        elsewhere = max(last.elsewhere, self.kidnapping_probability)
+        least = MIN_PROPOSED if elsewhere == self.kidnapping_probability else MIN_PROPOSED_CARRIED
+        last.elsewhere *= 1.0 - min(float(fix.probabilities.sum()), 1.0)
         novelty = self._novelty(last, belief, fix.poses[0], metres_of(length_scale))
         last.poses, last.driven = fix.poses, 0.0
         sure = np.minimum(fix.probabilities, 1.0 - OUTLIER_SHARE)
@@ -111,9 +124,9 @@ class LandmarkUpdate(Stage):
                 old[near] = belief.weights[near] * unsaid * counted
                 poses.append(self._drawn(ctx, centre, product))
                 weights.append(np.full(self.particles, share * agreement * counted / self.particles))
-            if probability < MIN_PROPOSED:
+            if probability < least:
                 continue
-            new = self.kidnapping_probability * novelty * probability**novelty
+            new = elsewhere * novelty * probability**novelty
             recovery.append((self._drawn(ctx, mean, covariance), np.full(self.particles, new / self.particles)))
         return self.Out(belief=self._resampled(ctx, poses, weights, recovery))
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State
-from omninav.stages.geometry.landmarks.unbroken_view import carried_at_most
+from omninav.stages.geometry.landmarks.unbroken_view import Carried, carried
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Particles
@@ -42,12 +42,14 @@ class UnbrokenTrackState(State):
     `since`: way since then, on which the robot may have been carried as far as `carried`; `against`: way on which
     landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m). `bearings`
     (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
+    `surely_carried`: the last image did not show the surroundings of the one before it.
     """
 
     pose: Array = field(default_factory=lambda: np.zeros(3))
     confirmed: float = 0.0
     since: float = 0.0
     carried: float = 0.0
+    surely_carried: bool = False
     against: float = 0.0
     elsewhere: float = 0.0
     moved: Array = field(default_factory=lambda: np.zeros(3))
@@ -104,7 +106,7 @@ class UnbrokenTrack(Stage):
             state.since += math.hypot(motion.x, motion.y)
         if state.since > MAX_SINCE * unit:
             state.confirmed = 0.0
-        left_out = np.zeros(0 if fix is None else len(fix), np.bool_)
+        left_out, state.surely_carried = np.zeros(0 if fix is None else len(fix), np.bool_), False
         if features is not None:
             left_out = self._left_out(state, belief, features, fix, unit)
         holds = state.against < state.confirmed
@@ -112,7 +114,7 @@ class UnbrokenTrack(Stage):
             belief = without_recovery(belief)
         if fix is not None and holds and left_out.any():
             fix = None if left_out.all() else fix.without(left_out)
-        return self.Out(belief=belief, track=Track(holds), fix=fix)
+        return self.Out(belief=belief, track=Track(holds, state.surely_carried), fix=fix)
 
     def _left_out(
         self,
@@ -132,8 +134,9 @@ class UnbrokenTrack(Stage):
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_)
-        if state.confirmed:
-            state.carried = max(state.carried, carried_at_most(before, now, moved))
+        how = carried(before, now, moved) if len(before[0]) else Carried(math.inf, False)
+        state.carried = max(state.carried, how.at_most)
+        state.surely_carried = how.surely and driven < NEAR[0]
         if math.isinf(state.carried):
             state.confirmed, state.carried = 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before

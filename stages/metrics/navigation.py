@@ -28,6 +28,7 @@ QUANTITIES = {
     "navigation.time_s": Quantity(title="Time", better="lower"),
     "navigation.path_length_m": Quantity(title="Path length"),
     "navigation.shortest_m": Quantity(title="Shortest path", context=True),
+    "navigation.lost_m_per_km": Quantity(title="Metres driven while lost, per kilometre", better="lower"),
     "navigation.routes": Quantity(title="Routes planned", better="lower"),
     "navigation.goal": Quantity(setting=True),
     "navigation.state": Quantity(title="Route at the end"),
@@ -41,7 +42,7 @@ HEADLINES = tuple(
 ENDS = ("arrived", "gave up")
 """States of a route after which the robot does not drive on."""
 WITHIN_M = 0.5
-"""Largest distance from the goal at which it is reached, metres."""
+"""Largest distance from the goal at which it is reached, and error of an estimate that is not lost, metres."""
 
 
 class Navigation(MetricStage):
@@ -54,8 +55,9 @@ class Navigation(MetricStage):
     `routes`: how many it planned;
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
-    seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Truth of the map's poses
-    that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
+    seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. `lost_m_per_km`: metres
+    of a kilometre that a simulated robot drove while its estimate was 0.5 m off, or there was none. Truth of the map's
+    poses that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
     """
 
     def step(
@@ -110,7 +112,16 @@ class Navigation(MetricStage):
             if reached and shortest:
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
+        if len(tallied):
+            found["lost_m_per_km"] = lost_metres(drive.at(slice(begun, None)))
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
+
+
+def lost_metres(drive: Drive) -> float | None:
+    """Metres of a kilometre that were driven from ticks whose estimate was too far off; None of a robot that stood."""
+    steps = np.diff(drive.distance)
+    lost = ~(np.hypot(*(drive.estimate - drive.truth)[:-1, :2].T) <= WITHIN_M)
+    return 1000.0 * float(steps[lost].sum() / steps.sum()) if steps.sum() > 0.0 else None
 
 
 def first_of_last_goal(routes: Sequence[PlannedRoute | None]) -> int:

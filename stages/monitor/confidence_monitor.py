@@ -30,6 +30,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.requests import Restart
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.track import Track
 
 Array = npt.NDArray[np.float64]
 
@@ -83,8 +84,9 @@ class ConfidenceMonitorState(State):
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
     `sure`: the estimate was since the robot began; `empty`: images in a row that say nothing.
-    `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
-    then, how surely the images so far would have shown some there, 0 to 1."""
+    `geometry`: log odds of right by landmarks; `found`: these have shown that the
+    robot is on the map; `missed`: until then, how surely the images so far would have shown some there, 0 to 1.
+    """
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
@@ -103,7 +105,6 @@ class ConfidenceMonitorState(State):
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
         self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
-        self.sure, self.empty = False, 0
 
     def told(self, probability: float) -> TrackingState:
         """The state that follows from the confidence; remembers that the robot was sure."""
@@ -179,13 +180,17 @@ class ConfidenceMonitor(Stage):
         restart: Restart | None = None,
         fix: LandmarkFix | None = None,
         features: LocalFeatures | None = None,
+        track: Track | None = None,
     ) -> Out:
         """One image, or a tick without one. `likelihood`: of the same image, for its novelty; `features`: in which
         landmarks were looked for."""
         if ctx.tick.first_of_log or restart is not None:
             recent.forget()
+            recent.sure, recent.empty = False, 0
         elif motion is not None:
             recent.move(motion)
+        if track is not None and track.carried:
+            recent.forget()
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
         if similarities is not None and similarities.values.size:

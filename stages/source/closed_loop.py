@@ -13,7 +13,7 @@ from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
-from omninav.stages.simulator.drawn_starts import drawn_way_back
+from omninav.stages.simulator.drawn_starts import drawn_pose, drawn_way_back
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
@@ -81,6 +81,9 @@ class ClosedLoop(Source):
     carried_m: Annotated[float, Bounds(ge=0)] = 0.0
     """With a drawn start: how far away (m) somebody puts it down after half a second, where the straight way back is
     free."""
+    kidnapped_every_m: Annotated[float, Bounds(ge=0)] = 0.0
+    """How far it drives (m) until somebody puts it down elsewhere, anywhere on the free floor, again and again; 0:
+    never."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     """How long it drives at most."""
     rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
@@ -148,7 +151,7 @@ class ClosedLoop(Source):
     def _drive(self, ctx: Context, simulation: ClosedLoopState, command: Command) -> Motion:
         """One tick under a command, and what the wheels say of it."""
         robot, now = simulation.robot, simulation.ticks / self.rate_hz
-        before = robot[:3].copy()
+        before, driven = robot[:3].copy(), robot[DISTANCE]
         people = round_bodies(self._people(simulation))
         steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate_hz, self._room, people)
         rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
@@ -156,6 +159,10 @@ class ClosedLoop(Source):
         for kidnapping in self._kidnappings:
             if now - 1.0 / self.rate_hz < kidnapping.at <= now:
                 teleport(robot, kidnapping)
+        if self.kidnapped_every_m and robot[DISTANCE] // self.kidnapped_every_m > driven // self.kidnapped_every_m:
+            x, y, heading = drawn_pose(self._world, ctx.rng).tolist()
+            teleport(robot, Kidnapping(at=now, to=(x, y, heading)))
+            ctx.count("kidnapped")
         return Motion(*(float(value) for value in rolled))
 
     def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:

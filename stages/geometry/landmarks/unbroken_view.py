@@ -1,6 +1,7 @@
 """Tells how far a robot may have been carried between two images."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,24 +31,37 @@ SAME_SURROUNDINGS, SURROUNDINGS_M = 40, 5.0
 row 98 % have 50 and more, also where the camera was lifted; of images more than 3 m off 98 % have fewer than 24."""
 SAME_HEADING = 0.7
 """Mean cosine of the turns of their matches against odometry's, above which the robot was not turned."""
+MIN_FEATURES, MIN_MATCHED = 100, 0.15
+"""Features of both images, and the share of them that match, below which they show different surroundings: of 2,437
+images in a row (a house, offices, stores, game levels, grass) one had so few, of images 1.5 m and more apart 92 to
+100 % (docs/experiments/landmarks.md)."""
 
 
-def carried_at_most(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> float:
-    """Bounds how far (m) from where odometry says an image was taken: by 0 if it continues the one before.
+class Carried(NamedTuple):
+    """How far (m) from where odometry says a robot may have been carried, `at_most`, and whether it `surely` was."""
+
+    at_most: float
+    surely: bool
+
+
+def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> Carried:
+    """Compares an image with the one before; what continues it was not carried.
 
     Of both: bearings (N, 3) and descriptors (N, D); `motion` (3,) between them.
     """
     pairs = mutual_nearest_units(root_descriptors(before[1]), root_descriptors(now[1]), RATIO)
     first = np.ascontiguousarray(before[0][pairs.first])
     second = np.ascontiguousarray(now[0][pairs.second])
+    seen = min(len(before[0]), len(now[0]))
+    surely = seen >= MIN_FEATURES and len(first) < MIN_MATCHED * seen
     number = max(_fitting(first, second, motion + np.array([0.0, 0.0, by])) for by in TURNS)
     if number >= max(MIN_FITTING, MIN_SHARE * len(first)):
-        return 0.0
+        return Carried(0.0, False)
     if len(first) < SAME_SURROUNDINGS:
-        return math.inf
+        return Carried(math.inf, surely)
     azimuths = [np.arctan2(each[:, 1], each[:, 0]) for each in (first, second)]
     turned = np.exp(1j * (azimuths[1] - azimuths[0] + motion[2])).mean()  # of far points: the turn odometry missed
-    return SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf
+    return Carried(SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf, surely)
 
 
 def _fitting(first: Array, second: Array, motion: Array) -> int:
