@@ -42,14 +42,12 @@ class UnbrokenTrackState(State):
     `since`: way since then, on which the robot may have been carried as far as `carried`; `against`: way on which
     landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m). `bearings`
     (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
-    `surely_carried`: the last image did not show the surroundings of the one before it.
     """
 
     pose: Array = field(default_factory=lambda: np.zeros(3))
     confirmed: float = 0.0
     since: float = 0.0
     carried: float = 0.0
-    surely_carried: bool = False
     against: float = 0.0
     elsewhere: float = 0.0
     moved: Array = field(default_factory=lambda: np.zeros(3))
@@ -75,7 +73,8 @@ class UnbrokenTrack(Stage):
     other agrees with it, and no threshold tells. But where landmarks have confirmed the belief, and each image since
     then continues the one before as odometry says, the robot was not carried. So poses elsewhere are left out, and the
     belief's recovery particles too, until they have gone on for as long a way as the belief was confirmed. Where an
-    image does not continue the one before, everything counts: a robot that was carried is found at once.
+    image does not continue the one before, everything counts: a robot that was carried is found at once. Where it shows
+    quite other surroundings, `track` says that the robot was carried, whatever landmarks tell.
     """
 
     class Out(Outputs):
@@ -106,25 +105,26 @@ class UnbrokenTrack(Stage):
             state.since += math.hypot(motion.x, motion.y)
         if state.since > MAX_SINCE * unit:
             state.confirmed = 0.0
-        left_out, state.surely_carried = np.zeros(0 if fix is None else len(fix), np.bool_), False
+        left_out, surely = np.zeros(0 if fix is None else len(fix), np.bool_), False
         if features is not None:
-            left_out = self._left_out(state, belief, features, fix, unit)
+            left_out, surely = self._judged(state, belief, features, fix, unit)
         holds = state.against < state.confirmed
         if holds and belief.recovery_particles:
             belief = without_recovery(belief)
         if fix is not None and holds and left_out.any():
             fix = None if left_out.all() else fix.without(left_out)
-        return self.Out(belief=belief, track=Track(holds, state.surely_carried), fix=fix)
+        return self.Out(belief=belief, track=Track(holds, surely), fix=fix)
 
-    def _left_out(
+    def _judged(
         self,
         state: UnbrokenTrackState,
         belief: Particles,
         features: LocalFeatures,
         fix: LandmarkFix | None,
         unit: float,
-    ) -> Bools:
-        """Keep account of what landmarks say of the track; and which poses (K,) it does not lead to."""
+    ) -> tuple[Bools, bool]:
+        """Keep account of what landmarks say of the track; which poses (K,) it does not lead to, and whether the robot
+        was surely carried to this image."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         driven = math.hypot(moved[0], moved[1])
@@ -133,22 +133,22 @@ class UnbrokenTrack(Stage):
         agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
-            return np.zeros(len(poses), np.bool_)
+            return np.zeros(len(poses), np.bool_), False
         how = carried(before, now, moved) if len(before[0]) else Carried(math.inf, False)
         state.carried = max(state.carried, how.at_most)
-        state.surely_carried = how.surely and driven < NEAR[0]
+        surely = how.surely and driven < NEAR[0]
         if math.isinf(state.carried):
             state.confirmed, state.carried = 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before
             state.elsewhere += driven
             if state.elsewhere >= state.confirmed:
                 state.confirm(poses[0], state.elsewhere)
-            return np.zeros(len(poses), np.bool_)
+            return np.zeros(len(poses), np.bool_), surely
         led = np.array([state.leads_to(pose) for pose in poses], np.bool_)
         out: Bools = ~led & (shares <= CONTRADICTED)
         if fix is not None and (fix.probabilities[out] >= LIKELY).any():
             state.against += driven
-        return out
+        return out, surely
 
 
 def without_recovery(belief: Particles) -> Particles:

@@ -146,7 +146,8 @@ class ConfidenceMonitor(Stage):
     Landmarks say more than any similarity: a sure pose by them outweighs all appearance, for or against
     the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
     robot may be nowhere on the map. So until one is found, in images that have features, appearance is not believed
-    either: it agrees with itself in another building too.
+    either: it agrees with itself in another building too. Where `track` says that the robot was carried, all that was
+    known before is forgotten.
 
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """

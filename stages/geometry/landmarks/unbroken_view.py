@@ -61,7 +61,7 @@ def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array
         return Carried(math.inf, surely)
     azimuths = [np.arctan2(each[:, 1], each[:, 0]) for each in (first, second)]
     turned = np.exp(1j * (azimuths[1] - azimuths[0] + motion[2])).mean()  # of far points: the turn odometry missed
-    return Carried(SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf, surely)
+    return Carried(SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf, False)
 
 
 def _fitting(first: Array, second: Array, motion: Array) -> int:

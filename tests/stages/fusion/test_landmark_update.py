@@ -10,6 +10,7 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.requests import Restart
+from omninav.stages.values.track import Track
 
 HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
 SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
@@ -27,11 +28,18 @@ def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> La
     )
 
 
-def updated(now: Particles, *fixes: LandmarkFix | None, seed: int = 0, motion: Motion | None = None) -> Particles:
+def updated(
+    now: Particles,
+    *fixes: LandmarkFix | None,
+    seed: int = 0,
+    motion: Motion | None = None,
+    carried_at: int | None = None,
+) -> Particles:
+    """The belief after some fixes; at the one with the number `carried_at` the robot is seen to be carried."""
     stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed), Tick(1, 0))
     last = LandmarkUpdateState()
-    for fix in fixes:
-        now = stage.step(ctx, last, now, fix, motion).belief
+    for n, fix in enumerate(fixes):
+        now = stage.step(ctx, last, now, fix, motion, track=Track(False, n == carried_at)).belief
     return now
 
 
@@ -110,6 +118,15 @@ def test_a_pose_that_is_rather_wrong_proposes_no_place() -> None:
     found = updated(belief(HERE), fix_at(THERE, probabilities=(0.45,)))
     assert share_at(found, THERE, 1.0) == 0.0
     assert share_at(updated(belief(HERE), fix_at(THERE, probabilities=(0.55,))), THERE, 1.0) > 0.0
+
+
+def test_a_robot_that_was_carried_is_looked_for_by_poses_that_are_rather_wrong_until_one_is_sure() -> None:
+    poor, sharp, still = fix_at(THERE, probabilities=(0.4,)), belief(HERE, 0.02), Motion(0.0, 0.0, 0.0)
+    assert share_at(updated(sharp, poor, motion=still), THERE) < 0.02
+    assert share_at(updated(sharp, poor, motion=still, carried_at=0), THERE) > 0.7
+    assert share_at(updated(sharp, None, None, poor, motion=still, carried_at=0), THERE) > 0.7  # also by a later image
+    found = updated(sharp, None, fix_at(HERE), poor, motion=still, carried_at=0)  # it was put down where it was
+    assert share_at(found, HERE) > 0.9
 
 
 def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:

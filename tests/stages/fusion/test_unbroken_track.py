@@ -56,16 +56,21 @@ def driven(
     turned_at: int | None = None,
     probability: float = 0.99,
     scale: float = 0.5,
+    dark_at: int | None = None,
+    step: float = 0.3,
 ) -> list:
     """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show the twin
-    hall; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not measure."""
-    poses = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    hall; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not measure; the
+    one of `dark_at` shows nothing."""
+    poses = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0
     if turned_at is not None:
         poses[turned_at:, 2] += math.pi
     images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
-    believed = np.column_stack([0.3 * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    if dark_at is not None:
+        images[dark_at] = none_found()
+    believed = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     for n in range(IMAGES):
         motion = Motion(*between(believed[n - 1], believed[n]).tolist()) if n else None
         spread = np.random.default_rng(n).normal(0.0, 0.05, (100, 3))
@@ -87,6 +92,14 @@ def test_a_robot_that_was_carried_may_be_anywhere_at_once():
     out = driven(twin_from=10, jump_at=10)
     assert all(each.fix is not None for each in out)
     assert not out[10].track.unbroken
+
+
+def test_an_image_of_other_surroundings_tells_that_the_robot_was_carried_and_blinking_eyes_do_not():
+    away = driven(twin_from=10, jump_at=10, probability=0.9)  # landmarks are never sure
+    assert [n for n, each in enumerate(away) if each.track.carried] == [10]
+    assert not any(each.track.carried for each in driven(twin_from=10, probability=0.9, dark_at=10))
+    assert not any(each.track.carried for each in driven(twin_from=10, jump_at=10, dark_at=10, probability=0.9))
+    assert not any(each.track.carried for each in driven(twin_from=10, probability=0.9, step=1.5))
 
 
 def test_a_track_that_was_never_sure_rules_nothing_out():

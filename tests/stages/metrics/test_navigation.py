@@ -1,6 +1,7 @@
 """What became of a drive to a goal, on a corner of two legs."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from made_places import made_map
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.metrics.navigation import Navigation, shortest_metres
+from omninav.stages.metrics.navigation import Navigation, lost_metres, shortest_metres
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
@@ -52,6 +53,14 @@ def test_of_a_real_robot_no_contacts_are_claimed_and_odometry_measures_its_path(
     assert found["reached"]
     assert not {"collisions", "collision_free_rate"} & found.keys()
     assert found["path_length_m"] == 0.0  # it knows of no motion
+
+
+def test_metres_driven_while_the_estimate_is_wrong_are_lost_and_none_of_a_robot_that_stands():
+    truth, driven = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [4, 0, 0]]), np.array([0.0, 1.0, 2.0, 4.0])
+    estimate = truth + np.array([[0.4, 0, 0], [0.6, 0, 0], [np.nan] * 3, [9, 0, 0]])
+    drive = SimpleNamespace(truth=truth, estimate=estimate, distance=driven)
+    assert lost_metres(drive) == pytest.approx(750.0)
+    assert lost_metres(SimpleNamespace(truth=truth, estimate=estimate, distance=np.zeros(4))) is None
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.track import Track
 from omninav.stages.values.visual_words import words_of
 
 SCALE = LengthScale(0.3)
@@ -55,6 +56,7 @@ def stated(
     map: ReferenceGraph = LINE,
     features: LocalFeatures | None = None,
     fixes: Sequence[LandmarkFix | None] = (),
+    carried_at: int | None = None,
 ) -> list[PoseConfidence]:
     """Confidences and states along a line; the best match of each image is given (None: no image), `elsewhere` the
     similarity of all references or of every so-many-th, and the estimate follows odometry."""
@@ -75,7 +77,7 @@ def stated(
         fix = fixes[n] if n < len(fixes) else None
         out = monitor.step(
             ctx, recent, belief, belief.estimate(), map, SCALE, wrong, seen, likelihood, motion,
-            features=None if match is None else features, fix=fix,
+            features=None if match is None else features, fix=fix, track=Track(True, n == carried_at),
         )  # fmt: skip
         told.append(out.confidence)
     return told
@@ -302,6 +304,9 @@ def test_until_landmarks_are_found_matches_that_agree_are_not_believed():
     )  # fmt: skip
     map = replace(LINE, landmarks=landmarks)
     way = list(range(20))
+    found = [fix(float(x), 0.99) for x in range(10)]
+    told = stated(way, map=map, features=features(200), fixes=[*found, None, None, fix(12.0, 0.99)], carried_at=10)
+    assert [each.state for each in told[9:13]] == ["tracking", "lost", "lost", "tracking"]
     assert max(drive(way, map=map, features=features(200))) < 0.05
     assert drive(way, map=map, features=features(10))[-1] > 0.9  # dark images show no landmarks on the map either
     blind = drive([*way, None, None, None], map=map, features=features(200))

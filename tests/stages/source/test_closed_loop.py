@@ -133,6 +133,21 @@ def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
     assert abs(after.motion.x) < 0.05
 
 
+def test_it_is_put_down_anywhere_every_so_many_metres_and_elsewhere_for_each_seed():
+    put = []
+    for seed in (0, 0, 1):
+        loop = Loop(seed, world=EXACT, start=(1.5, 1.3, 0.0), kidnapped_every_m=0.5)
+        spots = np.array(
+            [(out.truth.x, out.truth.y) for out in (loop.step(Command(0.4, 0.0)) for _ in range(20)) if out]
+        )
+        jumps = np.flatnonzero(np.hypot(*np.diff(spots, axis=0).T) > 0.3)
+        assert 1 <= len(jumps) <= 3
+        assert World(EXACT, 1).is_free(spots[jumps + 1], EXACT.robot.radius).all()
+        put.append(spots[jumps[0] + 1])
+    assert np.array_equal(put[0], put[1])
+    assert not np.array_equal(put[0], put[2])
+
+
 def test_its_images_are_blurred_by_its_motion_around_their_tick():
     """What it sees is the mean over where it is about to be and has just been; at rest it is one picture."""
     quiet = replace(EXACT, sensor=Sensor(noise=0.0, exposure_drift=0.0, shutter=0.1))
