@@ -21,6 +21,7 @@ needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recor
 
 settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # what one process compiles, those that tests start later read
 gc.set_threshold(50_000)  # as in `omninav`: what pytest has imported is looked through less often
 
 

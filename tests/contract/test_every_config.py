@@ -17,11 +17,9 @@ from omninav.pipeline.cli.commands.simulate import LIVE
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import config_file, option_content, settings_left_open
-from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment, without_graph
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.cli.variant_inputs import inputs_of
-from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
@@ -97,9 +95,7 @@ def command_composes(path: Path) -> None:
         assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     words = [word for word in command if not word.startswith("-")]
     words = [*LIVE, *words[1:]] if words[:1] == ["simulate"] else words
-    if group(path) == "experiment":  # its conditions are composed with their graphs, in test_every_experiment.py
-        without_graph(words)
-    else:
+    if group(path) != "experiment":  # these are composed, with their conditions, in test_every_experiment.py
         compose(with_unlisted_parameters(words, []))
 
 
@@ -199,20 +195,6 @@ def declares_its_inputs(variant: str) -> None:
     if read != declared:  # what else it declares, it reads on a robot
         live = compose([f"variant={variant}", "source=live"])
         assert declared <= read | settings_read(live)
-
-
-def test_every_experiment_can_be_read():
-    assert_each(FOLDERS["experiment"], can_be_read)
-
-
-def can_be_read(path: Path) -> None:
-    option = path.relative_to(CONF / "experiment").with_suffix("")
-    config = resolved_but_for_the_experiment(without_graph([f"+experiment={option}"]))
-    for profile in ("full", "quick"):
-        experiment = read_experiment(config["experiment"], profile)
-        measures_alone = path.parent.name == "recordings" or path.stem in ("home_store", "office")  # to start from
-        assert experiment.claims or measures_alone
-        assert experiment.conditions()
 
 
 def test_every_group_is_listed_before_the_variant():

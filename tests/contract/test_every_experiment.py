@@ -43,6 +43,21 @@ def typed(found, condition):
     return with_unlisted_parameters(own if named else [f"variant={found.variant}", *own], [])
 
 
+def test_every_experiment_can_be_read_by_the_command_in_its_file():
+    assert_each(ALL, can_be_read)
+
+
+def can_be_read(name):
+    command = (CONF / f"{name}.yaml").read_text().split("\n")[1].partition("  omninav ")[2]
+    config = resolved_but_for_the_experiment(without_graph(shlex.split(command)))
+    folder, _, stem = name.partition("/")
+    for profile in ("full", "quick"):
+        experiment = read_experiment(config["experiment"], profile)
+        measures_alone = folder == "recordings" or stem in ("home_store", "office")  # to start from
+        assert experiment.claims or measures_alone
+        assert experiment.conditions()
+
+
 def test_each_page_shows_how_far_odometry_alone_would_have_gone_wrong():
     assert_each(NAMES, shows_odometry_alone)
 

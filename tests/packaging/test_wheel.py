@@ -114,6 +114,7 @@ def test_an_installed_wheel_makes_a_map_and_localises_in_it_in_an_empty_folder(w
     python, empty = tmp_path / "environment" / "bin" / "python", tmp_path / "empty"
     where = call(python, "-c", "import omninav; print(omninav.__file__)", cwd=empty, PYTHONPATH="").strip()
     assert Path(where).is_relative_to(installed)
-    call(python, "-m", "omninav", "landmarks=none", "rate=1", cwd=empty, PYTHONPATH="")
+    tour, drive = (ROOT / "tests" / "data" / f"{name}.mcap" for name in ("tour", "drive"))
+    call(python, "-m", "omninav", "landmarks=none", f"tour={tour}", f"log={drive}", cwd=empty, PYTHONPATH="")
     assert (empty / "runs" / "latest" / "report.html").exists()
     assert [path.name for path in empty.iterdir()] == ["runs"]
