@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from hydra import compose
 from omegaconf import OmegaConf
@@ -27,17 +28,16 @@ def variants_page() -> dict[str, str]:
         default = f"{compose('config').variant}.yaml"
         for file in sorted(group_files("variant"), key=lambda file: (file.name != default, file.name)):
             name = file.name.removesuffix(".yaml")
-            lines += _described(name, file.read_text(encoding="utf-8"))
             config = compose("config", overrides=[f"variant={name}", *NEEDED.get(name, [])])
+            lines += _described(name, file.read_text(encoding="utf-8"), config.inputs)
             pictures[f"reference/{name}.svg"] = svg(plan(complete(config)).graph)
     return {"reference/variants.md": "\n".join(lines)} | pictures
 
 
-def _described(name: str, text: str) -> Iterator[str]:
+def _described(name: str, text: str, declared: Any) -> Iterator[str]:
     says = next(line for line in text.split("\n") if line.startswith("# ") and "@package" not in line).lstrip("# ")
     what, _, typed = says.partition("  omninav ")
     yield f"\n## {name}\n\n{what[:1].upper()}{what[1:]}\n\n```\nomninav {typed}\n```\n"
-    declared = compose("config", overrides=[f"variant={name}"]).inputs
     inputs = read_inputs({"inputs": OmegaConf.to_container(declared)})
     if inputs:
         yield "| input | what | |\n|---|---|---|"

@@ -24,7 +24,7 @@ from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.run.inputs import read_inputs
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.plan import Plan, plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 OPTIONS = CONF / "options.yaml"
@@ -157,11 +157,11 @@ def test_every_variant_builds():
 
 
 def builds(variant: str) -> None:
-    planned = plan(complete(compose([f"variant={variant}"])))
-    assert planned.variant == variant
-    assert planned.graph.nodes
+    found = planned(variant)
+    assert found.variant == variant
+    assert found.graph.nodes
     if compose([f"variant={variant}"]).artifacts.get("map"):
-        learned = plan(complete(compose([f"variant={variant}", "learn=map"])))
+        learned = planned(variant, "learn=map")
         assert learned.variant == f"{variant}_map"
         assert "map" in learned.saves
 
@@ -177,8 +177,12 @@ def test_every_variant_builds_without_what_it_is_measured_by():
 
 
 @functools.cache
+def planned(variant: str, *words: str) -> Plan:
+    return plan(complete(compose([f"variant={variant}", *words])))
+
+
 def nodes_of(variant: str, *words: str) -> set[str]:
-    return set(plan(complete(compose([f"variant={variant}", *words]))).graph.nodes)
+    return set(planned(variant, *words).graph.nodes)
 
 
 def test_a_variant_declares_the_inputs_that_its_graph_reads():
