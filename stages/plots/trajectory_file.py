@@ -1,5 +1,8 @@
 """Trajectories in the TUM format, which evo and others read."""
 
+from pathlib import Path
+from typing import Literal
+
 import numpy as np
 
 from omninav.pipeline import Context, Stage
@@ -11,26 +14,37 @@ class TrajectoryFile(Stage):
     """Writes `trajectory.tum`, a row per image: header stamp (s), x y z (m), quaternion qx qy qz qw; map frame.
 
     With several logs there is a `trajectory_<n>.tum` for each, and `trajectory.tum` is the last. Frames without an
-    estimate have no row and are counted.
+    estimate have no row and are counted. `truth.tum` is the same of the true poses that are known: `evo_ape tum
+    truth.tum trajectory.tum`.
     """
 
     name: str = "trajectory"
     """The file's name without its ending."""
+    truth: str | None = "truth"
+    """The same of the file of true poses; null: none."""
 
     def step(self, ctx: Context, drive: Drive) -> None:
         """The whole run at once."""
-        logs = {}
         for log in drive.by_log:
-            number, estimated = int(log.log[0]), known(log.estimate)
-            for frame in log.frames[~estimated]:
-                ctx.count("frame_without_estimate", detail=f"frame {frame} of log {number} has no estimate")
-            rows = zip(log.stamps[estimated].tolist(), log.estimate[estimated], strict=True)
-            logs[number] = "".join(tum_row(stamp, pose) for stamp, pose in rows)
-        if ctx.folder is not None:
-            for number, text in logs.items():
-                if len(logs) > 1:
-                    write_whole(ctx.folder / f"{self.name}_{number}.tum", text)
-            write_whole(ctx.folder / f"{self.name}.tum", logs[max(logs)] if logs else "")
+            for frame in log.frames[~known(log.estimate)]:
+                ctx.count("frame_without_estimate", detail=f"frame {frame} of log {log.log[0]} has no estimate")
+        if ctx.folder is None:
+            return
+        _write(ctx.folder, self.name, drive, "estimate")
+        if self.truth is not None and drive.has_truth:
+            _write(ctx.folder, self.truth, drive, "truth")
+
+
+def _write(folder: Path, name: str, drive: Drive, column: Literal["estimate", "truth"]) -> None:
+    texts = {}
+    for log in drive.by_log:
+        poses = getattr(log, column)
+        there = known(poses)
+        texts[int(log.log[0])] = "".join(map(tum_row, log.stamps[there].tolist(), poses[there]))
+    for number, text in texts.items():
+        if len(texts) > 1:
+            write_whole(folder / f"{name}_{number}.tum", text)
+    write_whole(folder / f"{name}.tum", texts[max(texts)] if texts else "")
 
 
 def tum_row(stamp: int, pose: Array) -> str:

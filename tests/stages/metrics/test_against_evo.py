@@ -1,4 +1,4 @@
-"""Our trajectory errors beside those of evo (Grupp 2017), which reads the trajectory.tum that a run writes."""
+"""Our trajectory errors beside those of evo (Grupp 2017), which reads trajectory.tum and truth.tum of a run."""
 
 import json
 import math
@@ -15,8 +15,7 @@ from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.relative_errors import RelativeErrors
-from omninav.stages.plots.trajectory_file import TrajectoryFile, tum_row
-from omninav.stages.recordings.opening import open_recording
+from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Pose
 
@@ -43,9 +42,6 @@ def assert_same(ours: dict[str, float], theirs: dict[str, float]) -> None:
 def test_the_absolute_error_of_a_run_is_evos(omninav: Command, tmp_path: Path):
     omninav("variant=plain_matching", f"tour={TOUR}", f"log={DRIVE}", check=True)
     run = tmp_path / "runs" / "latest"
-    recording = open_recording(str(DRIVE))
-    rows = zip(recording.stamps.tolist(), recording.truth, strict=True)
-    (run / "truth.tum").write_text("".join(tum_row(stamp, pose) for stamp, pose in rows))
     ours = json.loads((run / "metrics.json").read_text())["absolute_trajectory_error_m"]
     assert_same(ours, evo(run, "evo_ape", "--align"))
 
@@ -64,7 +60,6 @@ def test_relative_errors_are_evos(tmp_path: Path):
         [Pose(*map(float, pose)) for pose in truth],
         estimates=[PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses],
     )
-    (tmp_path / "truth.tum").write_text("".join(tum_row(tick.stamp, p) for tick, p in zip(ticks, truth, strict=True)))
     TrajectoryFile().step(Context("file", folder=tmp_path), drive)
     ours = RelativeErrors(distance_m=1.0).step(Context("errors"), drive).metrics.values
     pairs = ("evo_rpe", "--delta", "1", "--delta_unit", "m", "--all_pairs", "--pairs_from_reference")

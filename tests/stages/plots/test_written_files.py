@@ -33,7 +33,8 @@ def test_a_trajectory_file_has_a_row_per_image_with_all_digits_of_its_stamp(tmp_
 def test_every_log_has_its_trajectory_and_the_last_has_the_plain_name(tmp_path):
     run = small_run(frames=5, logs=2)
     TrajectoryFile().step(Context("t", folder=tmp_path), run.drive)
-    assert {path.name for path in tmp_path.iterdir()} == {"trajectory.tum", "trajectory_0.tum", "trajectory_1.tum"}
+    names = {f"{name}{log}.tum" for name in ("trajectory", "truth") for log in ("", "_0", "_1")}
+    assert {path.name for path in tmp_path.iterdir()} == names
     assert (tmp_path / "trajectory.tum").read_bytes() == (tmp_path / "trajectory_1.tum").read_bytes()
 
 
