@@ -62,7 +62,8 @@ class LandmarkUpdate(Stage):
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
     Once `track` says that the robot was carried, it is as likely elsewhere as here, until poses have been proposed that
-    are together as good as sure.
+    are together as good as sure. So a first pose that is right with 0.1 takes half of the belief, which cannot hold
+    all other places; how sure the robot is, the confidence tells.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """
@@ -95,12 +96,13 @@ class LandmarkUpdate(Stage):
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
             last.driven += math.hypot(motion.x, motion.y)
         if track is not None and track.carried:
-            last.elsewhere = CARRIED
+            last.poses, last.elsewhere = np.empty((0, 3)), CARRIED
         if fix is None or not len(fix):
             return self.Out(belief=belief)
         elsewhere = max(last.elsewhere, self.kidnapping_probability)
         least = MIN_PROPOSED if elsewhere == self.kidnapping_probability else MIN_PROPOSED_CARRIED
-        last.elsewhere *= 1.0 - min(float(fix.probabilities.sum()), 1.0)
+        proposed = fix.probabilities[fix.probabilities >= least]
+        last.elsewhere *= 1.0 - min(float(proposed.sum()), 1.0)
         novelty = self._novelty(last, belief, fix.poses[0], metres_of(length_scale))
         last.poses, last.driven = fix.poses, 0.0
         sure = np.minimum(fix.probabilities, 1.0 - OUTLIER_SHARE)

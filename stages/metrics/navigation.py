@@ -55,9 +55,10 @@ class Navigation(MetricStage):
     `routes`: how many it planned;
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
-    seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. `lost_m_per_km`: metres
-    of a kilometre that a simulated robot drove while its estimate was 0.5 m off, or there was none. Truth of the map's
-    poses that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
+    seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Of a simulated robot that
+    knows poses: `lost_m_per_km`, metres of a kilometre that it drove while its estimate was 0.5 m off, or there was
+    none. Truth of the map's poses that is not known gives None. Gives nothing where no route was ever planned and no
+    truth is known.
     """
 
     def step(
@@ -112,7 +113,7 @@ class Navigation(MetricStage):
             if reached and shortest:
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
-        if len(tallied):
+        if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
             found["lost_m_per_km"] = lost_metres(drive.at(slice(begun, None)))
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
 

@@ -84,8 +84,8 @@ class ConfidenceMonitorState(State):
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
     `sure`: the estimate was since the robot began; `empty`: images in a row that say nothing.
-    `geometry`: log odds of right by landmarks; `found`: these have shown that the
-    robot is on the map; `missed`: until then, how surely the images so far would have shown some there, 0 to 1.
+    `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
+    then, how surely the images so far would have shown some there, 0 to 1.
     """
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))

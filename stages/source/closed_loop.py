@@ -82,7 +82,7 @@ class ClosedLoop(Source):
     """With a drawn start: how far away (m) somebody puts it down after half a second, where the straight way back is
     free."""
     kidnapped_every_m: Annotated[float, Bounds(ge=0)] = 0.0
-    """How far it drives (m) until somebody puts it down elsewhere, anywhere on the free floor, again and again; 0:
+    """Metres that it drives until somebody puts it down elsewhere, anywhere on the free floor, again and again; 0:
     never."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     """How long it drives at most."""

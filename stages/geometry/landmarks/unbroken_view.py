@@ -38,7 +38,7 @@ levels, grass), and 98 to 100 % of images 1.5 m and more apart (docs/experiments
 
 
 class Carried(NamedTuple):
-    """How far (m) from where odometry says a robot may have been carried, `at_most`, and whether it `surely` was."""
+    """A bound, `at_most`, of how far (m) from where odometry says a robot was carried, and whether it `surely` was."""
 
     at_most: float
     surely: bool

@@ -102,6 +102,15 @@ def test_an_image_of_other_surroundings_tells_that_the_robot_was_carried_and_bli
     assert not any(each.track.carried for each in driven(twin_from=10, probability=0.9, step=1.5))
 
 
+@pytest.mark.parametrize(("turn", "carried"), [(0.1, True), (1.0, False)])
+def test_a_narrow_view_that_has_turned_out_of_what_it_saw_was_not_carried(turn, carried):
+    state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0), Tick(1, 0))
+    belief = Particles(np.zeros((2, 3)), np.full(2, 0.5))
+    first, other = seen_from(np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]))
+    assert not stage.step(ctx, state, belief, first, None, None).track.carried
+    assert stage.step(ctx, state, belief, other, None, Motion(0.0, 0.0, turn)).track.carried == carried
+
+
 def test_a_track_that_was_never_sure_rules_nothing_out():
     assert all(each.fix is not None and not each.track.unbroken for each in driven(10, probability=0.9))
 
