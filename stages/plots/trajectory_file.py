@@ -28,6 +28,8 @@ class TrajectoryFile(Stage):
         for log in drive.by_log:
             for frame in log.frames[~known(log.estimate)]:
                 ctx.count("frame_without_estimate", detail=f"frame {frame} of log {log.log[0]} has no estimate")
+        if len(drive) and not known(drive.estimate).any():
+            ctx.warn("no image has an estimate: see `dropped` in manifest.json for the stages that were skipped")
         if ctx.folder is None:
             return
         _write(ctx.folder, self.name, drive, "estimate")

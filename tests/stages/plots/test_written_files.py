@@ -44,6 +44,9 @@ def test_frames_without_an_estimate_are_counted(tmp_path):
     TrajectoryFile().step(ctx, collected(ticks, [None, None], estimates=[None, estimate(0, 0, 0)]))
     assert ctx.counts == {"frame_without_estimate": 1}
     assert len((tmp_path / "trajectory.tum").read_text().splitlines()) == 1
+    assert not ctx.warnings
+    TrajectoryFile().step(ctx, collected(ticks, [None, None]))
+    assert ctx.warnings[0].startswith("no image has an estimate")
 
 
 def test_the_result_log_opens_with_mcaps_own_ros2_decoder(tmp_path):
