@@ -29,7 +29,7 @@ def open_transport(domain: int) -> Transport:
 
 
 class RclpyTransport(Transport):
-    """The node `omninav`, spun in a thread; messages pass as CDR."""
+    """The node `omninav_live`, spun in a thread; messages pass as CDR."""
 
     def __init__(self, domain: int) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class RclpyTransport(Transport):
 
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self._node = rclpy.create_node("omninav", context=self._context, enable_rosout=False)
+        self._node = rclpy.create_node("omninav_live", context=self._context, enable_rosout=False)
         self._lock = threading.RLock()
         self._subscriptions: dict[str, Any] = {}
         self._publishers: dict[str, Any] = {}

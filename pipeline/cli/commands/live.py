@@ -16,10 +16,15 @@ RESULTS = ("estimate", "command")
 
 def command(arguments: list[str]) -> int:
     """Run a variant live. Whatever else may be typed for a run may be typed here."""
+    return run(live_words(arguments), plan_live)
+
+
+def live_words(arguments: list[str]) -> list[str]:
+    """What is typed behind `omninav live`, as it is typed behind `omninav` or `omninav check`."""
     typed = dict(word.split("=", 1) for word in arguments if "=" in word)
     if typed.get("log", "live") != "live":
         typed.setdefault("publish", "")  # what is plugged into this computer has nobody to tell it to
-    return run([*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments], plan_live)
+    return [*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments]
 
 
 def plan_live(settings: Mapping[str, Any]) -> Plan:
