@@ -53,4 +53,4 @@ def test_a_wrong_setting_is_said_once_for_a_graph_and_those_of_its_maps():
         settings = complete(config)
     with pytest.raises(ProblemsFound) as found:
         live.plan_live(settings)
-    assert [problem.where for problem in found.value.problems] == ["nodes.watch.port"]
+    assert [problem.where for problem in found.value.problems] == ["nodes.watch.viewer"]
