@@ -1,4 +1,4 @@
-"""What a run shows, as Rerun draws it."""
+"""A run as Rerun draws it."""
 
 import socket
 import time
@@ -30,9 +30,10 @@ class RerunView:
     """A recording that a server sends to Rerun's viewer, and that a file in a run's folder keeps.
 
     Entities, in the map frame (m): `world/map` (references), `world/landmarks`, `world/belief`, `world/similar` (the
-    most similar references), `world/truth`, `world/estimate` and its `path`; `panorama`, and `confidence`. A run that
-    is resumed writes a second file, of the same recording. Raises `BadInput` where rerun-sdk is missing or the server's
-    port is taken.
+    most similar references), `world/truth`, `world/estimate` and its `path`; `panorama`, and `confidence`. In a long
+    run only some ticks have what is only looked at, as in `result.mcap`. A run that is resumed writes a second file, of
+    the same recording; ticks since its last checkpoint are in both. Rerun itself writes what is shown within seconds,
+    and closes the file with the process. Raises `BadInput` where rerun-sdk is missing or the server's port is taken.
     """
 
     def __init__(self, folder: Path | None, port: int = PORT) -> None:
@@ -45,16 +46,20 @@ class RerunView:
             earlier.close()
         _await_port(port, 0.0 if earlier is None else CLOSING_S)
         self._rr: Any = rerun
-        self._stream = rerun.RecordingStream("omninav", recording_id=None if folder is None else folder.name)
+        self._stream = rerun.RecordingStream("omninav", recording_id=None if folder is None else str(folder.absolute()))
         sinks: list[Any] = [rerun.GrpcServerSink(bind_ip="127.0.0.1", port=port, server_memory_limit=MEMORY)]
         if folder is not None:
             sinks.append(rerun.FileSink(_free(folder)))
         self._stream.set_sinks(*sinks, default_blueprint=_blueprint())
         self._map_size, self._last = 0, np.full(2, np.nan)
+        self._ticks = 0
         _open[port] = self
 
     def show(self, shown: ShownTick, map: AnyMap | None) -> None:
         """Show a tick."""
+        if self._ticks % shown.views_every:
+            shown = shown.without_views()
+        self._ticks += 1
         rr, log, row = self._rr, self._stream.log, shown.numbers.view(ROW)[0]
         self._stream.set_time("time", timestamp=np.datetime64(shown.tick.stamp, "ns"))
         if shown.tick.first_of_log:
@@ -97,7 +102,8 @@ def _await_port(port: int, patience_s: float) -> None:
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
-                return probe.bind(("127.0.0.1", port))
+                probe.bind(("127.0.0.1", port))
+                return
             except OSError as error:
                 if time.monotonic() >= end:
                     what = f"127.0.0.1:{port} cannot be listened on ({error})"

@@ -5,13 +5,10 @@ from typing import Annotated, Literal
 from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.values.map_places import AnyMap
 
-from .foxglove_server import foxglove_server
+from .foxglove_server import PORT, foxglove_server
 from .rerun_view import RerunView
 from .show_tick import ShownTick
 from .tick_messages import PathSoFar, tick_messages
-
-PORT = 8765
-"""Foxglove's own default."""
 
 
 class WatchRun(Stage):

@@ -2,7 +2,9 @@
 
 import socket
 import sys
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +81,39 @@ def test_the_map_is_shown_once_with_its_landmarks(shown) -> None:
 def test_a_resumed_run_goes_on_in_another_file(shown, tmp_path: Path) -> None:
     RerunView(tmp_path, free_port()).close()
     assert (tmp_path / "result_2.rrd").exists()
+
+
+def test_what_was_shown_is_in_the_file_of_a_run_that_is_killed(shown, tmp_path: Path) -> None:
+    ticks, _, _ = shown
+    view, end = RerunView(tmp_path, free_port()), time.monotonic() + 60.0
+    for tick in ticks:
+        view.show(tick, None)
+    while len(list(rows(tmp_path / "result_2.rrd", "world/estimate", "Arrows3D:origins"))) < FRAMES:
+        assert time.monotonic() < end
+        time.sleep(0.2)
+    view.close()
+
+
+def test_a_long_runs_file_has_as_few_pictures_as_its_log(shown, tmp_path: Path) -> None:
+    ticks, _, _ = shown
+    view = RerunView(tmp_path, free_port())
+    for tick in ticks:
+        view.show(replace(tick, views_every=2), None)
+    view.close()
+    file = tmp_path / "result_2.rrd"
+    assert len(list(rows(file, "panorama", "EncodedImage:blob"))) == FRAMES / 2
+    assert len(list(rows(file, "world/belief", "Points3D:positions"))) == FRAMES / 2
+    assert len(list(rows(file, "world/estimate", "Arrows3D:origins"))) == FRAMES
+
+
+def test_jobs_of_two_sweeps_are_two_recordings(tmp_path: Path) -> None:
+    reader = pytest.importorskip("rerun.chunk").RrdReader
+    names = []
+    for job in (tmp_path / "a" / "0", tmp_path / "b" / "0"):
+        job.mkdir(parents=True)
+        RerunView(job, free_port()).close()
+        names += [entry.recording_id for entry in reader(str(job / "result.rrd")).recordings()]
+    assert len(set(names)) == 2
 
 
 def test_only_this_computer_is_served(tmp_path: Path) -> None:
