@@ -81,8 +81,8 @@ class Frames:
 
     csv: str | None = None
     header: bool = True
-    """False: columns have numbers, from 0, and lines that begin with # are comments. So it is with a .json that maps
-    names to rows or matrices of numbers: column 0 is the name."""
+    """False: columns have numbers, from 0, and lines that begin with # are comments. A .json has no header, whatever is
+    said here: it maps names, column 0, to rows or matrices of numbers."""
     delimiter: Delimiter = ","
     file: str | int | None = None
     """A column, or a name made of columns: '{0}.png', or '{0:010}.png' for a number with zeros to 10 digits."""
@@ -104,6 +104,8 @@ class Frames:
                 raise ValueError(f"'name' is {shown(self.name)}, expected different {{columns}} with text between them")
             if self.csv is not None:
                 raise ValueError("'name' makes a table of the images' names: leave out 'csv'")
+        if self.index is not None and (self.time is not None or (self.csv is None and self.name is None)):
+            raise ValueError("'index' counts periods in place of a 'time' in a 'csv' or 'name': leave it out (null)")
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,9 @@ class Heading:
     """Radians, counter-clockwise, that are added."""
 
     def __post_init__(self) -> None:
-        if (self.column is None) == (not self.rotation) or (self.column is not None and self.unit is None):
+        if self.column is not None and self.rotation:
+            raise ValueError("has a 'column' and a 'rotation': leave out one (`rotation: []`, `column: null`)")
+        if (self.column is None or self.unit is None) and not self.rotation:
             raise ValueError("needs a 'column' and its 'unit', or a 'rotation'")
         if len(self.rotation) not in (0, 4, 9):
             raise ValueError(f"'rotation' has {len(self.rotation)} columns, expected 4 (x, y, z, w) or 9 (a matrix)")
@@ -167,15 +171,13 @@ class Tangent:
 
 @dataclass(frozen=True)
 class DataSet:
-    """Facts about a public data set, which `omninav data` lists."""
+    """Facts about a public data set, which `omninav data` lists. `like` takes none of them over."""
 
     what: str
     site: str
     """Address to get it from."""
     run: str
-    """What to type behind `omninav`."""
-    size: str = "see its site"
-    licence: str = "see its site"
+    """Words to type behind `omninav`."""
     published: str = ""
     """Results of others on it, with their source."""
 
@@ -243,10 +245,11 @@ def _read(path: Path, layouts: Sequence[str], seen: tuple[Path, ...]) -> dict[st
     like = content.pop("like", None)
     if like is None:
         return content
-    return _merged(_read(find_layout(str(like), layouts), layouts, (*seen, path)), content)
+    return _merged(_read(find_layout(str(like), layouts), layouts, (*seen, path)) | {"about": None}, content)
 
 
 def _merged(under: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Mappings one over the other, key by key."""
     both = dict(under)
     for key, value in over.items():
         nested = isinstance(value, dict) and isinstance(both.get(key), dict)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_small
-from omninav.stages.camera.model import Camera
+from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Undecodable, decode_image, orientation_of
 from omninav.stages.values.image import Pixels
 
@@ -28,7 +28,7 @@ from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending, lone
-from .tables import NO_TIME, CsvTable, Delimiter, read_table, table_of
+from .tables import NO_TIME, CsvTable, Delimiter, by_numbers, read_table, table_of
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -63,6 +63,9 @@ class ImageFolder:
         frames = self._table(description.frames.csv, description.frames.header, description.frames.delimiter)
         paths = self._paths(frames)
         if description.frames.name is not None:
+            frames = names_table(paths, description.frames.name)
+            order = np.argsort(self._times(frames, len(paths)), kind="stable")  # names need not begin with the time
+            paths = [paths[row] for row in order]
             frames = names_table(paths, description.frames.name)
         times = self._times(frames, len(paths))
         truth, positions = None, description.positions
@@ -153,9 +156,7 @@ class ImageFolder:
             if not found:
                 raise UnreadableRecording(f"{self._folder}: no image fits '{pattern}' (frames.images in {self._where})")
             self._rows = [f"frame {number}" for number in range(len(found))]
-            return sorted(
-                found, key=lambda path: [int(n) if n.isdecimal() else n for n in re.split(r"(\d+)", path.name)]
-            )
+            return sorted(found, key=lambda path: by_numbers(path.name))
         if frames.file is None:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
         base = self._folder if frames.images.startswith("/") else table.path.parent
@@ -188,7 +189,10 @@ class ImageFolder:
         right = self._description.frames.right
         if right is None:
             return [path]
-        second = self._renamed(str(path.relative_to(self._folder)), path.name, right)
+        first = os.path.relpath(path, self._folder)
+        second = self._renamed(first, path.name, right)
+        if second == first:
+            raise UnreadableRecording(f"{self._where}: frames.right finds no {shown(right.replace)} in {shown(first)}")
         return [path, self._inside(self._folder / second, path.name)]
 
     def _read(self, path: Path) -> Pixels:
@@ -217,7 +221,8 @@ class ImageFolder:
             elif missing := [file for file in self._files(path) if not _is_file(file)]:
                 self._drop("missing_image", f"{self._rows[row]}: no file {missing[0]}")
             elif truth is not None and not np.isfinite(truth[row]).all():
-                self._drop("no_position", f"{self._rows[row]} ({path.name}): no position")
+                what = "heading" if np.isfinite(truth[row, :2]).all() else "position"
+                self._drop("no_position", f"{self._rows[row]} ({path.name}): no {what}")
             else:
                 rows.append(row)
         kept, repeated, backward = ascending(times[rows].tolist())
@@ -240,8 +245,11 @@ class ImageFolder:
         if named is None and not isinstance(described, dict) and beside.is_file():
             self._sources.append(beside)
             return read_camera(beside)
-        if isinstance(described, str):
-            named = named or described
+        if named is None and isinstance(described, str):
+            if described not in camera_models():  # a folder's own description opens no file
+                known = ", ".join(sorted(camera_models()))
+                raise UnreadableRecording(f"{self._where}: camera: {shown(described)} is no projection: {known}")
+            named = described
         if named is not None:
             camera, files = named_camera(named, lambda: self._first_picture().shape[1::-1])
             self._sources += files
@@ -270,14 +278,15 @@ def names_table(paths: Sequence[Path], form: str) -> CsvTable:
     for number, path in enumerate(paths, 1):
         first, *middle = texts[:-1]
         rest, end = path.stem, texts[-1]
-        fits = len(rest) <= MAX_NAME and rest.startswith(first) and rest.endswith(end)
+        fits = rest.isprintable() and len(rest) <= MAX_NAME and rest.startswith(first) and rest.endswith(end)
         rest, values = rest[len(first) : len(rest) - len(end)], []
         for text in middle:
             value, found, rest = rest.partition(text)
             fits = fits and bool(found)
             values.append(value)
         if not fits or "" in (*values, rest):
-            raise UnreadableRecording(f"{path}: the image's name is not of the form {shown(form)}")
+            named = f"{path.parent}: the image's name {shown(path.name)}"
+            raise UnreadableRecording(f"{named} is not of the form {shown(form)}")
         rows.append((number, [*values, rest]))
     return table_of(paths[0].parent, tuple(re.findall(r"\{(\w+)\}", form)), rows)
 
@@ -299,10 +308,11 @@ def _file_names(table: CsvTable, file: str | int) -> list[str]:
 
 
 def _last_number(text: str, row: str) -> int:
-    """The last whole number in a cell. Raises `UnreadableRecording` naming the row where there is none."""
-    numbers = re.findall(r"\d+", text)
+    """The last whole number in a cell, but for a suffix (.jp2). Raises `UnreadableRecording` naming the row."""
+    numbers = re.findall(r"\d+", re.sub(r"\.[A-Za-z]\w*$", "", text))
     if not numbers or len(numbers[-1]) > MAX_DIGITS:
-        raise UnreadableRecording(f"{row}: {shown(text)} has no number, expected the image's (frames.index)")
+        what = f"a number of more than {MAX_DIGITS} digits" if numbers else "no number"
+        raise UnreadableRecording(f"{row}: {shown(text)} has {what}, expected the image's (frames.index)")
     return int(numbers[-1])
 
 

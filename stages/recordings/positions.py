@@ -97,7 +97,7 @@ def headings(
 def _forward(heading: Heading, table: CsvTable, rows: npt.NDArray[np.int64]) -> Array:
     """Directions (K, 3) in the world of the axis that points ahead, at rows of a table.
 
-    Raises `UnreadableRecording` for a row that holds no rotation, and where most of the directions are steep.
+    NaN in a row without a rotation. Raises `UnreadableRecording` where most have none, or most directions are steep.
     """
     cells = np.column_stack([table.numbers(Length(column, "m"))[rows] for column in heading.rotation])
     if len(heading.rotation) == 4:
@@ -110,14 +110,15 @@ def _forward(heading: Heading, table: CsvTable, rows: npt.NDArray[np.int64]) -> 
         wrong |= np.linalg.det(turns) < 0.0
         expected = "a rotation matrix"
     wrong |= ~np.isfinite(cells).all(axis=1)
-    if wrong.any():
+    if 2 * wrong.sum() > len(rows):
         row = int(np.flatnonzero(wrong)[0])
         found = ", ".join("no number" if np.isnan(cell) else f"{cell:g}" for cell in cells[row])
         where = f"{table.path}, line {table.lines[rows[row]]}"
         raise UnreadableRecording(f"{where}: its rotation is ({found}), expected {expected}")
     axis = "xyz".index(heading.forward[-1])
     ahead: Array = turns[:, :, axis] * (-1.0 if heading.forward[0] == "-" else 1.0)
-    steep = math.degrees(np.median(np.arcsin(np.clip(abs(ahead[:, 2]), 0.0, 1.0))))
+    ahead[wrong] = np.nan
+    steep = math.degrees(np.nanmedian(np.arcsin(np.clip(abs(ahead[:, 2]), 0.0, 1.0))))
     if steep > MAX_STEEP_DEG:
         raise UnreadableRecording(
             f"{table.path}: the axis {heading.forward} of its rotations is {steep:.0f} degrees from level (median), "

@@ -34,6 +34,12 @@ MAX_TABLE_BYTES = 64_000_000
 """Largest accepted table, bytes."""
 MAX_LINES = 1_000_000
 """Lines of a table: poses of three hours at 100 Hz. They take some 200 MB."""
+MAX_JSON_BYTES = 4_000_000
+"""Largest accepted JSON, bytes; it takes some 40 times as much memory while it is read."""
+MAX_ENTRIES = 50_000
+"""Entries of a JSON."""
+MAX_NUMBERS = 64
+"""Numbers in an entry of a JSON: four matrices."""
 MAX_ROW = 100_000
 """Characters of a row."""
 MAX_CELL = 100
@@ -178,11 +184,14 @@ class CsvTable:
 def read_table(path: Path, header: bool = True, delimiter: Delimiter = ",") -> CsvTable:
     """A CSV file, or a .json of rows by their names. Skips empty lines, and comments (#) where there is no header.
 
-    Raises `BadInput`.
+    A .json has no header. Raises `BadInput`.
     """
-    rows = _json_rows(path) if path.suffix == ".json" else _csv_rows(path, delimiter)
-    if not header:
-        rows = ((line, row) for line, row in rows if row and not row[0].startswith("#"))
+    if path.suffix == ".json":
+        header, rows = False, _json_rows(path)
+    else:
+        rows = _csv_rows(path, delimiter)
+        if not header:
+            rows = ((line, row) for line, row in rows if row and not row[0].startswith("#"))
     first = next(((line, row) for line, row in rows if any(map(str.strip, row))), None)
     if first is None:
         raise UnreadableRecording(f"{path}: an empty table")
@@ -244,13 +253,31 @@ def _csv_rows(path: Path, delimiter: Delimiter) -> Iterator[tuple[int, list[str]
 
 def _json_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """The entries of a JSON object of numbers in lists, sorted by name: their places, and their names and numbers."""
+    entry = ""
     try:
-        content = json.loads(read_small(path, MAX_TABLE_BYTES))
-        for number, name in enumerate(sorted(content), 1):
+        content = json.loads(read_small(path, MAX_JSON_BYTES))
+        if not isinstance(content, dict):
+            raise TypeError(f"found a {type(content).__name__}")
+        if len(content) > MAX_ENTRIES:
+            raise ValueError(f"found {len(content):,} names")
+        for number, name in enumerate(sorted(content, key=by_numbers), 1):
+            entry = f", {cut(name)}"
+            name.encode()
             numbers = np.asarray(content[name], np.float64).ravel()
+            if len(numbers) > MAX_NUMBERS:
+                raise ValueError(f"found {len(numbers):,} numbers")
             yield number, [name, *map(repr, numbers.tolist())]
-    except (ValueError, TypeError, RecursionError) as error:
-        raise UnreadableRecording(f"{path}: expected an object of names and matrices of numbers ({error})") from None
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+        limits = f"at most {MAX_ENTRIES:,} names and {MAX_NUMBERS} numbers each"
+        raise UnreadableRecording(
+            f"{path}{entry}: expected an object of names and matrices of numbers, {limits} ({error!s:.200})"
+        ) from None
+
+
+def by_numbers(name: str) -> list[str | tuple[int, str]]:
+    """A key by which names come in the order of the numbers in them."""
+    parts = ((part, part.lstrip("0")) for part in re.split(r"(\d+)", name))
+    return [(len(digits), digits) if part.isdecimal() else part for part, digits in parts]
 
 
 def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:

@@ -20,11 +20,21 @@ class ListData(Tool):
 
     def run(self, ctx: Context) -> None:
         """List them."""
-        layouts = known_layouts(self.layout_folders)
-        described = {name: read_description(path, self.layout_folders).about for name, path in layouts.items()}
-        known = {name: about for name, about in described.items() if about is not None}
+        known: dict[str, DataSet] = {}
+        broken: dict[str, BadInput] = {}
+        for name, path in known_layouts(self.layout_folders).items():
+            try:
+                about = read_description(path, self.layout_folders).about
+            except BadInput as error:
+                broken[name] = error
+            else:
+                if about is not None:
+                    known[name] = about
         if not self.name:
-            print("\n".join(f"{name:<16} {about.what}\n{'':<16} {about.site}" for name, about in known.items()))
+            lines = [f"{name:<16} {about.what}\n{'':<16} {about.site}" for name, about in known.items()]
+            print("\n".join([*lines, *(f"{name:<16} {error}" for name, error in broken.items())]))
+        elif self.name in broken:
+            raise broken[self.name]
         elif self.name in known:
             print("\n".join(f"{name:<10} {value}" for name, value in facts(known[self.name])))
         else:
@@ -34,12 +44,10 @@ class ListData(Tool):
 
 
 def facts(about: DataSet) -> list[tuple[str, str]]:
-    """What is known of a data set, by name."""
+    """Facts about a data set, by name."""
     found = [
         ("what", about.what),
         ("from", about.site),
-        ("size", about.size),
-        ("licence", about.licence),
         ("run", f"omninav {about.run}"),
         ("published", about.published),
     ]

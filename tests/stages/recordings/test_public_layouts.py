@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shlex
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.description import known_layouts, read_description
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording
+from omninav.stages.recordings.tables import read_table
 
 HEADINGS = np.radians([-170.0, -91.3, 0.0, 12.7, 88.8, 179.9])
 """True headings of the frames, counter-clockwise from x."""
@@ -159,7 +161,7 @@ def test_the_other_camera_of_a_data_set_is_named_behind_its_folder(tmp_path: Pat
         (loc360, "camera_pose.json", "[[", "[[[", r"camera_pose\.json: expected an object of names and matrices"),
         (loc360, "camera_pose.json", '{"0000', '{"x', r"line 6: 'x\.jpg' has no number"),
         (kitti360, "data_poses/*/poses.txt", "\n2 ", "\ntwo ", r"poses\.txt, line 2: 'two' has no number"),
-        (kitti360, "data_poses/*/poses.txt", "\n2 -0", "\n2 -7", r"poses\.txt, line 2: .*\(-7.* a rotation matrix"),
+        (kitti360, "data_poses/*/poses.txt", "0.", "7.", r"poses\.txt, line 1: .*\(-7.* a rotation matrix"),
         (tum, "groundtruth.txt", "1.7000", "1.7000 0.1", r"groundtruth\.txt, line 3: .* a unit quaternion"),
         (euroc, "mav0/state*/data.csv", "0.000000,", "0.000000,none,", r"data\.csv, line 2: .*no number"),
         (sussex_campus, "database_entries.csv", "Filename", "File", r"no column 'Filename'; did you mean 'File'"),
@@ -169,19 +171,134 @@ def test_a_malformed_row_is_named(tmp_path: Path, data_set, file: str, old: str,
     log = data_set(tmp_path / "data")
     (path,) = (tmp_path / "data").glob(file)
     assert old in path.read_text()
-    path.write_text(path.read_text().replace(old, new, 1))
+    path.write_text(path.read_text().replace(old, new))
     with pytest.raises(BadInput, match=said) as caught:
         open_recording(log)
     assert "\n" not in str(caught.value)
 
 
-def test_a_name_of_another_form_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("stray", [b"thumbnail.jpeg", b"t_x_y_a.jpeg", b"t1_x\xff_y2_a3.jpeg"])
+def test_a_name_of_another_form_is_refused(tmp_path: Path, stray: bytes) -> None:
     log = cold(tmp_path)
-    for stray in ("thumbnail", "t_x_y_a"):
-        write_images([tmp_path / "omni_cam" / f"{stray}.jpeg"])
-        with pytest.raises(BadInput, match=stray + r"\.jpeg: the image's name is not of the form 't\{time\}_x\{x\}"):
-            open_recording(log)
-        (tmp_path / "omni_cam" / f"{stray}.jpeg").unlink()
+    (tmp_path / "omni_cam" / os.fsdecode(stray)).write_bytes(b"x")
+    with pytest.raises(BadInput, match=r"the image's name '\w.*\.jpeg' is not of the form 't\{time\}_x\{x\}"):
+        open_recording(log)
+
+
+@pytest.mark.parametrize("form", ["x{x}_t{time}", "t{time}_x{x}"])
+def test_images_come_in_the_order_of_the_times_in_their_names(tmp_path: Path, form: str) -> None:
+    (tmp_path / "recording.yaml").write_text(
+        f"frames: {{images: '*.png', name: '{form}', time: {{column: time, unit: s}}}}\n"
+        "positions: {x: {column: x, unit: m}, y: {column: time, unit: m}}\ncamera: equirectangular"
+    )
+    times = ("1.5", "1.75", "2", "2.25")
+    write_images([tmp_path / f"{form.format(x=9 - n, time=time)}.png" for n, time in enumerate(times)])
+    recording = open_recording(str(tmp_path))
+    assert not recording.dropped
+    assert (recording.stamps / 1e9).tolist() == [float(time) for time in times]
+    assert recording.truth is not None
+    assert recording.truth[:, 0].tolist() == [9.0, 8.0, 7.0, 6.0]
+    np.testing.assert_array_equal(
+        recording.image(3), cv2.imread(str(tmp_path / f"{form.format(x=6, time='2.25')}.png"))
+    )
+
+
+def test_names_in_a_json_come_in_the_order_of_their_numbers_and_without_a_header(tmp_path: Path) -> None:
+    log = loc360(tmp_path)
+    pose = json.loads((tmp_path / "camera_pose.json").read_text())["0000.jpg"]
+    names = [f"{number}.jpg" for number in range(12)]
+    write_images([tmp_path / "image" / name for name in names])
+    (tmp_path / "camera_pose.json").write_text(json.dumps(dict.fromkeys(names, pose)))
+    assert read_description(known_layouts()["loc360"]).frames.header
+    recording = open_recording(log)
+    assert (recording.stamps // 10**9).tolist() == list(range(12))
+    assert not recording.dropped
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("[0]", "found a list"),
+        ("[1, 2, 3]", "found a list"),
+        ("7", "found a int"),
+        ('{"a": [1' + 400 * "0" + "]}", r"json, 'a': expected an object of names and matrices"),
+        (r'{"\ud800": [1]}', "surrogates not allowed"),
+        ('{"a": {"x": 1}}', "json, 'a': expected"),
+        ('{"a": [' + "0," * 700_000 + "0]}", "found 700,001 numbers"),
+        ("{" + ",".join(f'"{n}":1' for n in range(50_001)) + "}", "found 50,001 names"),
+        ('{"a": [' + " " * 4_000_000 + "0]}", "more than 4,000,000 bytes"),
+    ],
+)
+def test_a_hostile_json_is_one_short_line(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "poses.json").write_text(content)
+    with pytest.raises(BadInput, match=said) as caught:
+        read_table(tmp_path / "poses.json")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def test_a_row_without_a_rotation_has_no_heading(tmp_path: Path) -> None:
+    log = tum(tmp_path / "tum")
+    truth = tmp_path / "tum" / "groundtruth.txt"
+    lines = truth.read_text().splitlines()
+    truth.write_text("\n".join([*lines[:4], " ".join([*lines[4].split()[:4], "0 0 0 0"]), *lines[5:]]))
+    recording = open_recording(log)
+    assert len(recording.stamps) == 6  # it is looked up between its neighbours
+    log = kitti360(tmp_path / "kitti")
+    (poses,) = (tmp_path / "kitti").glob("data_poses/*/poses.txt")
+    poses.write_text(poses.read_text().replace("\n2 -0", "\n2 -7"))
+    recording = open_recording(log)
+    assert recording.dropped == {"no_position": 1}
+    assert "line 2 (0000000002.png): no heading" in recording.details["no_position"]
+
+
+def test_a_column_takes_the_place_of_a_rotation(tmp_path: Path) -> None:
+    tum(tmp_path)
+    (tmp_path / "mine.yaml").write_text("like: tum\nheading: {column: 4, unit: rad, rotation: []}\n")
+    truth = open_recording(f"{tmp_path / 'mine.yaml'}:{tmp_path}").truth
+    assert truth is not None
+    np.testing.assert_allclose(truth[:, 2], np.loadtxt(tmp_path / "groundtruth.txt")[:, 4])
+
+
+PAIRS = """
+frames: {csv: images.csv, header: false, file: 0, right: {replace: left, by: right}, index: 1, period: 1.0}
+camera: equirectangular
+"""
+
+
+def pairs(folder: Path, cells: str) -> list[Path]:
+    """A folder with one pair of images, the left one by its absolute path, beside which the table has `cells`."""
+    images = [folder.absolute() / side / "0.png" for side in ("left", "right")]
+    write_images(images)
+    (folder / "images.csv").write_text(f"{images[0]},{cells}\n")
+    (folder / "recording.yaml").write_text(PAIRS)
+    return images
+
+
+def test_absolute_names_are_read_in_a_folder_named_relatively(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    images = pairs(Path("data"), "img_0001.jp2")
+    recording = open_recording("data")
+    assert recording.stamps.tolist() == [10**9]
+    np.testing.assert_array_equal(recording.image(0), np.hstack([cv2.imread(str(image)) for image in images]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("replace: left", "replace: links", r"recording\.yaml: frames\.right finds no 'links' in 'left/0\.png'"),
+        ("index: 1", "index: 2", "'00000000001' has a number of more than 10 digits"),
+        ("period: 1.0", "time: {column: 1, unit: s}", "'index' counts periods in place of a 'time'"),
+        ("csv: images.csv", "images: '*/*.png'", "'index' counts periods in place of a 'time' in a 'csv'"),
+        ("camera: equirectangular", "camera: /etc/passwd", "camera: '/etc/passwd' is no projection: .*donut"),
+    ],
+)
+def test_what_a_description_cannot_mean_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    pairs(tmp_path, "1,00000000001")
+    assert old in PAIRS
+    (tmp_path / "recording.yaml").write_text(PAIRS.replace(old, new))
+    with pytest.raises(BadInput, match=said):
+        open_recording(str(tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -189,7 +306,8 @@ def test_a_name_of_another_form_is_refused(tmp_path: Path) -> None:
     [
         ("heading: {forward: y}", "the axis y of its rotations is .* degrees from level"),
         ("heading: {rotation: [4, 5]}", "'rotation' has 2 columns, expected 4"),
-        ("heading: {column: 4}", "needs a 'column' and its 'unit', or a 'rotation'"),
+        ("heading: {column: 4, unit: deg}", "has a 'column' and a 'rotation': leave out one"),
+        ("heading: {column: 4, rotation: []}", "needs a 'column' and its 'unit', or a 'rotation'"),
         ("frames: {name: 't{x}{y}'}", "expected different {columns} with text between them"),
         ("frames: {name: 't{x}'}", "leave out 'csv'"),
     ],
