@@ -277,6 +277,7 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
         "timing.json",
         "trajectory.tum",
         "trajectory_smoothed.tum",
+        "truth.tum",
     }
     manifest = json.loads((demo / "manifest.json").read_text())
     assert manifest["status"] == "complete"
