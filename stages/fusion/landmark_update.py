@@ -61,9 +61,9 @@ class LandmarkUpdate(Stage):
     share the errors of the same landmarks, and a robot that stands sees nothing new. With `kidnapping_probability` the
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
-    Once `track` says that the robot was carried, it is as likely elsewhere as here, until poses have been proposed that
-    are together as good as sure. So a first pose that is right with 0.1 takes half of the belief, which cannot hold
-    all other places; how sure the robot is, the confidence tells.
+    Once `track` says that the robot was carried, it is as likely elsewhere as here, until poses that are together all
+    but certain have been proposed. So a first pose of probability 0.1 takes half of the belief, which cannot hold all
+    other places; the confidence says how sure the robot is.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """

@@ -74,7 +74,7 @@ class UnbrokenTrack(Stage):
     then continues the one before as odometry says, the robot was not carried. So poses elsewhere are left out, and the
     belief's recovery particles too, until they have gone on for as long a way as the belief was confirmed. Where an
     image does not continue the one before, everything counts: a robot that was carried is found at once. Where it shows
-    quite other surroundings, `track` says that the robot was carried, whatever landmarks tell.
+    quite different surroundings and no sure pose confirms the track, `track` says that the robot was carried.
     """
 
     class Out(Outputs):

@@ -15,7 +15,7 @@ class TrajectoryFile(Stage):
 
     With several logs there is a `trajectory_<n>.tum` for each, and `trajectory.tum` is the last. Frames without an
     estimate have no row and are counted. `truth.tum` is the same of the true poses that are known: `evo_ape tum
-    truth.tum trajectory.tum`.
+    truth.tum trajectory.tum --align`.
     """
 
     name: str = "trajectory"

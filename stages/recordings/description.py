@@ -187,7 +187,7 @@ class Description:
     """A folder of images, described. `which` fills `{which}` in file names; by default it stands for anything.
 
     `positions` null: the images are all there is. `camera`: what a camera.yaml holds (the image's size may be left
-    out); null: the folder's camera.yaml; a projection of which an image's size says enough: that, where there is none.
+    out); null: the folder's camera.yaml; a projection's name: used where there is no camera.yaml.
     """
 
     frames: Frames

@@ -32,8 +32,8 @@ row 98 % have 50 and more, also where the camera was lifted; of images more than
 SAME_HEADING = 0.7
 """Mean cosine of the turns of their matches against odometry's, above which the robot was not turned."""
 MIN_FEATURES, MIN_MATCHED = 100, 0.15
-"""Features of both images, and the share of them that match, below which they show different surroundings, where they
-have fewer than `SAME_SURROUNDINGS` matches too: so had one of 2,831 images in a row (a house, offices, stores, game
+"""Fewest features of both images for a judgement, and the share of them that match, below which surroundings differ,
+with fewer than `SAME_SURROUNDINGS` matches too: so had one of 2,831 images in a row (a house, offices, stores, game
 levels, grass), and 98 to 100 % of images 1.5 m and more apart (docs/experiments/landmarks.md)."""
 
 
