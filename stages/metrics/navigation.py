@@ -56,8 +56,8 @@ class Navigation(MetricStage):
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Of a simulated robot that
-    knows poses: `lost_m_per_km`, metres per kilometre driven with an estimate more than 0.5 m off, or none. Truth of the map's poses that is not known gives None. Gives nothing where no route was ever planned and no
-    truth is known.
+    knows poses: `lost_m_per_km`, metres per kilometre driven with an estimate more than 0.5 m off, or none. Truth of
+    the map's poses that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
     """
 
     def step(

@@ -10,7 +10,7 @@ PARAMETERS = {
     "topics.scan": ("topics.scan", "", "LaserScan that is read."),
     "topics.initial_pose": ("nodes.source.initial_pose", "", "PoseWithCovarianceStamped at which the belief restarts."),
     "topics.goal": ("nodes.source.goal", "", "PoseStamped to which a variant that drives is sent."),
-    "topics.restart": ("nodes.source.restart", "", "Topic (std_msgs/Empty) and service that restart the belief, uniform."),
+    "topics.restart": ("nodes.source.restart", "", "Topic (std_msgs/Empty), and service, that restart the belief."),
     "topics.pose": ("nodes.publish.pose", "", "PoseWithCovarianceStamped that is published."),
     "topics.tf": ("nodes.publish.tf", "", "TFMessage that is published: map to odom."),
     "topics.command": ("nodes.publish.command", "", "TwistStamped that is published by a variant that drives."),
