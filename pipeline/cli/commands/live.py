@@ -20,7 +20,7 @@ def command(arguments: list[str]) -> int:
 
 
 def live_words(arguments: list[str]) -> list[str]:
-    """What is typed behind `omninav live`, as it is typed behind `omninav` or `omninav check`."""
+    """Gives the words of `omninav` or `omninav check` that stand for those typed behind `omninav live`."""
     typed = dict(word.split("=", 1) for word in arguments if "=" in word)
     if typed.get("log", "live") != "live":
         typed.setdefault("publish", "")  # what is plugged into this computer has nobody to tell it to

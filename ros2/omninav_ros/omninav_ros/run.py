@@ -40,7 +40,7 @@ class Run:
         self._reader.start()
 
     def problems(self) -> str:
-        """What is wrong with the settings, once they are checked; '' where nothing is."""
+        """Wait until the settings are checked, and give what is wrong with them; '' where nothing is."""
         self._checked.wait()
         return "" if self._ready else "\n".join(self._problems) or "the process has ended"
 

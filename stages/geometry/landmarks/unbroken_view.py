@@ -52,13 +52,12 @@ def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array
     pairs = mutual_nearest_units(root_descriptors(before[1]), root_descriptors(now[1]), RATIO)
     first = np.ascontiguousarray(before[0][pairs.first])
     second = np.ascontiguousarray(now[0][pairs.second])
-    seen = min(len(before[0]), len(now[0]))
-    surely = seen >= MIN_FEATURES and len(first) < MIN_MATCHED * seen
     number = max(_fitting(first, second, motion + np.array([0.0, 0.0, by])) for by in TURNS)
     if number >= max(MIN_FITTING, MIN_SHARE * len(first)):
         return Carried(0.0, False)
     if len(first) < SAME_SURROUNDINGS:
-        return Carried(math.inf, surely)
+        seen = min(len(before[0]), len(now[0]))
+        return Carried(math.inf, seen >= MIN_FEATURES and len(first) < MIN_MATCHED * seen)
     azimuths = [np.arctan2(each[:, 1], each[:, 0]) for each in (first, second)]
     turned = np.exp(1j * (azimuths[1] - azimuths[0] + motion[2])).mean()  # of far points: the turn odometry missed
     return Carried(SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf, False)

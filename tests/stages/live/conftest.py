@@ -7,12 +7,14 @@ import json
 import os
 import queue
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from omninav.pipeline.mcap.message_types import make_message, standard_types
@@ -139,6 +141,20 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 def _has_rclpy() -> bool:
     words = [str(ROS2_PYTHON), "-c", "import rclpy, std_srvs"]
     return ROS2_PYTHON.exists() and subprocess.run(words, stderr=subprocess.DEVNULL, timeout=60).returncode == 0
+
+
+@functools.cache
+def _of_one_python(libraries: str) -> bool:
+    words, environment = [str(ROS2_PYTHON), "-c", "import cv2"], os.environ | {"PYTHONPATH": libraries}
+    return subprocess.run(words, env=environment, stderr=subprocess.DEVNULL, timeout=60).returncode == 0
+
+
+def ours_for_rclpy() -> str:
+    """PYTHONPATH by which rclpy's Python imports omninav and its packages; skips the test where they do not load."""
+    libraries = f"{ROOT}{os.pathsep}{Path(np.__file__).parents[1]}"
+    if not _of_one_python(libraries):
+        pytest.skip(f"{ROS2_PYTHON} and {sys.executable} are not of one Python: their libraries do not go together")
+    return libraries
 
 
 @pytest.fixture

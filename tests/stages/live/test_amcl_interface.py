@@ -3,7 +3,6 @@
 import os
 import queue
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,7 +14,7 @@ import pytest
 from omninav.stages.live.amcl_services import serve_amcl
 from omninav.stages.live.transport import TransportError
 
-from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd, Wire, decode, encode, until
+from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd, Wire, decode, encode, ours_for_rclpy, until
 
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 PAGE = ROOT / "docs/live.md"
@@ -25,16 +24,14 @@ PAGE = ROOT / "docs/live.md"
 def node(other_end: OtherEnd) -> Iterator["queue.Queue[str]"]:
     """omninav with transport=rclpy, in rclpy's Python with our libraries: the lines that it says."""
     script = Path(__file__).parent / "amcl_node.py"
-    libraries = f"{ROOT}{os.pathsep}{Path(np.__file__).parents[1]}"
     process = subprocess.Popen(
         [str(ROS2_PYTHON), str(script)],
         stdout=subprocess.PIPE,
         text=True,
-        env=os.environ | {"PYTHONPATH": libraries},
+        env=os.environ | {"PYTHONPATH": ours_for_rclpy()},
     )
     assert process.stdout is not None
-    if process.stdout.readline().strip() != "ready":
-        pytest.skip(f"{ROS2_PYTHON} and {sys.executable} are not of one Python: their libraries do not go together")
+    assert process.stdout.readline().strip() == "ready"
     said: queue.Queue[str] = queue.Queue()
     output = process.stdout
     threading.Thread(target=lambda: [said.put(line.strip()) for line in output], daemon=True).start()

@@ -3,12 +3,10 @@
 import os
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from background_runs import run_here
 from conftest import DRIVE, TOUR
@@ -16,12 +14,11 @@ from conftest import DRIVE, TOUR
 from omninav import open_run
 from omninav.pipeline.mcap.reader import LogReader
 
-from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd, until
+from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd, ours_for_rclpy, until
 
 PACKAGE = ROOT / "ros2/omninav_ros"
 CONFIGURE, CLEAN_UP, ACTIVATE, DEACTIVATE = 1, 2, 3, 4
 TOPICS = {"/odom": "/renamed/odometry", "/camera/image/compressed": "/renamed/image/compressed"}
-LIBRARIES = os.pathsep.join(map(str, (PACKAGE, ROOT, Path(np.__file__).parents[1])))
 
 Start = Callable[..., subprocess.Popen[bytes]]
 
@@ -29,9 +26,7 @@ Start = Callable[..., subprocess.Popen[bytes]]
 @pytest.fixture
 def start(other_end: OtherEnd, tmp_path: Path) -> Iterator[Start]:
     """Starts the node in an empty folder, all its topics renamed; what it logs is in `node.log` there."""
-    environment = os.environ | {"PYTHONPATH": LIBRARIES}
-    if subprocess.run([str(ROS2_PYTHON), "-c", "import cv2"], env=environment, stderr=subprocess.DEVNULL).returncode:
-        pytest.skip(f"{ROS2_PYTHON} and {sys.executable} are not of one Python: their libraries do not go together")
+    environment = os.environ | {"PYTHONPATH": f"{PACKAGE}{os.pathsep}{ours_for_rclpy()}"}
     names = "camera_info odometry scan initial_pose goal restart pose tf command diagnostics"
     settings = {f"topics.{name}": f"/renamed/{name}" for name in names.split()}
     settings |= {"topics.image": TOPICS["/camera/image/compressed"], "variant": "omniview_mcl", "map": "place.omap"}

@@ -1,4 +1,4 @@
-"""What is shown in Rerun, as its own reader reads it."""
+"""Rerun shows a run, as its own reader reads it."""
 
 import socket
 import sys
