@@ -425,6 +425,9 @@ class WorldConfig:
     draw: Annotated[int, Bounds(ge=0)] = 0
     """Which world is drawn: 0 is for development, 1 to 6 are for tests. Each has another seed; in draws 2, 4, 6, …
     routes that are not `random` are driven the other way round."""
+    plan: Literal["paper", "drawn"] = "paper"
+    """`paper`: walls, doors, rooms, aisles, lamps and routes as listed, of the papers' kind and size; `drawn`: by the
+    seed, others in each draw."""
     size: Point = (12.0, 9.0)
     height: Positive = 3.2
     wall: Material = "wall"
@@ -469,7 +472,8 @@ class WorldConfig:
     @property
     def label(self) -> str:
         """Its name, and its draw where that is not the one for development."""
-        return f"{self.name}, draw {self.draw}" if self.draw else self.name
+        plan = ", drawn plan" if self.plan == "drawn" else ""
+        return f"{self.name}{plan}, draw {self.draw}" if self.draw else f"{self.name}{plan}"
 
     @property
     def eye_height(self) -> float:

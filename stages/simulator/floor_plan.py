@@ -66,6 +66,7 @@ def plan_of(world: WorldConfig, day: int) -> FloorPlan:
     """A simulated world's plan on a day."""
     from .world import World, outline  # slow to import, and not needed for recorded logs
 
-    outlines = np.array([outline(box) for box in World(world, day).obstacles]).reshape(-1, 4, 2)
-    width, depth = world.size
+    built = World(world, day)
+    outlines = np.array([outline(box) for box in built.obstacles]).reshape(-1, 4, 2)
+    width, depth = built.config.size
     return FloorPlan(outlines, float(width), float(depth))

@@ -78,6 +78,9 @@ TABLES: dict[Furniture, tuple[Point, Material]] = {
 }
 """Size and look of the table in the middle, where there is room around it."""
 
+TABLE_ROOM_M = 4.3
+"""Metres that a room is wider than a table in it, so that a robot gets around the table and what stands along walls."""
+
 
 def openings(config: WorldConfig) -> list[Opening]:
     """The ways through walls of all rooms."""
@@ -298,7 +301,7 @@ def _table(config: WorldConfig, room: Room, shift: float) -> Iterator[Block]:
     width, height = room.size
     if width < height:
         length, depth = depth, length
-    if width - length < 3.6 or height - depth < 3.6:
+    if width - length < TABLE_ROOM_M or height - depth < TABLE_ROOM_M:
         return
     middle = room.corner[0] + width / 2 + max(-0.2, min(0.2, shift)), room.corner[1] + height / 2
     yield Block(middle, (length, depth), 0.74, material, "wood", look=f"{room.name} table", kind="furniture")

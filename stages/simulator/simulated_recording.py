@@ -22,6 +22,7 @@ from omninav.stages.values.scan import Scan
 from . import route_planning
 from .cameras import shutter_times
 from .config import Day, Kidnapping, WorldConfig
+from .drawn_plan import laid_out
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
 from .people import Person, Track
@@ -55,6 +56,7 @@ class SimulatedRecording:
     """
 
     def __init__(self, world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping] = ()) -> None:
+        world = laid_out(world)
         if route not in world.routes:
             raise UnreadableRecording(
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from . import people, textures
 from .bodies import Box, Tiling
 from .config import Block, Lamp, Room, Shelf, WallPanel, WorldConfig
+from .drawn_plan import laid_out
 from .layout import expand
 from .lighting import lamps_and_windows, lamps_on
 from .obstacles import Obstacles, distances, gather
@@ -45,7 +46,7 @@ class World:
     """
 
     def __init__(self, config: WorldConfig, day: int = 0) -> None:
-        self.config = config
+        self.config = config = laid_out(config)
         self.day = day
         self.layout = expand(config, day)
         lamps = self.layout.lamps

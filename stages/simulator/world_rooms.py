@@ -7,10 +7,12 @@ from omninav.stages.recordings.rooms_yaml import rooms_of_log
 from omninav.stages.values.rooms import Rooms
 
 from .config import WorldConfig
+from .drawn_plan import laid_out
 
 
 def rooms_of(world: WorldConfig) -> Rooms | None:
     """The rooms of a world; None where it has none."""
+    world = laid_out(world)
     corners = [(*room.corner, room.corner[0] + room.size[0], room.corner[1] + room.size[1]) for room in world.rooms]
     return Rooms(tuple(room.name for room in world.rooms), np.array(corners, np.float64)) if corners else None
 

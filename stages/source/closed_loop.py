@@ -107,7 +107,7 @@ class ClosedLoop(Source):
         """Build the world; the bodies in it are looked up by place."""
         world = World(self.world, self.day)
         self._world, self._scene = world, world.scene
-        self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
+        self._room = gather(world.obstacles, world.config.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
         self._camera = RobotCamera(self.world, "closed loop", self.day)
         self._bias = draw_bias(self.world.odometry, stream(self.world.draw_seed, "odometry bias", self.day))
@@ -213,8 +213,8 @@ class ClosedLoop(Source):
                 self._kidnappings = (Kidnapping(at=CARRIED_AT_S, to=(x, y, heading)),)
         elif self.start is not None:
             pose = np.array(self.start)
-        elif self.route in self.world.routes:
-            way = route_planning.plan(world, self.world.routes[self.route])
+        elif self.route in world.config.routes:
+            way = route_planning.plan(world, world.config.routes[self.route])
             ahead = next((point for point in way if np.hypot(*(point - way[0])) > 0.1), way[-1]) - way[0]
             pose = np.array([*way[0], np.arctan2(ahead[1], ahead[0])])
         else:
