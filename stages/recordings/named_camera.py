@@ -23,10 +23,9 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
 
     `size`: gives width and height of an image (pixels). Raises `UnreadableRecording` for a projection that needs more.
     """
-    path = user_path(name)
-    if path.exists() or path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+    path, models = user_path(name), camera_models()
+    if name not in models and (path.exists() or path.suffix in (".yaml", ".yml") or len(path.parts) > 1):
         return read_camera(path), [path]
-    models = camera_models()
     camera = models[name].of_size(*size()) if name in models else None
     if camera is None:
         known = [model for model, kind in models.items() if kind.of_size(64, 32) is not None]

@@ -1,6 +1,7 @@
 """camera.yaml: read, written back, and refused by key."""
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 import yaml
@@ -15,6 +16,7 @@ from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
+from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.recording import UnreadableRecording
 
 SIZE = {"width": 640, "height_px": 480}
@@ -133,3 +135,11 @@ def test_camera_info_stands_in_for_a_missing_camera_file() -> None:
     assert isinstance(camera_from_info(info("plumb_bob", [0.0] * 5), "log.mcap"), Perspective)
     with pytest.raises(UnreadableRecording, match="give camera="):
         camera_from_info(info("plumb_bob", [0.1] * 5), "log.mcap")
+
+
+def test_a_projection_is_meant_by_its_name_though_a_file_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "donut").write_text("not a camera")
+    monkeypatch.chdir(tmp_path)
+    camera, files = named_camera("donut", lambda: (640, 640))
+    assert isinstance(camera, Donut)
+    assert files == []
