@@ -108,7 +108,7 @@ class Session(AbstractContextManager["Session"]):
     def step(self, **frame: Any) -> Step:
         """Push a frame and run every stage once. What a frame may bring, its source says (`omninav stages source`).
 
-        Raises `BadInput` where the source refuses the frame: it is then as if it had not come. Raises `StageFailed`
+        Raises `BadInput` where the source refuses the frame, which is then discarded. Raises `StageFailed`
         where a stage raised; after that the session can only be resumed.
         """
         with self._alone():

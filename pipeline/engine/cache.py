@@ -74,7 +74,7 @@ class Cache:
 
     @contextmanager
     def lock(self, key: str) -> Iterator[None]:
-        """Hold the key: others who want the same result wait here until it is there."""
+        """Lock an entry while its result is being computed; others that need it wait."""
         with locked(self.path(key, ".lock")):
             yield
 

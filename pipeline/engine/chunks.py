@@ -1,4 +1,4 @@
-"""The front of an artifact file: arrays as they lie in memory, summed in chunks, read where they are needed."""
+"""Header section of an artifact file: raw arrays with checksums per chunk, read on demand."""
 
 import hashlib
 import io

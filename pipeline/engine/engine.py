@@ -168,7 +168,7 @@ class Engine:
         self._saved = time.monotonic()
 
     def check_source(self) -> None:
-        """Have the source refuse now what it can never give to those who read it. Raises `BadInput`."""
+        """Let the source reject a graph that it can never serve, before the first tick. Raises `BadInput`."""
         source = self.source
         if source is not None and isinstance(source.stage, Source):
             source.stage.check(self.calls[source.name].ctx)
@@ -302,7 +302,7 @@ class Engine:
         return self._rows
 
     def _verify_sequences(self) -> None:
-        """Nothing is computed from sequences that do not hold exactly what the ticks gave."""
+        """Check that the sequences hold exactly what the ticks gave, before anything is computed from them."""
         try:
             for sequence in self.sequences.values():
                 sequence.verify(self.ticks)

@@ -56,7 +56,7 @@ class Starts:
 
 
 class Shares:
-    """Weights or probabilities: not negative, and their sum is 1; of none, nothing is asked."""
+    """Non-negative weights that sum to 1; there may be none."""
 
 
 class UnitRows:

@@ -95,7 +95,7 @@ class Context:
         self._rng = rng
 
     def is_read(self, port: str) -> bool:
-        """Whether anybody reads an output. What nobody reads may be left out, if nothing random is drawn for it."""
+        """Whether an output is connected. An unconnected one may be skipped unless it consumes random numbers."""
         return self.read is None or port in self.read
 
     @property
@@ -122,7 +122,7 @@ class Context:
         (self.run_facts if of_run else self.facts)[name] = value
 
     def warn(self, sentence: str) -> None:
-        """Say once what one has to know to judge the run's results."""
+        """Record a warning, once, that matters for judging the run's results."""
         if sentence not in self.warnings:
             self.warnings.append(sentence)
 

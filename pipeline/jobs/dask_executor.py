@@ -115,7 +115,7 @@ def _client(where: Any) -> Any:
 
 
 def _quiet() -> None:
-    """Keep to ourselves what Dask logs: a worker or a scheduler that is lost is said in one line here."""
+    """Silence Dask's loggers: a lost worker or scheduler is reported in one line here."""
     for name in logging.root.manager.loggerDict:  # each of Dask's has a level of its own
         if name.partition(".")[0] in ("asyncio", "distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)

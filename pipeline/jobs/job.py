@@ -36,7 +36,7 @@ class Job:
     given: Mapping[str, Any]
     """Its first argument."""
     log: Path
-    """The file that gets what it prints. Beside it lie its messages, while it runs."""
+    """Log file of what it prints; a message file lies next to it while the job runs."""
 
     @property
     def messages(self) -> Path:

@@ -20,7 +20,7 @@ LOOK_S = 0.5
 LEASE_S = 60.0
 """Time after which a job ends whose client gives no sign of life, seconds."""
 MAX_LEFT = 1_000_000_000
-"""A process that keeps more than this after a job (bytes) does not get another one."""
+"""Memory above which an idle worker process is replaced (bytes)."""
 
 
 def perform(text: str) -> dict[str, Any]:

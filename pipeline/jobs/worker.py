@@ -19,7 +19,7 @@ from typing import Any
 
 
 def main() -> None:
-    """Run jobs until whoever gives them closes the input or dies, even in the middle of one."""
+    """Run jobs until standard input closes or the parent process dies, even in the middle of one."""
     answers, own_output = os.dup(1), os.dup(2)
     environment, path = dict(os.environ), list(sys.path)
     jobs: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()

@@ -70,7 +70,7 @@ def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = Non
 
 def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> Iterator[Engine]:
     config = planned.config
-    Engine(planned.graph, {}, EngineOptions(planned.seed)).check_source()  # before an artifact is made in vain
+    Engine(planned.graph, {}, EngineOptions(planned.seed)).check_source()  # before time is spent on artifacts
     cache = Cache(Path(str(config["cache"])).absolute()) if config.get("cache") else None
     execution = Execution(
         run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display, bool(config.get("validate", False))

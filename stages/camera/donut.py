@@ -1,4 +1,4 @@
-"""A mirror image with nothing known of the mirror: a ring, one azimuth per radius."""
+"""Uncalibrated catadioptric camera: the mirror image is a ring, with one azimuth along each radius."""
 
 import dataclasses
 from typing import Annotated, Any, Self

@@ -25,7 +25,7 @@ TRAINING_SAMPLE = 1 << 16
 """References, evenly over the map, from which centroids and codebooks are learned."""
 MAX_LISTS = 1 << 15
 PER_TURN = 4
-"""One turn of a view alone gives a quarter of what is wanted at most: few turns are like anything in the map."""
+"""At most 1 / PER_TURN of the candidates come from a single heading, since few headings resemble the map at all."""
 
 
 def faiss_or_none() -> Any:

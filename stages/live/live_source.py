@@ -190,7 +190,7 @@ class LiveSource(Source):
 
     def _told_to_stop(self) -> None:
         self._stop.set()
-        self._give_signals_back()  # who asks twice is not kept waiting
+        self._give_signals_back()  # a second signal terminates at once
 
     def _give_signals_back(self) -> None:
         while self._handlers:

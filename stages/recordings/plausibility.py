@@ -18,7 +18,7 @@ Mask = npt.NDArray[np.bool_]
 MIN_INTERVAL_S = 0.05
 """Stamps of a busy computer come in bunches: of two that are closer, this interval is judged."""
 EXCURSION_S = 1.0
-"""A track that is back after this time was never away; one that stays away longer has started again."""
+"""Longest excursion that is bridged, seconds; a track that stays away longer has started again."""
 LOOK_BACK = 16
 """Stretches to which a track may be back."""
 MIN_STRETCH = 1.5

@@ -186,7 +186,7 @@ def around(state: F64, seconds: npt.ArrayLike) -> F64:
 
 
 def teleport(state: F64, kidnapping: Kidnapping) -> None:
-    """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
+    """Teleport a robot: its `state` (8,) is at rest afterwards, and no distance is counted."""
     state[:3] = compose(state[:3] if kidnapping.to is None else kidnapping.to, (0.0, 0.0, kidnapping.turn))
     state[SPEED] = state[TURNING] = state[IN_CONTACT] = 0.0
 

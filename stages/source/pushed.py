@@ -33,7 +33,7 @@ INTERVAL_NS = 100_000_000
 MAX_STAMP_NS = 1 << 62
 """A stamp lies within 146 years of 1970."""
 MAX_NUMBER = 1e8
-"""Of a pose, metres or radians: more than any map's coordinates."""
+"""Largest accepted coordinate of a pose (m, rad)."""
 MAX_READINGS = 100_000
 """Of a ring of ranges."""
 MAX_MOTION_M = 1000.0
