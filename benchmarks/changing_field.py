@@ -148,7 +148,7 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
         "particle_clustering",
         "map_update",
         "mapping",
-        "past_states",
+        "fixed_lag_smoother",
     }
     kept = {name for name in kept | {"initial_map", "estimate"} if nodes.get(name)}
     config["nodes"] = {name: nodes[name] for name in nodes if name in kept}

@@ -24,7 +24,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
-from omninav.stages.homing.warping import WarpingVector, WarpingVectorState
+from omninav.stages.homing.warping import MinWarping, MinWarpingState
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.homing import HomingTarget, HomingVector
@@ -99,13 +99,13 @@ class Methods:
 
     def warping(self, pair: Pair, given: HomingVector = LOST, compass: float | None = None) -> HomingVector:
         """Columns; with a compass the target's view is turned to the present heading, and 10 degrees are searched."""
-        stage = WarpingVector(max_turn_deg=180.0 if compass is None else 10.0)
+        stage = MinWarping(max_turn_deg=180.0 if compass is None else 10.0)
         stage.setup(self._ctx)
         target = pair.target
         if compass is not None:
             columns = round(pair.turn / to_the_right(pair.camera))
             target = Image(np.roll(target.pixels, -columns, axis=1))
-        found = stage.step(self._ctx, WarpingVectorState(), pair.here, given, target, pair.camera).vector
+        found = stage.step(self._ctx, MinWarpingState(), pair.here, given, target, pair.camera).vector
         assert found is not None
         return found
 

@@ -16,7 +16,7 @@ from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.view_comparison import ViewComparison
-from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
@@ -138,7 +138,7 @@ def _map() -> list[Row]:
         LoopClosure(place_size=1e-6, min_support=1.0),
     )
     assert len(few) == PLACES
-    match, context = MatchPlaces(), Context("match")
+    match, context = VisualDistance(), Context("match")
     match.setup(context)
     look = medians({"look": lambda: match.step(context, views[-1], GREY, few)}, rounds=15)["look"]
     return [

@@ -223,8 +223,9 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
         return
     value = str(word.input_line).partition("=")[2]
     parents, name, inside = _deepest(config, path)
-    if path in replaced():
-        yield Problem(path, "this setting is gone", replaced()[path])
+    gone = next((each for each in replaced() if path == each or path.startswith(f"{each}.")), None)
+    if gone is not None:
+        yield Problem(gone, "this setting is gone", replaced()[gone])
         return
     if word.is_add():
         if name is None and not word.is_force_add() and not isinstance(inside, Mapping):

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import user_path, whole_file
-from omninav.pipeline.graph.contents import misfit, stored_fields
+from omninav.pipeline.graph.contents import stored_fields, violation
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
@@ -140,7 +140,7 @@ def read_artifact(path: str | Path, whole: bool = False) -> Value:
             value = cls(**fields | decode(fields.pop("rest").tobytes()))
         except (BadEncoding, TypeError) as error:
             raise Unfit(f"does not fit {cls.__name__} of this version ({error!s:.160})") from None
-        wrong = misfit(value)
+        wrong = violation(value)
         if wrong is not None:
             raise Unfit(f"it is no sound {cls.__name__}: {wrong}")
         return value

@@ -67,7 +67,7 @@ class Covariances:
     """Matrices (…, n, n) that are symmetric, with variances above zero and no negative eigenvalue."""
 
 
-def misfit(value: Value) -> str | None:
+def violation(value: Value) -> str | None:
     """Describes the first field that does not hold what it states; None where each does."""
     return next(_wrong_fields(value), None)
 
@@ -78,7 +78,7 @@ def wrong_output(thing: Any, kind: Any, optional: bool) -> str | None:
         return None if optional else f"is missing, expected {type_name(kind)}; write `{type_name(kind)} | None`"
     if not _is(thing, kind):
         return f"is {_shown(thing)}, expected {type_name(kind)}"
-    wrong = misfit(thing) if isinstance(thing, Value) else None
+    wrong = violation(thing) if isinstance(thing, Value) else None
     return None if wrong is None else f"is no sound {type(thing).__name__}: {wrong}"
 
 

@@ -11,8 +11,8 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import drawn, floored, moments
 from omninav.stages.values.belief import GaussianMixture, Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose, StartPose
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ class GrowingPrior:
     """Standard deviation of the heading at which a map is begun; 0.1 rad where there is a map."""
 
     def known(
-        self, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None
+        self, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None
     ) -> tuple[Array, Array] | None:
         """The pose (3,) and its standard deviations (3,), or None where the belief is uniform over the map."""
         at = self.at if restart is None else restart.at or "uniform"
@@ -69,7 +69,7 @@ class ParticlesInMap(GrowingPrior, Stage):
 
         belief: Particles | None = None
 
-    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None) -> Out:
+    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None) -> Out:
         """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
@@ -95,7 +95,7 @@ class MixtureInMap(GrowingPrior, Stage):
 
         belief: GaussianMixture | None = None
 
-    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None) -> Out:
+    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None) -> Out:
         """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()

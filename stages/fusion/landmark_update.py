@@ -13,10 +13,10 @@ from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.geometry.probability.gaussians import intersected
 from omninav.stages.geometry.probability.particles import are_within, share_within, systematic, weighted_moments
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.track import Track
 
 from .covariance_intersection import alpha_of_min_determinant
@@ -86,7 +86,7 @@ class LandmarkUpdate(Stage):
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
-        restart: Restart | None = None,
+        restart: Reinitialise | None = None,
         track: Track | None = None,
     ) -> Out:
         """Fuse belief and fix."""

@@ -9,11 +9,11 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.particles import uniform_around
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose, StartPose
-from omninav.stages.values.requests import Restart
 
 RADIUS = 2.0
 """Distance from a reference, in appearance length scales, up to which a uniform belief extends without `area`."""
@@ -44,7 +44,7 @@ class ParticlePrior(Stage):
         truth: Pose | None = None,
         length_scale: LengthScale | None = None,
         area: FreeSpace | None = None,
-        restart: Restart | None = None,
+        restart: Reinitialise | None = None,
         tick: Tick | None = None,
     ) -> Out:
         """Give the first belief, also where somebody asks a running robot to start again (`restart`).

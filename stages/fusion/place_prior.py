@@ -7,8 +7,8 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose, StartPose
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.topological_map import TopologicalMap
 
 
@@ -31,7 +31,12 @@ class PlacePrior(Stage):
         belief: PlaceBelief | None = None
 
     def step(
-        self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None, restart: Restart | None = None
+        self,
+        ctx: Context,
+        tick: Tick,
+        map: TopologicalMap,
+        truth: Pose | None = None,
+        restart: Reinitialise | None = None,
     ) -> Out:
         """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
         where = self.at if restart is None else restart.at or "uniform"

@@ -11,11 +11,11 @@ from omninav.stages.geometry.landmarks.unbroken_view import Carried, carried
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.track import Track
 
 Array = npt.NDArray[np.float64]
@@ -93,7 +93,7 @@ class UnbrokenTrack(Stage):
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
-        restart: Restart | None = None,
+        restart: Reinitialise | None = None,
     ) -> Out:
         """Judge one image; `features`: of it, from which `fix` was made."""
         unit = metres_of(length_scale)

@@ -11,7 +11,7 @@ from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.values.image import Pixels
 
-from .column_warping import LOG_STEP, Columns, Floats
+from .min_warping import LOG_STEP, Columns, Floats
 
 FINER = 4
 """Samples per column and per row, which are averaged."""

@@ -12,7 +12,7 @@ from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Image, Panorama
 
 from .column_table import ColumnTable
-from .column_warping import Columns, warped
+from .min_warping import Columns, warped
 
 NOISE_LEVELS = 14.0
 """Difference of intensity (of 255) that the same thing may have in two views; smaller ones count for more."""
@@ -26,14 +26,14 @@ MIN_COLUMNS = 20
 """Columns that must match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 
 
-class WarpingVectorState(State):
+class MinWarpingState(State):
     """`target`: the number of the target; `nearness`: at the first vector towards it, 0 before that."""
 
     target: int = -1
     nearness: float = 0.0
 
 
-class WarpingVector(Stage):
+class MinWarping(Stage):
     """Computes the way from the robot to the target view by warping whole columns of one image to those of the other.
 
     Möller, Krzykawski & Gerstmayr 2010: for every direction and turn, how well do the columns of one view match those
@@ -63,7 +63,7 @@ class WarpingVector(Stage):
     def step(
         self,
         ctx: Context,
-        state: WarpingVectorState,
+        state: MinWarpingState,
         image: Image | Panorama,
         vector: HomingVector,
         target: Image | Panorama | None = None,

@@ -11,7 +11,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import camera_from_info
-from omninav.stages.recordings.live_record import DriveSoFar, Frame, LiveHeader, Role
+from omninav.stages.recordings.live_record import Frame, LiveHeader, OdometryBuffer, Role
 from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, is_blank, pixels_of
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.plausibility import EXCURSION_S
@@ -64,7 +64,7 @@ class Intake:
     transport: Transport
     status: LiveStatus
     header: LiveHeader
-    drive: DriveSoFar
+    drive: OdometryBuffer
     camera: Camera | str | None
     """A projection's name says enough with the first image; None: the robot's CameraInfo does."""
     camera_info: str | None

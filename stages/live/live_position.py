@@ -11,9 +11,9 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import Frame
 from omninav.stages.source.outputs import motion_of
 from omninav.stages.values.image import Image
-from omninav.stages.values.pose import GuessedMotion, Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 
-Guess = Callable[["LiveSourceState", Image, Camera, float | None], GuessedMotion | None]
+Guess = Callable[["LiveSourceState", Image, Camera, float | None], AssumedMotion | None]
 """Says the motion to an image, seconds after the one before, and goes on with the position."""
 
 

@@ -13,11 +13,11 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.recordings.camera_yaml import read_camera
-from omninav.stages.recordings.live_record import HEADER, DriveSoFar, Frame, LiveHeader, LiveRecording, Role
+from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, LiveRecording, OdometryBuffer, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.topics import IMAGE_TOPICS
-from omninav.stages.source.guessed_motion import VisualCompass, reckon, settled_speed
+from omninav.stages.source.dead_reckoning import VisualCompass, assumed_speed, dead_reckon
 from omninav.stages.source.outputs import DriveOutputs, pose_of
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
@@ -99,7 +99,7 @@ class LiveSource(Source):
     def check(self, ctx: Context) -> None:
         """Refuse a variant that needs odometry, where there is none and no speed is stated; and what is not there."""
         if self._odometry_topic() is None:
-            self._settled_speed(ctx)
+            self._assumed_speed(ctx)
         self._roles(ctx.is_read("scan"))
         self._connect()
 
@@ -110,7 +110,7 @@ class LiveSource(Source):
         self._header = LiveHeader(roles, self.limits)
         self._guess: Guess | None = None
         if self._odometry_topic() is None:
-            self._guess = partial(reckon, VisualCompass(), self._settled_speed(ctx))
+            self._guess = partial(dead_reckon, VisualCompass(), self._assumed_speed(ctx))
         ctx.fact("odometry", "guessed" if self._guess else "measured")
         self._transport, assumed = self._connect()
         if assumed:
@@ -170,7 +170,7 @@ class LiveSource(Source):
             transport=self._transport,
             status=self._transport.status,
             header=self._header,
-            drive=DriveSoFar(self._header) if before is None else before.drive,
+            drive=OdometryBuffer(self._header) if before is None else before.drive,
             camera=self._camera if before is None else before.camera,
             camera_info=self.topics.camera_info,
             patience_s=PATIENCE_S,
@@ -297,9 +297,9 @@ class LiveSource(Source):
     def _odometry_topic(self) -> str | None:
         return self.topics.odometry if self._device() is None and self.speed_m_s is None else None
 
-    def _settled_speed(self, ctx: Context) -> float:
+    def _assumed_speed(self, ctx: Context) -> float:
         name = "the robot" if self._device() is None else f"log={self.log}"
-        return settled_speed(ctx, name, None, self.speed_m_s, has_truth=False)
+        return assumed_speed(ctx, name, None, self.speed_m_s, has_truth=False)
 
     def _roles(self, scan: bool) -> dict[str, Role]:
         wanted: list[tuple[str | None, Role]] = [

@@ -34,7 +34,7 @@ class Arrival(NamedTuple):
     data: bytes
 
 
-class Inbox:
+class MessageQueue:
     """Arrivals between the transport's thread and the one that takes them: bounded, whatever the taker does."""
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class Transport(ABC):
     """
 
     def __init__(self) -> None:
-        self.inbox, self.status = Inbox(), LiveStatus()
+        self.inbox, self.status = MessageQueue(), LiveStatus()
         self.place = ""
         """Where it listens, for messages: the transport and its domain."""
         self.farewells: list[Callable[[], None]] = []

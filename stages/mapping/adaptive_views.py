@@ -22,7 +22,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
-from .before_threshold import BeforeThreshold, begin, due
+from .pending_updates import PendingUpdates, ready_updates, start_over
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -111,13 +111,13 @@ class AdaptiveViews(Stage):
         updates: MapUpdates | None,
         threshold: NoveltyThreshold | None,
         map: ViewMixtures,
-        waiting: BeforeThreshold,
+        waiting: PendingUpdates,
     ) -> Out:
         """Apply the updates of this tick."""
         map.keep_threshold(threshold)
         before = map.ids
-        begin(updates, map, waiting)
-        ready = due(() if updates is None else updates.items, threshold, map, waiting)
+        start_over(updates, map, waiting)
+        ready = ready_updates(() if updates is None else updates.items, threshold, map, waiting)
         if not ready:
             return self.Out(map=map)
         changed: list[Ints] = []

@@ -17,7 +17,7 @@ from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
 from .applied_update import AppliedUpdate, record_update
-from .before_threshold import BeforeThreshold, begin, due
+from .pending_updates import PendingUpdates, ready_updates, start_over
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -31,7 +31,7 @@ MIN_WEIGHT = 0.01
 """Weight below which a component is removed."""
 
 
-class FusedMixturesState(BeforeThreshold):
+class FusedMixturesState(PendingUpdates):
     """Updates that wait for a threshold, and applied ones that can be undone."""
 
     open: list[AppliedUpdate] = field(default_factory=list)
@@ -80,10 +80,10 @@ class FusedMixtures(Stage):
         open_from = math.inf if updates.open_from is None else updates.open_from
         pending.open = [] if updates.relearn else [applied for applied in pending.open if applied.index >= open_from]
         before = map.ids.copy()
-        begin(updates, map, pending)
+        start_over(updates, map, pending)
         new, changed = self._redo(ctx, updates.items, pending, map) if open_from < math.inf else (updates.items, [])
         seen: dict[int, int] = {}
-        for update in due(new, threshold, map, pending):
+        for update in ready_updates(new, threshold, map, pending):
             seen[map.next_id] = update.index  # if it is a new one
             applied = self._apply(update, threshold, map)
             changed.append(applied.ids)

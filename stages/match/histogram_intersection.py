@@ -37,5 +37,5 @@ class HistogramIntersection(ReferenceMatch, Stage):
     ) -> npt.NDArray[np.float32]:
         return similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
 
-    def how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+    def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         return 0.0, None

@@ -22,5 +22,5 @@ class L2Match(ReferenceMatch, Stage):
     ) -> npt.NDArray[np.float32]:
         return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)
 
-    def how_compared(self, features: SegmentFeatures) -> tuple[None, float]:
+    def exponent_and_scale(self, features: SegmentFeatures) -> tuple[None, float]:
         return None, max_distance_of(len(features.values), features.kind)

@@ -59,7 +59,7 @@ class ReferenceMatch(ABC):
         if words is not None and self.word_power:
             values = values * words.factors(len(map), candidates.references, self.word_power)[:, None]
         similarities = Similarities(
-            values, candidates.references, candidates.sampling_weight, *self.how_compared(features)
+            values, candidates.references, candidates.sampling_weight, *self.exponent_and_scale(features)
         )
         if not ctx.is_read("calibration"):
             return self.Out(similarities=similarities)
@@ -75,7 +75,7 @@ class ReferenceMatch(ABC):
     ) -> npt.NDArray[np.float32]:
         """Similarities to the chosen references, None for all: (chosen, headings)."""
 
-    def how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+    def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         """`exponent` and `colour_scale` of the similarities."""
         return None, None
 

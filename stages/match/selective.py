@@ -32,10 +32,10 @@ class SelectiveMatch(ReferenceMatch, Stage):
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
-        exponent, scale = self.how_compared(features)
+        exponent, scale = self.exponent_and_scale(features)
         histograms = features.kind == "histograms"
         return similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
 
-    def how_compared(self, features: SegmentFeatures) -> tuple[float, float]:
+    def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float, float]:
         kind = features.kind
         return EXPONENTS[self.penalty], self.colour_scale if kind == "colours" else MAX_DISTANCES[kind]

@@ -19,7 +19,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
 
-class MatchPlaces(Stage):
+class VisualDistance(Stage):
     """Visual distance to every place of a map: global colours first, local features where these leave it open.
 
     Goedemé et al. 2007, section 4.2: equations 3 and 4 (erratum 27 in docs/papers.md) against each place's medoid. The

@@ -10,7 +10,7 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
 
-from .after_lifts import lifted
+from .kidnap_recovery import lifted
 
 CARRIED_M = 0.5
 """Distance between true motion and odometry of one tick from which the robot was carried."""

@@ -19,7 +19,8 @@ class ResamplingSpread(MetricStage):
 
     Porta & Kröse 2004, section 3.1: resampling by pi p(y|x) gives "a concentration of the particles in the
     prior-likelihood intersection". The spread is the root of the summed variances of x and y (m); belief and map agree
-    where the particles' mean density under the map's hypothesis is above `AGREE_ABOVE` (as `Agreement` decides).
+    where the particles' mean density under the map's hypothesis is above `AGREE_ABOVE` (as
+    `ConditionalResampling` decides).
 
     Under `resampling`: `frames`, where they agree; `before_m` and `after_m`, the mean spreads there; `ratio`, the
     second over the first. Only `frames` where they never agree.

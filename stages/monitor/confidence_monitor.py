@@ -13,6 +13,7 @@ from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.confidence import (
     MIN_EMPTY,
     MIN_SEEN,
@@ -28,7 +29,6 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.track import Track
 
@@ -178,7 +178,7 @@ class ConfidenceMonitor(Stage):
         likelihood: Likelihood | None = None,
         motion: Motion | None = None,
         conflicts: Conflicts | None = None,
-        restart: Restart | None = None,
+        restart: Reinitialise | None = None,
         fix: LandmarkFix | None = None,
         features: LocalFeatures | None = None,
         track: Track | None = None,

@@ -15,13 +15,13 @@ from omninav.stages.geometry.appearance.visual_compass import turns_and_correlat
 from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.conflicts import FOREIGN, Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.image import Strip
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
-from omninav.stages.values.requests import Restart
+from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 from omninav.stages.values.similarity import Similarities
 
 from .confidence_monitor import best_place
@@ -149,7 +149,7 @@ class InputConflicts(Stage):
         length_scale: LengthScale | None = None,
         map_conflicts: Conflicts | None = None,
         estimate: PoseEstimate | None = None,
-        restart: Restart | None = None,
+        restart: Reinitialise | None = None,
     ) -> Out:
         """One image, or a tick without one. `estimate`: where matches are not scattered by changed light."""
         of_map = () if map_conflicts is None else map_conflicts.sentences
@@ -196,7 +196,7 @@ class InputConflicts(Stage):
 def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     """Whether the clock leapt since the last image: much time went by, or less than none, yet the robot drove on as
     between other images, which no pause explains; else ""."""
-    if odometry is None or isinstance(odometry, GuessedPose) or len(recent.rows) < MIN_BEFORE_LEAP:
+    if odometry is None or isinstance(odometry, AssumedPose) or len(recent.rows) < MIN_BEFORE_LEAP:
         return ""
     seconds = (tick.stamp - recent.stamp) / 1e9
     if 0.0 <= seconds < MIN_LEAP_S:
@@ -224,7 +224,7 @@ def is_known(pose: Array) -> bool:
 
 def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Array:
     """Odometry's pose (3,) with a heading that is not wrapped; NaN where motion is only guessed, or not known."""
-    if isinstance(odometry, GuessedPose) or isinstance(motion, GuessedMotion):
+    if isinstance(odometry, AssumedPose) or isinstance(motion, AssumedMotion):
         return np.full(3, np.nan)
     known = is_known(before)
     if odometry is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import wrap_angle
-from omninav.stages.values.pose import BridgedMotion, GuessedMotion, Motion, UncertainMotion
+from omninav.stages.values.pose import AssumedMotion, BridgedMotion, Motion, UncertainMotion
 
 
 @dataclass(kw_only=True, eq=False)
@@ -48,7 +48,7 @@ class OdometryNoiseModel:
                 self.unmeasured_turn * motion.unmeasured_s,
                 self.unmeasured_speed * motion.unmeasured_s,
             )
-        elif isinstance(motion, GuessedMotion):
+        elif isinstance(motion, AssumedMotion):
             more_turn, more_way = motion.sigma_turn, motion.sigma_m
         return UncertainMotion(steps, self.sigmas(steps, more_turn, more_way))
 

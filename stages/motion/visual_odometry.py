@@ -14,7 +14,7 @@ from omninav.stages.geometry.landmarks.visual_odometry import STILL, Keyframes, 
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
-from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
 Array = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
@@ -110,7 +110,7 @@ class VisualOdometry(Stage):
         fix: LandmarkFix | None = None,
     ) -> Out:
         """See the motion to one image; `fix`: what the map said of the image before."""
-        if motion is not None and not isinstance(motion, GuessedMotion):
+        if motion is not None and not isinstance(motion, AssumedMotion):
             return self.Out(motion=motion, odometry=odometry)
         descriptors = features.descriptors
         if motion is None:
@@ -147,19 +147,19 @@ class VisualOdometry(Stage):
             if found.scaled and not lost and length > MOVING * state.speed_ratio * guess:
                 state.speed_ratio += SPEED_GAIN * (length / guess - state.speed_ratio)
             sigma = math.hypot(SCALE_SIGMAS[int(not known)] * length, unit * found.sigmas[0])
-            seen = GuessedMotion(x, y, turn, sigma, found.sigmas[1])
+            seen = AssumedMotion(x, y, turn, sigma, found.sigmas[1])
         state.odometry = compose(state.odometry, (seen.x, seen.y, seen.turn))
-        return self.Out(motion=seen, odometry=GuessedPose(*state.odometry.tolist()))
+        return self.Out(motion=seen, odometry=AssumedPose(*state.odometry.tolist()))
 
     def _lost(
         self,
         ctx: Context,
         state: VisualOdometryState,
-        guess: GuessedMotion,
+        guess: AssumedMotion,
         usual: float,
         bearings: Array,
         descriptors: Bytes,
-    ) -> GuessedMotion:
+    ) -> AssumedMotion:
         ctx.count("motion_not_seen", detail=f"image {ctx.tick.frame}: too few points agree on a motion")
         state.lost += 1
         if not (state.seen or self.speed_m_s or ctx.tick.log) and state.lost >= MAX_LOST:
@@ -170,7 +170,7 @@ class VisualOdometry(Stage):
         seen = guess
         if state.seen:  # else as it was stated, for images that hold no points at all
             x, y = usual * math.cos(guess.turn / 2), usual * math.sin(guess.turn / 2)
-            seen = GuessedMotion(x, y, guess.turn, max(usual, guess.sigma_m), guess.sigma_turn)
+            seen = AssumedMotion(x, y, guess.turn, max(usual, guess.sigma_m), guess.sigma_turn)
         state.pose, state.anchor = compose(state.pose, (seen.x, seen.y, seen.turn)), None
         if state.lost >= MAX_LOST:
             state.keyframes = begun(state.pose, bearings, descriptors)

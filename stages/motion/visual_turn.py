@@ -12,7 +12,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.turn_by_flow import smoothness, turn_by_flow
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Panorama
-from omninav.stages.values.pose import GuessedMotion, Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 
 from .odometry_noise import OdometryNoiseModel
 
@@ -80,6 +80,6 @@ class VisualTurn(OdometryNoiseModel, Stage):
             y=sin * motion.x + cos * motion.y,
             turn=float(wrap(motion.turn + change)),
         )
-        if isinstance(turned, GuessedMotion):
+        if isinstance(turned, AssumedMotion):
             turned = replace(turned, sigma_turn=min(turned.sigma_turn, sigma))
         return self.Out(motion=turned)

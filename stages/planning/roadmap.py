@@ -12,6 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
@@ -19,7 +20,6 @@ from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.requests import GoalPoint
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput, nearest
 from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.requests import GoalPoint
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 

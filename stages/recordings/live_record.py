@@ -13,8 +13,8 @@ import numpy.typing as npt
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.commands import GoalPoint, Reinitialise
 from omninav.stages.values.image import Pixels
-from omninav.stages.values.requests import GoalPoint, Restart
 from omninav.stages.values.scan import Scan
 
 from .camera_yaml import parse_camera
@@ -69,11 +69,11 @@ class Frame(NamedTuple):
     unmeasured_s: float
     truth: Array | None
     scan: Scan | None
-    restart: Restart | None
+    restart: Reinitialise | None
     goal: GoalPoint | None
 
 
-class DriveSoFar:
+class OdometryBuffer:
     """What is known of a drive from the messages that have come, in the order in which they came."""
 
     def __init__(self, header: LiveHeader) -> None:
@@ -81,7 +81,7 @@ class DriveSoFar:
         self.odometry = LiveTrack(header.limits, jumps=False) if "odometry" in roles else None
         self.truth = LiveTrack(header.limits, jumps=True) if "truth" in roles else None
         self._scans: deque[tuple[int, Scan, Any]] = deque(maxlen=SCANS)
-        self._restart: Restart | None = None
+        self._restart: Reinitialise | None = None
         self._goal: GoalPoint | None = None
 
     def add(self, role: Role, stamp: int, message: Any, item: Any = None) -> list[Any]:
@@ -100,9 +100,9 @@ class DriveSoFar:
             x, y, _ = pose_of(message)
             self._goal = GoalPoint(x, y)
         elif role == "restart":
-            self._restart = Restart()
+            self._restart = Reinitialise()
         elif role == "initial_pose":
-            self._restart = Restart(_start_of(message))
+            self._restart = Reinitialise(_start_of(message))
         return [item]
 
     def frame(self, stamp: int) -> tuple[Frame, list[Any]] | None:
@@ -137,7 +137,7 @@ class LiveRecording(TopicRecording):
         self._frames: list[Frame] = []
         stamps: list[int] = []
         places: list[tuple[str, Any]] = []
-        drive = self.drive = DriveSoFar(header)
+        drive = self.drive = OdometryBuffer(header)
         for record in feed.scan(set(header.topics)):
             role = header.topics[record.topic]
             if role == "image":
@@ -177,7 +177,7 @@ class LiveRecording(TopicRecording):
         """The range readings that the tick had."""
         return self._frames[frame].scan
 
-    def restart(self, frame: int) -> Restart | None:
+    def restart(self, frame: int) -> Reinitialise | None:
         """Where the belief was to start again at that tick."""
         return self._frames[frame].restart
 

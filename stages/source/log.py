@@ -14,9 +14,9 @@ from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
 from omninav.stages.values.image import Image
-from omninav.stages.values.pose import GuessedPose, Motion, Pose
+from omninav.stages.values.pose import AssumedPose, Motion, Pose
 
-from .guessed_motion import VisualCompass, advance, reckon, settled_speed
+from .dead_reckoning import VisualCompass, advance, assumed_speed, dead_reckon
 from .log_parts import LogPart
 from .outputs import motion_of, pose_of
 from .playback import Playback, PlaybackState
@@ -71,7 +71,7 @@ class LogSource(Playback):
         self._open()
         for part in self._parts:
             if part.kind == "guessed":
-                self._settled_speed(ctx, part)
+                self._assumed_speed(ctx, part)
 
     def recordings(self) -> list[Recording]:
         """Open the logs by their names."""
@@ -89,7 +89,7 @@ class LogSource(Playback):
         if part.kind == "synthetic":
             ctx.warn(f"No odometry in {part.recording.name}: made from its true positions, with noise")
         elif part.kind == "guessed":
-            self._speed = self._settled_speed(ctx, part)
+            self._speed = self._assumed_speed(ctx, part)
         else:
             super()._begin(ctx, part)
 
@@ -103,19 +103,19 @@ class LogSource(Playback):
         motion: Motion | None = None
         if part.kind == "guessed":
             seconds = None if last is None else float(recording.stamps[frame] - recording.stamps[last]) / 1e9
-            motion = reckon(self._compass, self._speed, position, image, recording.camera, seconds)
+            motion = dead_reckon(self._compass, self._speed, position, image, recording.camera, seconds)
         elif last is not None:
             motion = motion_of(self._synthetic(ctx, between(part.driven[last], part.driven[frame])))
             advance(position, motion)
         odometry = np.array([position.x, position.y, position.heading])
-        return pose_of(odometry, GuessedPose if part.kind == "guessed" else Pose), motion
+        return pose_of(odometry, AssumedPose if part.kind == "guessed" else Pose), motion
 
     def _guesses(self) -> bool:
         return self.speed_m_s is not None
 
-    def _settled_speed(self, ctx: Context, part: LogPart) -> float:
+    def _assumed_speed(self, ctx: Context, part: LogPart) -> float:
         placed = part.truth is not None and not isinstance(part.recording, LiveRecording)
-        return settled_speed(ctx, part.recording.name, part.recording.camera, self.speed_m_s, placed)
+        return assumed_speed(ctx, part.recording.name, part.recording.camera, self.speed_m_s, placed)
 
     def _synthetic(self, ctx: Context, increment: Array) -> Array:
         return add_odometry_noise(

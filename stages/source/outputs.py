@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Outputs, Tick
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.commands import GoalPoint, Reinitialise
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import BridgedMotion, Motion, Pose
-from omninav.stages.values.requests import GoalPoint, Restart
 from omninav.stages.values.scan import Scan
 
 Array = npt.NDArray[np.float64]
@@ -25,7 +25,7 @@ class DriveOutputs(Outputs):
     motion: Motion | None = None
     truth: Pose | None = None
     scan: Scan | None = None
-    restart: Restart | None = None
+    restart: Reinitialise | None = None
     goal: GoalPoint | None = None
 
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 
-from .requests import GoalPoint
+from .commands import GoalPoint
 
 
 class PlannedRoute(Value):

@@ -40,7 +40,7 @@ class BridgedMotion(Motion):
     unmeasured_s: Annotated[float, Bounds(ge=0)]
 
 
-class GuessedMotion(Motion):
+class AssumedMotion(Motion):
     """A motion that no odometry measured: far less certain than a measured one.
 
     `sigma_m`: standard deviation of its length. `sigma_turn`: of its turn (rad).
@@ -60,7 +60,7 @@ class UncertainMotion(Value):
     sigmas: tuple[float, float, float]
 
 
-class GuessedPose(Pose):
+class AssumedPose(Pose):
     """A pose that guessed motions led to, in a frame of its own."""
 
 
@@ -77,4 +77,4 @@ SOURCE_WORDS: dict[PoseSource, str] = {
 
 def frame_of(odometry: Pose | None) -> PoseSource:
     """The source of poses that are stored where there is no ground truth."""
-    return "guess" if isinstance(odometry, GuessedPose) else "odometry"
+    return "guess" if isinstance(odometry, AssumedPose) else "odometry"

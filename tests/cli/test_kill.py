@@ -51,7 +51,7 @@ def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resume
     words = ("variant=particle_cml", logs, "nodes.source.stop=90", "cache=null")
     whole, killed = finished(tmp_path / "whole", *words), tmp_path / "killed" / "runs" / "latest"
     counted = json.loads((whole / "manifest.json").read_text())["dropped"]
-    assert {"past_states.view_propagated", "mapping.update_undone"} <= set(counted)
+    assert {"fixed_lag_smoother.view_propagated", "mapping.update_undone"} <= set(counted)
 
     moments, kills, last = random.Random(7), 0, 0
     process = start(tmp_path / "killed", *words, "checkpoint_s=0.05")

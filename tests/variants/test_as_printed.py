@@ -24,7 +24,7 @@ def gross() -> Graph:
 
 def test_porta_and_kroese_learn_from_every_state_at_once_and_carry_nothing_back(porta: Graph):
     assert type(porta.nodes["map_update"].stage).__name__ == "ImmediateUpdate"
-    assert "past_states" not in porta.nodes
+    assert "fixed_lag_smoother" not in porta.nodes
 
 
 def test_porta_and_kroese_compare_views_as_they_are_with_their_brightness(porta: Graph):
@@ -42,7 +42,7 @@ def test_porta_and_kroese_have_points_for_places_and_resample_by_importance(port
     assert not porta.nodes["sensor"].stage.extent
     assert porta.nodes["sensor"].stage.views == "all"
     fusion = porta.nodes["fusion"].stage
-    assert type(fusion).__name__ == "Agreement"
+    assert type(fusion).__name__ == "ConditionalResampling"
     assert (fusion.sampling, fusion.agree_above, fusion.keep) == ("importance", 1e-4, 0.8)
     assert fusion.outlier_probability == 0.0
 

@@ -9,13 +9,13 @@ import numpy.typing as npt
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.fusion.agreement import Agreement
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.fusion.growing_prior import ParticlesInMap
 from omninav.stages.fusion.particle_clustering import ParticleClustering
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
+from omninav.stages.mapping.fixed_lag_smoother import FixedLagSmoother, FixedLagSmootherState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
-from omninav.stages.mapping.past_states import CorrectPastStates, CorrectPastStatesState
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
@@ -74,15 +74,19 @@ def run(
     ctx = {
         name: Context(name, np.random.default_rng(n)) for n, name in enumerate(("first", "motion", "fusion", "rest"))
     }
-    correct = CorrectPastStates(reconstruct_path=reconstruct_path, back_propagate=back_propagate)
+    correct = FixedLagSmoother(reconstruct_path=reconstruct_path, back_propagate=back_propagate)
     known, limit, queue, path, learned = (
         ViewMixtures.empty(),
         NoveltyThreshold(LIMIT),
         DelayedByDistanceState(),
-        CorrectPastStatesState(),
+        FixedLagSmootherState(),
         FusedMixturesState(),
     )
-    start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)
+    start, move, fuse = (
+        ParticlesInMap(number=500),
+        RotationTranslationRotation(),
+        ConditionalResampling(**filter_options),
+    )
     match, sensor, gather, delay, learn = (
         ViewNeighbours(),
         Superposition(),

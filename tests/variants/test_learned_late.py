@@ -9,13 +9,13 @@ from small_run import collected
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_threshold import BeforeThreshold
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
+from omninav.stages.mapping.pending_updates import PendingUpdates
 from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueState
 from omninav.stages.metrics.map_history import MapHistory
-from omninav.stages.metrics.wrong_places import WrongPlaces
+from omninav.stages.metrics.mislocalised_references import MislocalisedReferences
 from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.values.belief import GaussianMixture, PoseEstimate
 from omninav.stages.values.pose import Motion, Pose, UncertainMotion
@@ -29,7 +29,7 @@ SIGMAS = np.diag([0.05, 0.05, 0.02])
 
 WAYS = {
     "left_behind": lambda: (DelayedByDistance(), DelayedByDistanceState(), FusedMixtures(), FusedMixturesState()),
-    "at_once": lambda: (UnimodalQueue(length=0), UnimodalQueueState(), AdaptiveViews(), BeforeThreshold()),
+    "at_once": lambda: (UnimodalQueue(length=0), UnimodalQueueState(), AdaptiveViews(), PendingUpdates()),
 }
 
 
@@ -78,8 +78,8 @@ def test_no_reference_is_new_after_the_first_lap_where_all_laps_are_alike(told):
 def test_no_place_is_wrong_where_every_state_was_right_however_many_are_learned_in_one_tick(told):
     ticks, truth, _, events, mixtures = told
     assert max(len(event.inserted) for event in events if event is not None) > 3
-    found = WrongPlaces().step(Context("wrong"), collected(ticks, truth), events, mixtures).metrics.values
-    assert found["wrong_places"] == {"references": 0}
+    found = MislocalisedReferences().step(Context("wrong"), collected(ticks, truth), events, mixtures).metrics.values
+    assert found["mislocalised_references"] == {"references": 0}
 
 
 def test_the_beginning_of_the_way_is_in_the_map_though_it_was_driven_before_there_was_a_limit(told):

@@ -38,7 +38,7 @@ def test_each_stage_of_one_variant_serves_the_other(v: int, f: int, m: int):
     [
         (("features=hsv_histogram", "unwarp=window"), "is of type Windows"),
         (("features=fourier",), "has no output 'features'"),
-        (("fusion=agreement",), "hypothesis"),
+        (("fusion=conditional_resampling",), "hypothesis"),
     ],
     ids=["a window for who wants a circle", "features of another kind", "a fusion of another kind"],
 )

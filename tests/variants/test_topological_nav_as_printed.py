@@ -5,7 +5,7 @@ import pytest
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.run.plan import Plan, plan
-from omninav.stages.features.sift_and_columns import SiftAndColumns
+from omninav.stages.features.sift_and_vertical_segments import SiftAndVerticalSegments
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.sensor.place_likelihood import PlaceLikelihood
@@ -30,7 +30,7 @@ def is_printed_map(graph: Graph) -> None:
     assert (loops.between, loops.similarity, loops.min_share, loops.accepted) == ("medoids", "ratio", 0.0, "merge")
     assert (mapping.min_path_matches, mapping.spread) == (0, "all_views")
     assert graph.nodes["views"].stage.patch_distance == "mahalanobis"
-    assert type(graph.nodes["features"].stage) is SiftAndColumns
+    assert type(graph.nodes["features"].stage) is SiftAndVerticalSegments
 
 
 def is_printed_place_filter(whole: Plan) -> None:
@@ -40,7 +40,7 @@ def is_printed_place_filter(whole: Plan) -> None:
     assert isinstance(sensor, PlaceLikelihood)
     assert (sensor.tail, sensor.sigma) == ("gaussian", None)
     assert whole.graph.nodes["match"].stage.patch_distance == "mahalanobis"
-    assert type(whole.graph.nodes["features"].stage) is SiftAndColumns
+    assert type(whole.graph.nodes["features"].stage) is SiftAndVerticalSegments
     is_printed_map(map_graph(whole))
 
 
@@ -78,4 +78,4 @@ def test_printed_navigation_is_all_of_these_and_one_route():
 @pytest.mark.parametrize("variant", ["homing", "topological_nav learn=map", "topological_localisation"])
 def test_ours_is_not_as_printed(variant: str):
     features = planned(*f"variant={variant}".split()).graph.nodes["features"].stage
-    assert type(features) is not SiftAndColumns
+    assert type(features) is not SiftAndVerticalSegments

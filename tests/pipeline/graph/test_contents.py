@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import MAX_MAGNITUDE, Covariances, RowsOf, Shape, Starts, misfit
+from omninav.pipeline.graph.contents import MAX_MAGNITUDE, Covariances, RowsOf, Shape, Starts, violation
 
 Reals = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -44,8 +44,8 @@ def stated(**changes: object) -> Stated:
 
 
 def test_a_value_that_holds_what_it_states_is_sound():
-    assert misfit(stated()) is None
-    assert misfit(stated(part=None)) is None
+    assert violation(stated()) is None
+    assert violation(stated(part=None)) is None
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_value_that_holds_what_it_states_is_sound():
     ],
 )
 def test_what_does_not_fit_is_named(changes: dict[str, object], said: str):
-    wrong = misfit(stated(**changes))
+    wrong = violation(stated(**changes))
     assert wrong is not None
     assert said in wrong
     assert len(wrong) < 200

@@ -8,7 +8,7 @@ import pytest
 
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.cli.main import main
-from omninav.pipeline.graph.contents import misfit
+from omninav.pipeline.graph.contents import violation
 from omninav.stages.features.onnx_encoder import OnnxEncoder, encoder_input
 from omninav.stages.values.features import SegmentDescriptors
 from omninav.stages.values.image import Panorama
@@ -54,7 +54,7 @@ def described(**parameters: object) -> np.ndarray:
     stage, ctx = OnnxEncoder(**parameters), Context("features")
     stage.setup(ctx)
     found = stage.step(ctx, panorama=Panorama(PIXELS)).features
-    assert misfit(found) is None
+    assert violation(found) is None
     return found.values
 
 
@@ -118,9 +118,9 @@ def test_without_onnxruntime_it_says_what_to_install(tmp_path: Path, monkeypatch
 
 
 def test_a_descriptor_that_is_no_unit_vector_is_no_descriptor():
-    wrong = misfit(SegmentDescriptors(np.array([[3.0, 4.0]], np.float32)))
+    wrong = violation(SegmentDescriptors(np.array([[3.0, 4.0]], np.float32)))
     assert wrong == "'values' holds a vector of length 5, expected 1"
-    assert misfit(SegmentDescriptors.of(np.array([[3.0, 4.0], [0.0, 0.0]]))) is None
+    assert violation(SegmentDescriptors.of(np.array([[3.0, 4.0], [0.0, 0.0]]))) is None
 
 
 @pytest.mark.parametrize("match", ["cosine", "selective"])

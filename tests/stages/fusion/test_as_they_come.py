@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.augmented_recovery import AugmentedRecovery, AugmentedRecoveryState
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.fusion.covariance_intersection import CovarianceIntersection
 from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
@@ -33,7 +33,7 @@ def test_map_and_belief_agree_above_a_ten_thousandth_else_four_fifths_stay(densi
     wide = np.diag([((2 * np.pi) ** -1.5 / density) ** 2, 1.0, 1.0])[None]
     hypothesis = GaussianMixture(np.zeros((1, 3)), wide, np.ones(1))
     ctx = context()
-    out = Agreement().step(ctx, particles(*[(0.0, 0.0, 0.0)] * 10), hypothesis).belief
+    out = ConditionalResampling().step(ctx, particles(*[(0.0, 0.0, 0.0)] * 10), hypothesis).belief
     assert dict(ctx.counts) == ({"agreed": 1} if agreed else {"disagreed": 1})
     assert (out.poses == 0.0).all(axis=1).sum() == (10 if agreed else 8)
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.auxiliary import auxiliary_filter
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.geometry.plane.odometry_motion import move_poses
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
@@ -52,7 +52,7 @@ def test_as_an_option_it_gives_the_belief_of_importance_sampling_up_to_chance() 
         move_poses(before.poses, AHEAD.steps, AHEAD.sigmas, rng.standard_normal((3, 50_000))), before.weights
     )
     beliefs = [
-        Agreement(sampling=sampling).step(Context("fusion"), particles, at(1.4, 0.3), before, AHEAD).belief
+        ConditionalResampling(sampling=sampling).step(Context("fusion"), particles, at(1.4, 0.3), before, AHEAD).belief
         for sampling in ("importance", "auxiliary")
     ]
     means = [float(belief.weights @ belief.poses[:, 0]) for belief in beliefs]
@@ -135,7 +135,7 @@ def test_a_view_that_fits_the_predictions_but_no_pose_gives_no_belief() -> None:
 def test_where_the_filter_finds_nothing_the_belief_is_that_of_importance_sampling() -> None:
     # Before the motion nothing would have led there; the particles, as they moved, agree with the view.
     there, elsewhere = few(5.0, 5.0), few(-50.0, -50.0)
-    stage = Agreement(sampling="auxiliary")
+    stage = ConditionalResampling(sampling="auxiliary")
     out = stage.step(Context("fusion"), there, at(5.0, 0.3), elsewhere, AHEAD).belief
     assert out.poses[:, 0].tolist() == [5.0, 5.0]
 
@@ -144,6 +144,6 @@ def test_the_outlier_probability_is_the_floor_of_the_auxiliary_filter() -> None:
     # Half of the particles are at the peak p: the agreement is p / 2, the floor of q = 0.2 p / 10, at the peak 1.1 p.
     still = UncertainMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     half = few(*([0.0] * 60 + [9.0] * 60))
-    stage = Agreement(sampling="auxiliary", outlier_probability=0.2)
+    stage = ConditionalResampling(sampling="auxiliary", outlier_probability=0.2)
     out = stage.step(Context("fusion"), half, at(0.0, 0.3), half, still).belief
     assert (out.poses[:, 0] == 0.0).sum() == pytest.approx(120 * 1.1 / 1.2, abs=1)

@@ -4,8 +4,8 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 
@@ -74,7 +74,9 @@ def test_there_is_no_belief_to_begin_with_in_the_middle_of_a_log() -> None:
     assert MixtureInMap().step(context(first=False), two_places(), None).belief is None
 
 
-def moments_of(stage: ParticlesInMap | MixtureInMap, map: ViewMixtures, truth: Pose | None = None, **ports: Restart):
+def moments_of(
+    stage: ParticlesInMap | MixtureInMap, map: ViewMixtures, truth: Pose | None = None, **ports: Reinitialise
+):
     """Mean and standard deviations of the first belief, headings around 0."""
     belief = stage.step(context(first=not ports), map, truth, **ports).belief
     assert belief is not None
@@ -102,10 +104,10 @@ def test_a_start_in_a_map_is_less_certain_than_one_that_begins_it(prior: type, k
 
 @pytest.mark.parametrize("prior", PRIORS)
 def test_who_asks_to_start_again_says_where_or_means_anywhere_in_the_map(prior: type) -> None:
-    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Restart((6.0, 7.0, -1.0, 0.3, 0.2)))
+    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Reinitialise((6.0, 7.0, -1.0, 0.3, 0.2)))
     assert mean == pytest.approx([6.0, 7.0, -1.0], abs=0.05)
     assert spread == pytest.approx([0.3, 0.3, 0.2], rel=0.1)
-    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Restart())
+    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Reinitialise())
     assert mean[:2] == pytest.approx([5.0, 0.0], abs=0.5)
     assert spread == pytest.approx([25.01**0.5, 0.1, np.pi / 3**0.5], rel=0.1)
 

@@ -7,9 +7,9 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.requests import Restart
 from omninav.stages.values.track import Track
 
 HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
@@ -173,5 +173,7 @@ def test_after_a_restart_a_standing_robot_is_found_by_the_landmarks_it_saw_befor
     stage, ctx, last = LandmarkUpdate(), Context("update", rng, Tick(1, 0)), LandmarkUpdateState()
     still = Motion(0.0, 0.0, 0.0)
     stage.step(ctx, last, anywhere, fix_at(HERE), still)
-    told = [stage.step(ctx, last, anywhere, fix_at(HERE), still, restart=again).belief for again in (None, Restart())]
+    told = [
+        stage.step(ctx, last, anywhere, fix_at(HERE), still, restart=again).belief for again in (None, Reinitialise())
+    ]
     assert share_at(told[1], HERE) > 0.5 > 5.0 * share_at(told[0], HERE)  # without, it is the same image once more

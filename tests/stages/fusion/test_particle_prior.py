@@ -6,11 +6,11 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.requests import Restart
 
 FEATURES, EDGES = np.zeros((1, 1, 1), np.float32), np.zeros((0, 2), np.int64)
 MAP = ReferenceGraph(np.array([[5.0, 5.0, 0.0]]), FEATURES, "histograms", EDGES, "truth")
@@ -63,8 +63,8 @@ def test_a_known_start_has_the_spread_that_is_said_and_headings_within_half_a_tu
 def test_a_belief_begins_again_where_somebody_asks_for_it() -> None:
     stage = ParticlePrior(at="origin", number=500)
     assert begun(stage, first=False) is None
-    there = begun(stage, first=False, restart=Restart((9.0, -9.0, 0.0, 0.1, 0.1)))
-    anywhere = begun(stage, first=False, restart=Restart())
+    there = begun(stage, first=False, restart=Reinitialise((9.0, -9.0, 0.0, 0.1, 0.1)))
+    anywhere = begun(stage, first=False, restart=Reinitialise())
     assert there is not None
     assert anywhere is not None
     assert there.poses.mean(axis=0) == pytest.approx([9.0, -9.0, 0.0], abs=0.03)

@@ -9,8 +9,8 @@ from made_places import made_map
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.place_prior import PlacePrior
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.requests import Restart
 
 MAP = made_map([(0.0, 0.0), (4.0, 1.0), (4.0, 9.0)], {})
 
@@ -20,7 +20,7 @@ def begun(
     truth: Pose | None = None,
     index: int = 0,
     first: bool = True,
-    restart: Restart | None = None,
+    restart: Reinitialise | None = None,
 ) -> list[float] | None:
     tick = Tick(index, index, first_of_log=first)
     belief = stage.step(Context("start"), tick, MAP, truth, restart).belief
@@ -49,9 +49,9 @@ def test_a_belief_begins_with_a_log_with_a_request_and_every_so_many_images() ->
 
 def test_who_asks_to_start_again_says_where_or_means_anywhere() -> None:
     stage = PlacePrior(at="origin")
-    at = Restart((4.0, 8.0, 0.0, 0.1, 0.1))
+    at = Reinitialise((4.0, 8.0, 0.0, 0.1, 0.1))
     assert begun(stage, index=7, first=False, restart=at) == [0.0, 0.0, 1.0]
-    assert begun(stage, index=7, first=False, restart=Restart()) == pytest.approx([1 / 3] * 3)
+    assert begun(stage, index=7, first=False, restart=Reinitialise()) == pytest.approx([1 / 3] * 3)
 
 
 def test_what_is_missing_is_said_in_one_line() -> None:

@@ -10,9 +10,9 @@ from world_files import DEMO
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.homing.column_table import ColumnTable
-from omninav.stages.homing.column_warping import NEARNESSES, Columns, places_of_columns, warped
 from omninav.stages.homing.first_image import FirstImage
-from omninav.stages.homing.warping import WarpingVector, WarpingVectorState
+from omninav.stages.homing.min_warping import INVERSE_DEPTH_RATIOS, Columns, places_of_columns, warped
+from omninav.stages.homing.warping import MinWarping, MinWarpingState
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import mirror
 from omninav.stages.simulator.renderer import render
@@ -29,17 +29,17 @@ def seen(pose: tuple[float, float, float]) -> Image:
     return Image(render(World(DEMO).scene, camera_rays(CAMERA), pose, 0.9))
 
 
-def vector(stage: WarpingVector, image: Image, target: Image, given: HomingVector = LOST) -> HomingVector:
+def vector(stage: MinWarping, image: Image, target: Image, given: HomingVector = LOST) -> HomingVector:
     ctx = Context("homing")
     stage.setup(ctx)
-    found = stage.step(ctx, WarpingVectorState(), image, given, target, CAMERA).vector
+    found = stage.step(ctx, MinWarpingState(), image, given, target, CAMERA).vector
     assert found is not None
     return found
 
 
 @pytest.mark.parametrize("pose", [(4.4, 4.6, 2.0), (5.6, 4.4, -1.1)])
 def test_it_points_to_where_the_target_was_taken_whatever_the_headings_are(pose: tuple[float, float, float]):
-    found = vector(WarpingVector(), seen(pose), seen(TARGET))
+    found = vector(MinWarping(), seen(pose), seen(TARGET))
     direction = math.atan2(TARGET[1] - pose[1], TARGET[0] - pose[0]) - pose[2]
     assert abs(math.remainder(found.direction - direction, math.tau)) < math.radians(10)
     assert abs(math.remainder(found.turn - (TARGET[2] - pose[2]), math.tau)) < math.radians(6)
@@ -47,7 +47,7 @@ def test_it_points_to_where_the_target_was_taken_whatever_the_headings_are(pose:
 
 
 def test_it_is_nearer_where_less_of_the_way_is_left():
-    stage, state, ctx, target = WarpingVector(), WarpingVectorState(), Context("homing"), seen(TARGET)
+    stage, state, ctx, target = MinWarping(), MinWarpingState(), Context("homing"), seen(TARGET)
     stage.setup(ctx)
     vectors = [stage.step(ctx, state, seen((x, 4.6, 0.4)), LOST, target, CAMERA).vector for x in (4.2, 4.8)]
     assert vectors[0] is not None
@@ -69,14 +69,14 @@ def test_it_is_nearer_where_less_of_the_way_is_left():
 )
 def test_a_vector_on_which_enough_features_agree_is_given_on(state: str, inliers: int, stays: bool):
     given = replace(LOST, state=state, inliers=inliers, why="")
-    assert (vector(WarpingVector(), seen((4.4, 4.6, 2.0)), seen(TARGET), given) is given) == stays
+    assert (vector(MinWarping(), seen((4.4, 4.6, 2.0)), seen(TARGET), given) is given) == stays
 
 
 def test_a_target_in_the_dark_stays_lost_and_says_why(monkeypatch: pytest.MonkeyPatch):
     rng = np.random.default_rng(1)
     noise = Image(rng.integers(0, 256, (CAMERA.height_px, CAMERA.width, 3)).astype(np.uint8))
     monkeypatch.setattr("omninav.stages.homing.warping.MIN_COLUMNS", 170)
-    found = vector(WarpingVector(), noise, seen(TARGET))
+    found = vector(MinWarping(), noise, seen(TARGET))
     assert found.state == "lost"
     assert found.why.startswith("2 matches; ")
     assert found.why.endswith("170 are needed")
@@ -84,13 +84,13 @@ def test_a_target_in_the_dark_stays_lost_and_says_why(monkeypatch: pytest.Monkey
 
 def test_a_compass_limits_the_turn():
     pose = (4.4, 4.6, 2.0)
-    found = vector(WarpingVector(max_turn_deg=20), seen(pose), seen(TARGET))
+    found = vector(MinWarping(max_turn_deg=20), seen(pose), seen(TARGET))
     assert abs(found.turn) <= math.radians(20)
 
 
 def test_columns_are_seen_where_geometry_says():
     columns, planes = places_of_columns(360)
-    row = int(np.flatnonzero(NEARNESSES == 0.52)[0])
+    row = int(np.flatnonzero(INVERSE_DEPTH_RATIOS == 0.52)[0])
     assert planes[0, 0] == planes[180, 0]  # no way to the target: nothing changes
     assert columns[90, 0] == 90
     # straight ahead, half the way there: still ahead, 1 / 0.48 times as near; behind: 1.52 times as far

@@ -9,13 +9,13 @@ from omninav.stages.live.amcl_services import serve_amcl, serve_restart
 from omninav.stages.live.intake import Intake
 from omninav.stages.live.publish import Publish
 from omninav.stages.live.transport import connect
-from omninav.stages.recordings.live_record import DriveSoFar, LiveHeader
+from omninav.stages.recordings.live_record import LiveHeader, OdometryBuffer
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Pose
 
 transport = connect("rclpy")
 header = LiveHeader({"/initialpose": "initial_pose", "/reinitialize_global_localization": "restart"})
-drive = DriveSoFar(header)
+drive = OdometryBuffer(header)
 intake = Intake(transport, transport.status, header, drive, None, None, 1.0)
 intake.subscribe()
 serve_restart(transport, "/reinitialize_global_localization")

@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from omninav.stages.live.dds_transport import _settings
-from omninav.stages.live.transport import Arrival, Inbox, TransportError, connect
+from omninav.stages.live.transport import Arrival, MessageQueue, TransportError, connect
 
 from .conftest import WAIT_S, OtherEnd, decode, encode, until
 
@@ -16,7 +16,7 @@ def arrival(topic: str, received: int) -> Arrival:
 
 
 def test_of_a_topic_whose_newest_is_wanted_older_ones_are_overtaken_and_counted():
-    inbox = Inbox()
+    inbox = MessageQueue()
     inbox.open("/image", newest=True)
     inbox.open("/odom", newest=False)
     for received in range(4):
@@ -34,7 +34,7 @@ def test_of_a_topic_whose_newest_is_wanted_older_ones_are_overtaken_and_counted(
 
 
 def test_an_empty_inbox_gives_none_in_time():
-    inbox = Inbox()
+    inbox = MessageQueue()
     inbox.open("/odom", newest=False)
     assert inbox.take(0.01) is None
 

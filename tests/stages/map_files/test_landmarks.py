@@ -5,7 +5,7 @@ import pytest
 from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, with_landmarks
 
 from omninav.pipeline import BadInput, Context
-from omninav.pipeline.graph.contents import misfit
+from omninav.pipeline.graph.contents import violation
 from omninav.stages.map_files.references import cut_references, joined_references, thinned_references
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.maps import ReferenceGraph
@@ -31,7 +31,7 @@ def test_images_are_found_in_a_thinned_and_in_a_cut_map() -> None:
     map = mapped_room()
     thin, cut = thinned_references(map, 1.1), cut_references(map, map.poses[:, 0] < 5.0)
     for part in (thin, cut):
-        assert misfit(part) is None
+        assert violation(part) is None
         assert len(part) == part.landmarks.references < len(map)
         assert len(part.landmarks) < len(map.landmarks) or part is thin
         assert found_in(part) == pytest.approx(POSE, abs=1e-3)
@@ -45,7 +45,7 @@ def test_what_no_reference_of_a_part_sees_is_gone() -> None:
 
 def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
     both = joined_references([mapped_room(), other_room()], "truth")
-    assert misfit(both) is None
+    assert violation(both) is None
     assert len(both.landmarks) == len(mapped_room().landmarks) + len(other_room().landmarks)
     assert found_in(both) == pytest.approx(POSE, abs=1e-3)
     assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
@@ -65,7 +65,7 @@ def test_parts_of_one_map_keep_their_words() -> None:
 def test_references_of_a_map_without_landmarks_see_none_in_a_joined_one(first: bool) -> None:
     plain = graph_of(tour_poses() + AWAY)
     both = joined_references([plain, mapped_room()] if first else [mapped_room(), plain], "truth")
-    assert misfit(both) is None
+    assert violation(both) is None
     sees = np.diff(both.landmarks.starts) > 0
     assert (sees == (both.poses[:, 0] < 20.0)).all()
     assert found_in(both) == pytest.approx(POSE, abs=1e-3)

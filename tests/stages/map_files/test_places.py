@@ -5,7 +5,7 @@ import dataclasses
 import made_places
 import numpy as np
 
-from omninav.pipeline.graph.contents import misfit
+from omninav.pipeline.graph.contents import violation
 from omninav.stages.map_files.places import cut_places, joined_places, thinned_places
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -27,7 +27,7 @@ def same_view(one: TopologicalMap, view: int, other: TopologicalMap, again: int)
 def test_joined_places_keep_their_links_and_views() -> None:
     map = corner()
     both = joined_places([map, map], "truth")
-    assert misfit(both) is None
+    assert violation(both) is None
     assert len(both) == 6
     assert both.names == ("a", "", "b", "a", "", "b")
     assert both.links.tolist() == [*map.links.tolist(), *(map.links + 3).tolist()]
@@ -42,7 +42,7 @@ def test_joined_places_keep_their_links_and_views() -> None:
 def test_thinned_ways_keep_images_that_are_apart_and_all_places() -> None:
     map = corner()
     thin = thinned_places(map, 0.9)
-    assert misfit(thin) is None
+    assert violation(thin) is None
     assert len(thin) == 3
     assert [len(thin.path_of(link)) for link in range(3)] == [1, 1, 0]
     assert np.allclose(thin.poses[thin.path_of(1)[0], :2], (2.0, 1.0))
@@ -52,12 +52,12 @@ def test_thinned_ways_keep_images_that_are_apart_and_all_places() -> None:
 def test_a_cut_map_keeps_the_links_inside_with_their_images() -> None:
     map = corner()
     cut = cut_places(map, np.array([False, True, True]))
-    assert misfit(cut) is None
+    assert violation(cut) is None
     assert cut.links.tolist() == [[0, 1]]
     assert cut.names == ("", "b")
     assert len(cut.views) == 5
     assert same_view(cut, int(cut.path_of(0)[2]), map, int(map.path_of(1)[2]))
-    assert misfit(cut_places(map, np.zeros(3, bool))) is None
+    assert violation(cut_places(map, np.zeros(3, bool))) is None
 
 
 def test_an_image_whose_place_is_cut_away_goes_to_its_way() -> None:

@@ -8,8 +8,8 @@ import pytest
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_threshold import BeforeThreshold
 from omninav.stages.mapping.frozen import Frozen
+from omninav.stages.mapping.pending_updates import PendingUpdates
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures
@@ -33,7 +33,7 @@ def state(*means, sigma=0.1, weights=None):
 def learn(map, view, state, **options):
     stage = AdaptiveViews(**{**FREE, **options})
     lessons = MapUpdates((MapUpdate(view, state, 0),))
-    return stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
+    return stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events
 
 
 def test_a_new_view_is_inserted_with_its_state_and_weight_beta():
@@ -213,14 +213,14 @@ def test_the_cap_on_views_holds_when_many_updates_come_at_once():
     map = ViewMixtures.empty()
     lessons = MapUpdates(tuple(MapUpdate(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
     stage = AdaptiveViews(max_views=4)
-    event = stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
+    event = stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events
     assert len(map) == event.views == 4
     assert 8 in map.ids
     assert event.inserted.tolist() == map.ids.tolist()
 
 
 def test_before_there_is_a_threshold_only_the_first_update_is_applied():
-    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), BeforeThreshold()
+    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), PendingUpdates()
     for n in range(3):
         lessons = MapUpdates((MapUpdate(view(2 * n, 0), state([n, 0, 0]), n),))
         stage.step(Context("mapping"), lessons, None, map, waiting)
@@ -233,7 +233,7 @@ def test_before_there_is_a_threshold_only_the_first_update_is_applied():
 
 def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing():
     map = ViewMixtures.empty()
-    assert AdaptiveViews().step(Context("m"), MapUpdates(()), LIMIT, map, BeforeThreshold()).events is None
+    assert AdaptiveViews().step(Context("m"), MapUpdates(()), LIMIT, map, PendingUpdates()).events is None
     lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
     out = Frozen().step(Context("m"), map=map, updates=lessons, threshold=LIMIT)
     assert out.map is map
@@ -242,7 +242,7 @@ def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing()
 
 def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row():
     rng = np.random.default_rng(0)
-    map, waiting = ViewMixtures.empty(), BeforeThreshold()
+    map, waiting = ViewMixtures.empty(), PendingUpdates()
 
     def random_lesson(least):
         parts = int(rng.integers(1, 4))
@@ -278,7 +278,7 @@ def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
         map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
         map.add_component(0, np.array([0.4, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
         lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
-        AdaptiveViews(**FREE).step(Context("mapping"), lessons, threshold, map, BeforeThreshold())
+        AdaptiveViews(**FREE).step(Context("mapping"), lessons, threshold, map, PendingUpdates())
         assert map.weights[0] == pytest.approx(weight)
         assert map.threshold == (threshold if threshold.settled else None)
 
@@ -377,7 +377,7 @@ def test_an_event_says_why_views_went_and_what_changed():
     events = []
     for n in range(3):
         lessons = MapUpdates((MapUpdate(view(5.0 * n, 0), state([9.0 * n, 0, 0]), 30 + n),))
-        events.append(stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events)
+        events.append(stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events)
     assert [event.why for event in events] == ["", "", "full"]
     assert [event.removed.tolist() for event in events] == [[], [], [0]]
     assert [event.seen.tolist() for event in events] == [[30], [31], [32]]

@@ -13,7 +13,7 @@ from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, Delaye
 from omninav.stages.mapping.fixed_threshold import FixedThreshold
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.mapping.image_database import ImageDatabase, ImageDatabaseState
-from omninav.stages.mapping.kept_sessions import KeepSessions
+from omninav.stages.mapping.keyframe_history import KeyframeHistory
 from omninav.stages.mapping.learned_words import LearnVisualWords
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
@@ -183,7 +183,7 @@ def test_views_of_a_drive_are_kept_a_centimetre_apart(step: float, kept: int) ->
     sessions: Sessions | None = None
     for tick in range(2):
         motion = Motion(step, 0.0, 0.0) if tick else None
-        sessions = KeepSessions().step(context(tick, not tick), view(0.0), motion, at(0.0), sessions).sessions
+        sessions = KeyframeHistory().step(context(tick, not tick), view(0.0), motion, at(0.0), sessions).sessions
     assert sessions is not None
     assert len(sessions) == kept
 

@@ -9,9 +9,9 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_threshold import BeforeThreshold
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
+from omninav.stages.mapping.pending_updates import PendingUpdates
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.metrics.view_map_size import stored_bytes
 from omninav.stages.values.belief import GaussianMixture
@@ -22,7 +22,7 @@ from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
 STEP_M = 0.3
 WAVES, PHASES = np.random.default_rng(0).uniform(-2.0, 2.0, (2, 40))
-MAPPINGS = {"fused": (FusedMixtures, FusedMixturesState), "adaptive": (AdaptiveViews, BeforeThreshold)}
+MAPPINGS = {"fused": (FusedMixtures, FusedMixturesState), "adaptive": (AdaptiveViews, PendingUpdates)}
 both = pytest.mark.parametrize("mapping", MAPPINGS)
 
 

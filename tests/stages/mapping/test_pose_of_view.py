@@ -7,7 +7,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.mapping.pose_of_view import Supervised, pose_of_view
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import GuessedPose, Pose
+from omninav.stages.values.pose import AssumedPose, Pose
 
 VIEW = np.ones((1, 1), np.float32)
 TRUE, DRIVEN = Pose(1.0, 2.0, 0.0), Pose(9.0, 9.0, 0.0)
@@ -41,7 +41,7 @@ def test_the_first_view_settles_the_source(supervised: Supervised, truth: Pose |
 
 
 def test_a_guess_is_called_one_and_truth_that_is_asked_for_must_be_there() -> None:
-    assert begun(odometry=GuessedPose(1.0, 0.0, 0.0), truth=None)[1] == "guess"
+    assert begun(odometry=AssumedPose(1.0, 0.0, 0.0), truth=None)[1] == "guess"
     with pytest.raises(BadInput, match="no ground truth for its first image"):
         begun("truth", truth=None)
 

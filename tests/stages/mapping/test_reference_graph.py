@@ -6,7 +6,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import GuessedPose, Pose
+from omninav.stages.values.pose import AssumedPose, Pose
 
 
 def view(bin_: int, segments: int = 8) -> SegmentHistograms:
@@ -65,7 +65,7 @@ def test_poses_come_from_where_the_map_says(supervised: str, truth: bool, source
 def test_a_map_says_that_its_poses_were_guessed() -> None:
     ctx, map = Context("mapping"), ReferenceGraph.empty()
     ctx.tick = Tick(index=0, stamp=0, log=0, first_of_log=True)
-    LearnReferenceGraph().step(ctx, view(1), GuessedPose(0.0, 0.0, 0.0), None, map, LearnReferenceGraphState())
+    LearnReferenceGraph().step(ctx, view(1), AssumedPose(0.0, 0.0, 0.0), None, map, LearnReferenceGraphState())
     assert map.pose_source == "guess"
 
 

@@ -7,7 +7,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
-from omninav.stages.mapping.kept_sessions import KeepSessions
+from omninav.stages.mapping.keyframe_history import KeyframeHistory
 from omninav.stages.mapping.session_closures import closures_between
 from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.values.belief import GaussianMixture
@@ -116,7 +116,7 @@ def test_a_map_of_one_view_stays():
 
 
 def kept(poses, restored_at=None):
-    sessions, stage = None, KeepSessions()
+    sessions, stage = None, KeyframeHistory()
     steps = between(poses[:-1], poses[1:])
     for row, pose in enumerate(poses):
         if row == restored_at:
@@ -153,8 +153,8 @@ def test_drives_with_other_views_are_not_gone_on_with():
     ctx.tick = Tick(0, 0, first_of_log=True)
     other = Spectrum(np.ones(8, np.float32), 2, 36)
     state = GaussianMixture(np.zeros((1, 3)), 0.01 * np.eye(3)[None], np.ones(1))
-    assert len(KeepSessions().step(ctx, other, None, state, None, known).sessions) == 1
-    assert len(KeepSessions().step(ctx, view(TWICE[0]), None, state, None, known).sessions) == 4
+    assert len(KeyframeHistory().step(ctx, other, None, state, None, known).sessions) == 1
+    assert len(KeyframeHistory().step(ctx, view(TWICE[0]), None, state, None, known).sessions) == 4
     assert len(known.sessions) == 3
 
 

@@ -24,7 +24,7 @@ from omninav.stages.geometry.appearance.place_clusters import (
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.mapping.topological import with_names
-from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.rooms import Rooms
@@ -146,7 +146,7 @@ def test_what_looks_alike_by_chance_is_left_apart() -> None:
 
 def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
     made, found = once
-    match, context = MatchPlaces(), Context("match")
+    match, context = VisualDistance(), Context("match")
     match.setup(context)
     apart = []
     for row, pose in enumerate(found.poses):

@@ -16,7 +16,7 @@ from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions
 from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
-from omninav.stages.values.pose import GuessedPose, Pose
+from omninav.stages.values.pose import AssumedPose, Pose
 
 WORLD = Landmarks(scattered(20.0, 20.0, 250))
 POSES = along([(4.0, 10.0), (16.0, 10.0)], 1.5)[:6]
@@ -147,7 +147,7 @@ def test_views_say_by_what_they_were_compared() -> None:
         ("auto", POSES, POSES, "truth"),
         ("auto", POSES, (), "odometry"),
         ("auto", POSES, [None] * 6, "odometry"),
-        ("auto", [None, GuessedPose(0.0, 0.0, 0.0)], (), "guess"),
+        ("auto", [None, AssumedPose(0.0, 0.0, 0.0)], (), "guess"),
         ("odometry", POSES, POSES, "odometry"),
         ("truth", POSES, [None, *POSES[1:]], "truth"),
     ],

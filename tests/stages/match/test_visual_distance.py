@@ -9,7 +9,7 @@ from made_tour import Landmarks, along, mapped, scattered
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.correspondences import MatchFeatures
-from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
@@ -25,7 +25,7 @@ def made() -> TopologicalMap:
 
 
 def compared(features: LocalFeatures, map: TopologicalMap, moments: GlobalDescriptor = GREY) -> VisualDistances:
-    stage, context = MatchPlaces(), Context("match")
+    stage, context = VisualDistance(), Context("match")
     stage.setup(context)
     return stage.step(context, features=features, descriptor=moments, map=map).distances
 

@@ -10,11 +10,11 @@ from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, lost_metres, shortest_metres
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
-from omninav.stages.values.requests import GoalPoint
 
 # 3 m east, then 4 m north; place 3 lies apart
 CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, (1, 2): 0})

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.agreement import Agreement
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.metrics.resampling_spread import ResamplingSpread, agreement
 from omninav.stages.values.belief import GaussianMixture, Particles
 
@@ -20,7 +20,7 @@ def seen(sigma: float) -> GaussianMixture:
 
 def test_resampling_concentrates_where_both_agree():
     before, hypothesis = cloud(1.0), seen(1.0)
-    after = Agreement().step(Context("fusion", np.random.default_rng(1)), before, hypothesis).belief
+    after = ConditionalResampling().step(Context("fusion", np.random.default_rng(1)), before, hypothesis).belief
     found = ResamplingSpread().step(CTX, [before, before], [hypothesis, None], [after, before]).metrics.values
     # The product of two Gaussians of equal variance has half of it.
     assert found["resampling"]["frames"] == 1

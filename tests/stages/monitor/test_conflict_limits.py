@@ -28,7 +28,7 @@ from omninav.stages.monitor.input_conflicts import (
 )
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.image import Strip
-from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
 Array = npt.NDArray[np.float64]
 SCALE_M = 0.4
@@ -105,7 +105,7 @@ def test_a_leap_is_said_with_what_is_more_than_usual_and_how_the_robot_drove() -
     )
     recent = InputConflictsState(rows=watched(8).rows, stamp=7 * 10**9)
     tick = Tick(9, 67 * 10**9, 0, 9, False)
-    assert leap(recent, tick, GuessedPose(1.6, 0.0, 0.0)) == ""
+    assert leap(recent, tick, AssumedPose(1.6, 0.0, 0.0)) == ""
     assert leap(recent, tick, None) == ""
 
 
@@ -284,8 +284,8 @@ def test_headings_are_not_wrapped_and_a_guess_is_not_odometry() -> None:
     np.testing.assert_allclose(driven, (0.0, 1.0, math.pi / 2 + 3.0), atol=1e-12)
     np.testing.assert_allclose(pose_now(np.full(3, np.nan), None, Motion(1.0, 0.5, 0.25)), (1.0, 0.5, 0.25))
     np.testing.assert_array_equal(pose_now(before, None, None), before)
-    assert np.isnan(pose_now(before, GuessedPose(1.0, 0.0, 0.0), None)).all()
-    assert np.isnan(pose_now(before, None, GuessedMotion(1.0, 0.0, 0.0, 0.5, 0.1))).all()
+    assert np.isnan(pose_now(before, AssumedPose(1.0, 0.0, 0.0), None)).all()
+    assert np.isnan(pose_now(before, None, AssumedMotion(1.0, 0.0, 0.0, 0.5, 0.1))).all()
 
 
 def test_a_window_of_images_is_remembered_and_its_times_begin_with_another_camera() -> None:

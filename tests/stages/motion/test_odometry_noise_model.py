@@ -5,7 +5,7 @@ import math
 import pytest
 
 from omninav.stages.motion.odometry_noise import OdometryNoiseModel
-from omninav.stages.values.pose import BridgedMotion, GuessedMotion, Motion
+from omninav.stages.values.pose import AssumedMotion, BridgedMotion, Motion
 
 NO_FLOOR = OdometryNoiseModel(rotation_floor=0.0, translation_floor=0.0)
 
@@ -45,6 +45,6 @@ def test_seconds_that_odometry_says_nothing_of_add_a_turn_and_a_way_each_by_its_
 
 
 def test_a_guessed_motion_adds_its_own_uncertainty():
-    first, translation, second = NO_FLOOR.model(GuessedMotion(0.0, 0.0, 0.0, sigma_m=0.4, sigma_turn=0.2)).sigmas
+    first, translation, second = NO_FLOOR.model(AssumedMotion(0.0, 0.0, 0.0, sigma_m=0.4, sigma_turn=0.2)).sigmas
     assert math.hypot(first, second) == pytest.approx(0.2)
     assert translation == pytest.approx(0.4)

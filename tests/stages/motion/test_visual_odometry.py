@@ -14,9 +14,9 @@ from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState
 from omninav.stages.values.landmarks import LandmarkFix
-from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
-GUESS = GuessedMotion(0.37, 0.0, 0.0, 0.5, 0.5)
+GUESS = AssumedMotion(0.37, 0.0, 0.0, 0.5, 0.5)
 STEP_M = 0.2
 FLOOR_M = 0.9
 
@@ -54,7 +54,7 @@ def run(points, poses: np.ndarray, height: float | None = None, hidden=(), fixes
             restore_state(fresh, decode(encode(encode_state(state))))
             state = fresh
         camera, fix = SimpleNamespace(height=height), None if fixes is None or not number else fixes[number - 1]
-        outs.append(stage.step(ctx, features, camera, motion, GuessedPose(0.0, 0.0, 0.0), state, fix))
+        outs.append(stage.step(ctx, features, camera, motion, AssumedPose(0.0, 0.0, 0.0), state, fix))
     return outs, ctx
 
 

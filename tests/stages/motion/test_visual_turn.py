@@ -10,7 +10,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.turn_by_flow import turn_by_flow
 from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState
 from omninav.stages.values.image import Panorama
-from omninav.stages.values.pose import GuessedMotion, Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 
 COLUMNS, ROWS = 360, 80
 RNG = np.random.default_rng(0)
@@ -90,6 +90,6 @@ def test_panoramas_of_few_pixels_are_no_error(shape):
 
 
 def test_a_guessed_turn_becomes_as_sure_as_what_was_seen():
-    motion = corrected(GuessedMotion(0.2, 0.0, 0.05, 0.5, 0.2))
+    motion = corrected(AssumedMotion(0.2, 0.0, 0.05, 0.5, 0.2))
     assert motion.turn == pytest.approx(TURN, abs=0.006)
     assert motion.sigma_turn < 0.02

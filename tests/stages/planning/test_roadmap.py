@@ -13,12 +13,12 @@ from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.planning.roadmap import MAX_BLOCKED, RoadmapPlanner, RoadmapPlannerState, goal_pose
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.homing import DrivingStatus
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.requests import GoalPoint
 
 START, GOAL = (2.0, 2.6, 2.0), (8.0, 3.2, -1.0)
 

@@ -12,12 +12,12 @@ from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, bin
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap, planned_routes
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
 from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
-from omninav.stages.values.requests import GoalPoint
 
 CTX = Context("view")
 MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1, 2): 0, (2, 3): 2})

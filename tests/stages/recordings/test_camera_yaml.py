@@ -137,7 +137,7 @@ def test_camera_info_stands_in_for_a_missing_camera_file() -> None:
         camera_from_info(info("plumb_bob", [0.1] * 5), "log.mcap")
 
 
-def test_a_projection_is_meant_by_its_name_though_a_file_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_projection_comes_before_a_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "donut").write_text("not a camera")
     monkeypatch.chdir(tmp_path)
     camera, files = named_camera("donut", lambda: (640, 640))

@@ -20,7 +20,7 @@ from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.source.synthetic_odometry import add_odometry_noise
-from omninav.stages.values.pose import GuessedMotion
+from omninav.stages.values.pose import AssumedMotion
 
 
 def context(seed: int = 0) -> Context:
@@ -128,7 +128,7 @@ def test_without_odometry_and_truth_a_path_is_guessed_for_drawing(tmp_path: Path
     ctx = context()
     outs = drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap", without(ODOMETRY, TRUTH)))), ctx)
     assert len(outs) == FRAMES
-    assert all(isinstance(out.motion, GuessedMotion) for out in outs[1:])
+    assert all(isinstance(out.motion, AssumedMotion) for out in outs[1:])
     assert all(out.truth is None for out in outs)
     assert ctx.facts["odometry"] == "guessed"
     assert "No odometry in" in ctx.warnings[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from landmark_tour import FEW, mapped_room
 
-from omninav.pipeline.graph.contents import misfit
+from omninav.pipeline.graph.contents import violation
 from omninav.stages.geometry.plane.se2 import compose
 
 
@@ -25,7 +25,9 @@ def test_some_references_keep_what_they_see_in_their_order() -> None:
         some.words.weights.tolist()
         == np.concatenate([whole.weights[whole.starts[row] : whole.starts[row + 1]] for row in rows]).tolist()
     )
-    assert misfit(replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)) is None
+    assert (
+        violation(replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)) is None
+    )
 
 
 def test_references_that_came_later_and_none_at_all_see_nothing() -> None:
@@ -62,9 +64,9 @@ def test_a_landmark_moves_with_the_references_that_see_it() -> None:
 def test_landmarks_of_more_references_than_the_map_has_are_a_contradiction() -> None:
     map = mapped_room()
     fewer = replace(map, poses=map.poses[:5], features=map.features[:5], edges=FEW)
-    assert misfit(fewer) == f"'landmarks' are of {len(map)} references, and the map has 5"
+    assert violation(fewer) == f"'landmarks' are of {len(map)} references, and the map has 5"
     grown = replace(map, poses=np.concatenate([map.poses, map.poses]), features=np.concatenate([map.features] * 2))
-    assert misfit(grown) is None
+    assert violation(grown) is None
 
 
 @pytest.mark.parametrize(
@@ -93,7 +95,7 @@ def test_landmarks_that_contradict_themselves_are_said(field: str, value: object
         starts=np.array([0, 1, 2]),
         seen=np.zeros(2, np.int32),
     )
-    assert misfit(one) is None
-    found = misfit(replace(one, **{field: value}))
+    assert violation(one) is None
+    found = violation(replace(one, **{field: value}))
     assert found is not None
     assert said in found

@@ -1,0 +1,32 @@
+"""Both kinds of local features: SIFT for a robot on a floor, and columns between two edges."""
+
+from dataclasses import replace
+
+from omninav.pipeline import Context
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Image, Panorama
+
+from .rotation_reduced_sift import RotationReducedSift
+from .vertical_segments import FindVerticalSegments
+
+MAX_COLUMNS = 200
+"""Prototypes that are kept of an image: those that stand for most columns."""
+
+
+class SiftAndVerticalSegments(RotationReducedSift):
+    """Rotation-reduced SIFT with colours, and invariant column segments, which complement each other.
+
+    Goedemé et al. 2007, sections 3.2 to 3.4: map, localisation and homing use both. Raises BadInput for an image
+    without a camera.
+    """
+
+    def setup(self, ctx: Context) -> None:
+        """Make both detectors."""
+        super().setup(ctx)
+        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
+
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> RotationReducedSift.Out:
+        """Describe one image."""
+        patches = super().step(ctx, image, camera).features
+        columns = self._columns.step(ctx, image, camera).vertical_segments
+        return self.Out(features=replace(patches, columns=columns))

@@ -1,0 +1,39 @@
+"""Column segments as a view's only local features."""
+
+from dataclasses import replace
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.local_features import LocalFeatures
+
+from .rotation_reduced_sift import none_found
+from .vertical_segments import FindVerticalSegments
+
+MAX_COLUMNS = 200
+"""Largest number of prototypes; those that stand for most columns are kept."""
+
+
+class VerticalSegmentFeatures(Stage):
+    """Describes a view by invariant column segments alone, without patches, to measure what these contribute.
+
+    Goedemé et al. 2007, sections 3.3 and 3.4. Raises BadInput for an image without a camera.
+    """
+
+    max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
+    """Larger images are made smaller; 320 x 240 is the paper's size."""
+
+    class Out(Outputs):
+        """Columns, and no patches; there may be no columns either."""
+
+        features: LocalFeatures
+
+    def setup(self, ctx: Context) -> None:
+        """Make the detector."""
+        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
+
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
+        """Describe one image."""
+        found = self._columns.step(ctx, image, camera).vertical_segments
+        return self.Out(features=replace(none_found(), columns=found))

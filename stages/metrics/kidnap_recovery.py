@@ -1,0 +1,65 @@
+"""Time until the estimate is right again after the robot was lifted."""
+
+import itertools
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.values.drive import Array, Drive, known
+
+Ints = npt.NDArray[np.int64]
+QUANTITIES = {
+    "lifts.number": Quantity(title="Times lifted", context=True),
+    "lifts.never": Quantity(title="Times lifted and not right again", better="lower"),
+}
+
+JUMP_M = 0.5
+"""Distance between true motion and odometry of one frame from which the robot was lifted, metres."""
+JUMP_DEG = 15.0
+"""Largest difference of their turns, degrees."""
+
+
+class KidnapRecovery(MetricStage):
+    """Measures the time from each lifting of the robot until the estimate is right again, in the last log.
+
+    The robot was lifted between two frames where its true motion is not that of odometry: it was turned, or put down
+    elsewhere. The estimate is right where position and heading errors stay below 1 m and 20 degrees for ten frames (as
+    under `converged_after_frames`).
+
+    Under `lifts`: `number`; `never`, after how many the estimate was not right before the next one or the end; lists
+    with an entry for each: `step`, and `seconds` until the estimate was right, or until the next one or the end where
+    it never was. Nothing where it was not lifted, or without ground truth.
+    """
+
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
+        """The whole run at once."""
+        log = drive.last_log
+        log = log.at(known(log.truth) & known(log.estimate))
+        if not len(log):
+            return self.Out()
+        starts = lifted(log, JUMP_M, JUMP_DEG).tolist()
+        if not starts:
+            return self.Out()
+        metres, degrees = position_errors(log.estimate, log.truth), heading_errors_deg(log.estimate, log.truth)
+        parts = list(itertools.pairwise([*starts, len(log)]))
+        found = [first_settled(metres[first:end], degrees[first:end]) for first, end in parts]
+        until = [end - 1 if rows is None else first + rows for (first, end), rows in zip(parts, found, strict=True)]
+        values = {
+            "number": len(starts),
+            "never": found.count(None),
+            "step": log.frames[starts].tolist(),
+            "seconds": (log.seconds[until] - log.seconds[starts]).tolist(),
+        }
+        return self.Out(metrics=Metrics({"lifts": values}, QUANTITIES))
+
+
+def lifted(log: Drive, jump_m: float, jump_deg: float) -> Ints:
+    """Rows of a log, all with truth, before which the robot was lifted."""
+    true: Array = between(log.truth[:-1], log.truth[1:])
+    gap = true - log.motion[1:]
+    jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))
+    return np.flatnonzero(jumped) + 1

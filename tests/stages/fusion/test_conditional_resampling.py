@@ -1,0 +1,166 @@
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling
+from omninav.stages.geometry.probability.gaussians import density
+from omninav.stages.values.belief import GaussianMixture, Particles
+
+
+def around(x: float, number: int = 2000, seed: int = 0) -> Particles:
+    poses = np.random.default_rng(seed).normal((x, 0.0, 0.0), 0.2, (number, 3))
+    return Particles(poses, np.full(number, 1 / number))
+
+
+def at(*places: float, weights: tuple[float, ...] | None = None, sigma: float = 0.2) -> GaussianMixture:
+    means = np.array([[x, 0.0, 0.0] for x in places])
+    shares = np.full(len(places), 1 / len(places)) if weights is None else np.array(weights)
+    return GaussianMixture(means, np.repeat(np.eye(3)[None] * sigma**2, len(places), axis=0), shares)
+
+
+def fuse(particles: Particles, hypothesis: GaussianMixture | None, seed: int = 1, **options: Any) -> Particles:
+    ctx = Context("fusion", np.random.default_rng(seed))
+    return ConditionalResampling(**options).step(ctx, particles, hypothesis).belief
+
+
+def test_where_map_and_belief_agree_the_belief_becomes_their_product() -> None:
+    # N(0, 0.2^2) times N(0.2, 0.2^2) is N(0.1, 0.02), worked by hand.
+    out = fuse(around(0.0, 20_000), at(0.2))
+    assert out.poses[:, 0].mean() == pytest.approx(0.1, abs=0.01)
+    assert out.poses[:, 0].var() == pytest.approx(0.02, rel=0.1)
+    assert np.allclose(out.weights, 1 / 20_000)
+
+
+def test_where_they_do_not_a_fifth_of_the_weight_goes_to_what_the_map_says() -> None:
+    out = fuse(around(0.0), at(9.0))
+    assert len(out.poses) == 2000
+    assert out.weights[out.poses[:, 0] > 5.0].sum() == pytest.approx(0.2)
+    assert out.weights.sum() == pytest.approx(1.0)
+
+
+def test_new_hypotheses_are_drawn_by_their_weight() -> None:
+    out = fuse(around(0.0, 20_000), at(9.0, 20.0, weights=(0.25, 0.75)))
+    far = out.poses[:, 0] > 15.0
+    assert out.weights[far].sum() == pytest.approx(0.15, abs=0.01)
+
+
+def test_particles_are_kept_at_random_not_by_weight() -> None:
+    # Half of the particles carry nearly all of the weight; by weight they would be nearly all that is kept.
+    particles = around(0.0, 20_000)
+    weights = np.where(np.arange(20_000) < 10_000, 0.999, 0.001)
+    particles = Particles(np.column_stack([np.arange(20_000.0), np.zeros((20_000, 2))]), weights / weights.sum())
+    out = fuse(particles, at(-900.0))
+    kept = out.poses[out.poses[:, 0] > -1.0, 0]
+    assert len(kept) == 16_000
+    assert (kept < 10_000).mean() == pytest.approx(0.5, abs=0.02)
+
+
+def test_the_border_between_the_two_is_a_density_per_square_metre_and_radian() -> None:
+    # One particle at the centre of a Gaussian of sigmas 1 m, 1 m, 1 rad: density (2 pi)^-1.5.
+    peak = (2 * math.pi) ** -1.5
+    one = Particles(np.zeros((10, 3)), np.full(10, 0.1))
+    wide = GaussianMixture(np.array([[0.0, 0.0, 0.0]]), np.eye(3)[None], np.ones(1))
+    assert len(np.unique(fuse(one, wide, agree_above=peak * 0.99).poses, axis=0)) == 1
+    assert len(np.unique(fuse(one, wide, agree_above=peak * 1.01).poses, axis=0)) == 3  # 2 of 10 drawn anew
+
+
+def test_without_anything_near_in_the_map_the_belief_stays_as_it_is() -> None:
+    particles = around(0.0)
+    assert fuse(particles, None) is particles
+    none = GaussianMixture(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))
+    assert fuse(particles, none) is particles
+
+
+def kidnapped(**options: Any) -> list[float]:
+    """Share of the weight at B, tick by tick, when the robot is carried there from A and the map knows both."""
+    ctx, stage, belief = Context("fusion", np.random.default_rng(3)), ConditionalResampling(**options), around(0.0)
+    shares = []
+    for _ in range(10):
+        belief = stage.step(ctx, belief, at(9.0)).belief
+        moved = belief.poses + np.random.default_rng(4).normal(0.0, 0.02, belief.poses.shape)
+        belief = Particles(moved, belief.weights)
+        shares.append(float(belief.weights[belief.poses[:, 0] > 5.0].sum()))
+    return shares
+
+
+def test_a_kidnapped_robot_is_found_again() -> None:
+    shares = kidnapped()
+    assert shares[0] == pytest.approx(0.2)
+    assert shares[1] == pytest.approx(1.0)  # the next picture agrees with the fifth that went there
+
+
+def test_with_an_outlier_probability_a_belief_outlives_one_look_alike() -> None:
+    # Views of 9 m that are really seen at 0: two in a row take all, unless a share of views may be strays.
+    lone, careful = kidnapped()[1], kidnapped(outlier_probability=0.2)
+    assert lone == pytest.approx(1.0)
+    assert 0.5 < careful[1] < 0.95
+    assert careful[-1] > 0.99
+
+
+def test_equal_seeds_give_equal_beliefs() -> None:
+    one, other = fuse(around(0.0), at(9.0)), fuse(around(0.0), at(9.0))
+    assert np.array_equal(one.poses, other.poses)
+
+
+def test_agreement_is_the_mean_density_by_the_particles_weights() -> None:
+    # A quarter of the weight stands at the peak of two equal Gaussians, 0.5 (2 pi)^-1.5; the rest is far from both.
+    both = GaussianMixture(np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), np.stack([np.eye(3)] * 2), np.full(2, 3.0))
+    particles = Particles(np.array([[0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]), np.array([0.25, 0.75]))
+    agreement = 0.25 * 0.5 * (2 * math.pi) ** -1.5
+    for above, agreed in ((agreement * 0.99, True), (agreement * 1.01, False)):
+        ctx = Context("fusion", np.random.default_rng(1))
+        out = ConditionalResampling(agree_above=above).step(ctx, particles, both).belief
+        assert ctx.counts == ({"agreed": 1} if agreed else {"disagreed": 1})
+        assert (out.poses[:, 0] == 0.0).all() == agreed
+
+
+def test_the_outlier_probability_mixes_the_density_with_its_mean() -> None:
+    # Half of the weight at the peak p: the mean is p / 2, and the two halves weigh 0.8 p + 0.1 p and 0.1 p.
+    particles = Particles(np.array([[0.0, 0.0, 0.0]] * 50 + [[9.0, 0.0, 0.0]] * 50), np.full(100, 0.01))
+    out = fuse(particles, at(0.0), outlier_probability=0.2)
+    assert (out.poses[:, 0] == 0.0).sum() == 90
+    assert out.weights == pytest.approx(np.full(100, 0.01))
+
+
+def test_what_is_kept_has_its_share_of_the_weight_and_its_own_proportions() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(4)]), np.array([0.1, 0.2, 0.3, 0.4]))
+    out = fuse(particles, at(900.0), keep=0.5)
+    old, new = out.poses[:, 0] < 10.0, out.poses[:, 0] > 800.0
+    assert (old.sum(), new.sum()) == (2, 2)
+    assert np.diff(out.poses[old, 0]) > 0.0
+    before = 0.1 * (1.0 + out.poses[old, 0])
+    assert out.weights[old] == pytest.approx(0.5 * before / before.sum())
+    assert out.weights[new] == pytest.approx([0.25, 0.25])
+
+
+def test_all_of_the_belief_can_be_kept_and_a_kept_part_without_weight_gets_none() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(4)]), np.array([0.1, 0.2, 0.3, 0.4]))
+    same = fuse(particles, at(900.0), keep=1.0)
+    assert same.poses.tolist() == particles.poses.tolist()
+    assert same.weights == pytest.approx(particles.weights)
+    anew = fuse(particles, at(900.0), keep=0.0)
+    assert anew.poses[:, 0].min() > 800.0
+    assert anew.weights == pytest.approx([0.25] * 4)
+    lone = Particles(np.array([[float(n), 0.0, 0.0] for n in range(100)]), np.array([1.0] + [0.0] * 99))
+    seed = next(s for s in range(9) if 0 not in np.random.default_rng(s).permutation(100)[:50])
+    out = fuse(lone, at(900.0), seed=seed, keep=0.5)
+    assert out.weights[out.poses[:, 0] < 200.0].tolist() == [0.0] * 50
+    assert out.weights.sum() == pytest.approx(1.0)
+
+
+def test_a_lone_new_particle_has_all_the_weight_that_is_not_kept() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(5)]), np.full(5, 0.2))
+    out = fuse(particles, at(900.0))
+    assert out.weights == pytest.approx([0.2] * 5)
+    assert (out.poses[:, 0] > 800.0).tolist() == [False] * 4 + [True]
+
+
+def test_agreement_at_the_border_itself_is_none() -> None:
+    particles, hypothesis = around(0.0, 10), at(0.1)
+    likely = density(particles.poses, hypothesis.means, hypothesis.covariances, hypothesis.weights)
+    ctx = Context("fusion", np.random.default_rng(1))
+    ConditionalResampling(agree_above=float(particles.weights @ likely)).step(ctx, particles, hypothesis)
+    assert ctx.counts == {"disagreed": 1}

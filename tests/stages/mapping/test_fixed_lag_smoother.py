@@ -1,0 +1,228 @@
+"""Past states corrected along the odometry."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.plane.odometry_motion import move_gaussians
+from omninav.stages.mapping.fixed_lag_smoother import FixedLagSmoother, FixedLagSmootherState
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.map_update import MapUpdates
+from omninav.stages.values.pose import UncertainMotion
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Coefficients, Neighbours
+
+VIEW = Coefficients(np.zeros(2, np.float32), np.zeros((1, 2), np.float32))
+
+
+def around_a_square(
+    end: tuple[float, float, float], **options: Any
+) -> tuple[dict[int, GaussianMixture], list[MapUpdates]]:
+    """The corrections on a square of four metres, five images a side, by odometry alone up to the last image; there a
+    view of the map gives the pose `end`."""
+    stage, path, ctx = FixedLagSmoother(**options), FixedLagSmootherState(), Context("fixed_lag_smoother")
+    map = ViewMixtures.empty()
+    map.add_view(VIEW.values, "Coefficients")
+    none = Neighbours(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0), np.inf)
+    seen = Neighbours(np.zeros(1, np.int64), np.zeros(1), np.ones(1), np.zeros(1), 0.0)
+    certain = np.diag([0.02, 0.02, 0.02])[None] ** 2
+    means, covariances = np.zeros((1, 3)), certain
+    states, out = {}, []
+    for n in range(21):
+        ctx.tick = Tick(n, n, 0, n, n == 0)
+        model = None if n == 0 else UncertainMotion((np.pi / 2 if n % 5 == 1 and n > 1 else 0.0, 0.8, 0.0), (0.05,) * 3)
+        if model is not None:
+            means, covariances = move_gaussians(means, covariances, model.steps, model.sigmas)
+        state = GaussianMixture(means, covariances, np.ones(1))
+        if n == 20:
+            state = GaussianMixture(np.array([end]), certain, np.ones(1))
+        states[n] = state
+        out.append(stage.step(ctx, VIEW, state, model, path, seen if n == 20 else none, map).corrections)
+    return states, out
+
+
+def test_where_the_path_closes_the_states_on_it_are_corrected_along_odometry() -> None:
+    # Odometry leads back to (0, 0), the map says (0.4, 0): the path in between is shifted, more the nearer to the end.
+    before, corrections = around_a_square((0.4, 0.0, -np.pi / 2))
+    assert all(tick.open_from == 0 for tick in corrections)
+    assert not any(tick.items for tick in corrections[:-1])
+    after = {update.index: update.state for update in corrections[-1].items}
+    assert set(after) >= set(range(3, 19))
+    shift = {n: float(np.hypot(*(state.means[0] - before[n].means[0])[:2])) for n, state in after.items()}
+    assert shift[4] < 0.1 < shift[16] < 0.45
+    for n, state in after.items():
+        assert np.linalg.det(state.covariances[0]) < np.linalg.det(before[n].covariances[0])
+
+
+@pytest.mark.parametrize(
+    ("end", "options"),
+    [((0.4, 0.0, -np.pi / 2), {"back_propagate": False}), ((9.0, 0.0, -np.pi / 2), {})],
+    ids=["where it is switched off", "where odometry does not explain the end"],
+)
+def test_states_stay(end: tuple[float, float, float], options: dict[str, bool]) -> None:
+    _, corrections = around_a_square(end, **options)
+    assert len(corrections) == 21
+    assert not any(tick.items for tick in corrections)
+
+
+SURE = np.diag([0.02, 0.02, 0.02]) ** 2
+SPLIT = GaussianMixture(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]), np.stack([SURE] * 2), np.array([0.5, 0.5]))
+UNKNOWN = GaussianMixture(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))
+BORN = (1, 1, 2, 7, 8, 9)
+"""The steps at which the views of a map were inserted, a view each."""
+
+
+def at(x: float, y: float = 0.0, sigma: float = 0.02) -> GaussianMixture:
+    return GaussianMixture(np.array([[x, y, 0.0]]), np.diag([sigma, sigma, 0.02])[None] ** 2, np.ones(1))
+
+
+class Straight:
+    """Drives ahead, a metre from image to image by odometry; says what is believed, and by which views of the map."""
+
+    def __init__(self, **options: Any) -> None:
+        self.stage, self.path, self.ctx = (
+            FixedLagSmoother(**options),
+            FixedLagSmootherState(),
+            Context("fixed_lag_smoother"),
+        )
+        self.map = ViewMixtures.empty()
+        for born in BORN:
+            self.map.put(steps=born)
+            self.map.add_view(VIEW.values, "Coefficients")
+        self.tick = 0
+
+    def to(self, state: GaussianMixture, by: tuple[int, ...] = (), moved: bool = True) -> MapUpdates:
+        rows = np.array(by, np.int64)
+        some = np.zeros(len(rows))
+        seen = Neighbours(rows, some, some, some, 0.0)
+        model = UncertainMotion((0.0, 1.0, 0.0), (0.01, 0.01, 0.01)) if moved and self.tick else None
+        self.ctx.tick = Tick(self.tick, self.tick, 0, self.tick, not self.tick)
+        self.tick += 1
+        return self.stage.step(self.ctx, VIEW, state, model, self.path, seen, self.map).corrections
+
+    def led_away(
+        self, *between: GaussianMixture, end: GaussianMixture | None = None, by: tuple[int, ...] = (2,)
+    ) -> dict:
+        """Right up to 2 m, away in between by a view of step 7, and right again by what view is said."""
+        for x in range(3):
+            assert not self.to(at(x), (0,)).items
+        for state in between:
+            assert not self.to(state, (3,)).items
+        corrected = self.to(at(3.0 + len(between)) if end is None else end, by).items
+        assert all(update.reconstructed for update in corrected)
+        return {update.index: update.state.means[0].round(2).tolist() for update in corrected}
+
+
+ALONG = {3: [3.0, 0.0, 0.0], 4: [4.0, 0.0, 0.0]}
+
+
+def test_where_the_belief_returns_to_where_odometry_led_the_states_in_between_are_those_of_the_path() -> None:
+    drive = Straight(back_propagate=False)
+    assert drive.led_away(at(3.0, 5.0), at(4.0, 5.0)) == ALONG
+    assert drive.ctx.counts == {"belief_jumped": 2, "view_reconstructed": 2}
+    assert drive.path.jumps == []
+    assert [update.state.means[0, 1].round(3) for update in drive.path.past] == [0.0] * 6
+
+
+@pytest.mark.parametrize("by", [(3,), (4,), (3, 5)])
+def test_what_leads_back_must_be_older_than_what_led_away(by: tuple[int, ...]) -> None:
+    drive = Straight(back_propagate=False)
+    assert drive.led_away(at(3.0, 5.0), at(4.0, 5.0), by=by) == {}
+    assert drive.path.jumps == [(2, 7), (4, min(BORN[row] for row in by))]
+
+
+def test_the_oldest_view_that_supports_the_new_place_counts() -> None:
+    assert Straight(back_propagate=False).led_away(at(3.0, 5.0), at(4.0, 5.0), by=(5, 2)) == ALONG
+
+
+def test_a_robot_that_was_carried_away_is_not_brought_back() -> None:
+    drive = Straight(back_propagate=False)
+    assert drive.led_away(at(3.0, 5.0), at(4.0, 5.0), end=at(5.0, 0.8)) == {}
+    assert Straight(reconstruct_path=False, back_propagate=False).led_away(at(3.0, 5.0), at(4.0, 5.0)) == {}
+
+
+def test_states_in_between_that_agree_with_the_path_stay_and_unknown_ones_are_no_updates() -> None:
+    drive = Straight(back_propagate=False)
+    assert drive.led_away(at(3.0, 5.0), SPLIT, UNKNOWN, at(6.0, 5.0), at(7.0, 5.0)) == {
+        n: [float(n), 0.0, 0.0] for n in (3, 4, 6, 7)
+    }
+    assert drive.ctx.counts["view_reconstructed"] == 5
+    assert drive.path.past[5].state.means[0] == pytest.approx([5.0, 0.0, 0.0], abs=1e-3)
+    drive = Straight(back_propagate=False)
+    assert set(drive.led_away(at(3.0, 5.0), at(4.0, 3.9, 1.2), at(5.0, 5.0))) == {
+        3,
+        5,
+    }  # 3.9 m of 1.2 m may be the path
+    assert drive.ctx.counts == {"belief_jumped": 2, "view_reconstructed": 2}
+
+
+def test_of_several_jumps_the_last_that_odometry_explains_is_undone_with_all_after_it() -> None:
+    drive = Straight(back_propagate=False)
+    for x in range(3):
+        drive.to(at(x), (0,))
+    for x, y, by in ((3, 5.0, 4), (4, 9.0, 3), (5, 9.0, 3)):
+        drive.to(at(x, y), (by,))
+    assert drive.path.jumps == [(2, 8), (3, 7)]
+    assert {update.index for update in drive.to(at(6.0, 0.0), (2,)).items} == {3, 4, 5}
+    assert drive.path.jumps == []
+
+
+def test_without_a_view_of_the_map_or_a_certain_state_nothing_is_corrected() -> None:
+    drive = Straight()
+    for state, by in ((SPLIT, (0,)), (UNKNOWN, (0,)), (at(50.0), ()), (SPLIT, (0,)), (at(90.0), ())):
+        assert not drive.to(state, by).items
+    assert not drive.ctx.counts
+    lone = Straight()
+    assert not lone.to(at(0.0), (0,)).items
+    assert not lone.to(SPLIT, (0,)).items
+
+
+def test_a_path_begins_anew_without_odometry_and_holds_so_many_views() -> None:
+    drive = Straight(max_views=3)
+    assert [drive.to(at(x)).open_from for x in range(6)] == [0, 0, 0, 0, 1, 2]
+    assert (len(drive.path.past), len(drive.path.motions)) == (4, 3)
+    assert drive.to(at(6.0), moved=False).open_from == 6
+    assert (len(drive.path.past), len(drive.path.motions), drive.path.jumps) == (1, 0, [])
+    jumping = Straight(max_views=2)
+    for x, y, by in ((0, 0.0, 0), (1, 5.0, 3), (2, 5.0, 3), (3, 5.0, 3)):
+        jumping.to(at(x, y), (by,))
+    assert jumping.path.jumps == []  # what lay before it is forgotten
+
+
+def grown(min_improvement: float, first: float = 0.02, **options: Any) -> dict[int, GaussianMixture]:
+    """Less certain from image to image (0.02, 0.1, 0.2, 0.3 m, or `first` at the beginning), then a view at 4 m."""
+    drive = Straight(min_improvement=min_improvement, **options)
+    for x, sigma in enumerate((first, 0.1, 0.2, 0.3)):
+        assert not drive.to(at(x, 0.0, sigma)).items
+    return {update.index: update.state for update in drive.to(at(4.0), (0,)).items}
+
+
+def test_states_since_the_last_one_that_was_as_certain_become_so() -> None:
+    after = grown(2.0)
+    assert list(after) == [1, 2, 3]
+    for n, state in after.items():
+        assert state.means[0] == pytest.approx([n, 0.0, 0.0], abs=1e-6)
+        assert np.sqrt(state.covariances[0, 0, 0]) < 0.03
+
+
+def test_how_much_more_certain_a_state_must_become_is_the_root_of_the_determinants_ratio() -> None:
+    # (0.1 / 0.02)^2 = 25 from the second image on; (0.3 / 0.02)^2 = 225, that of the last.
+    assert list(grown(24.9)) == [1, 2, 3]
+    assert list(grown(25.1)) == [2, 3]
+    assert list(grown(99.0)) == [2, 3]
+    assert grown(226.0) == {}
+
+
+def test_where_nothing_before_was_as_certain_nothing_is_propagated() -> None:
+    assert grown(2.0, first=0.05) == {}
+    assert list(grown(2.0, first=0.028)) == [1, 2, 3]
+
+
+def test_a_jump_is_from_the_last_certain_state_be_it_the_first() -> None:
+    drive = Straight()
+    for state, by in ((at(0.0), 0), (SPLIT, 3), (at(2.0, 5.0), 3)):
+        drive.to(state, (by,))
+    assert drive.ctx.counts == {"belief_jumped": 1}
+    assert drive.path.jumps == [(0, 7)]

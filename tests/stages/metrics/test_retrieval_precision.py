@@ -1,0 +1,96 @@
+"""Answers against where they were taken and which way they look, worked by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.retrieval_precision import RetrievalPrecision
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Answers
+
+ROBOT = Pose(3.0, -2.0, 1.0)
+
+
+def map_of(*poses: tuple[float, float, float]) -> ReferenceGraph:
+    """References so far from the robot (m, m, degrees)."""
+    at = np.array([(ROBOT.x + x, ROBOT.y + y, ROBOT.heading + math.radians(turn)) for x, y, turn in poses])
+    return ReferenceGraph(at, np.ones((len(at), 1, 2), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def told(
+    map: ReferenceGraph, *answers: list[tuple[int, float, float]] | None, truth: Pose | None = ROBOT, **parameters
+):
+    """Of answers (reference, similarity, turn in degrees) to an image each."""
+    given = [
+        None
+        if each is None
+        else Answers(*(np.array(part) for part in zip(*each, strict=True)))
+        if each
+        else Answers(np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0))
+        for each in answers
+    ]
+    given = [each and Answers(each.references, each.similarities, np.radians(each.turns)) for each in given]
+    drive = collected([Tick(n, n, 0, n) for n in range(len(given))], [truth] * len(given))
+    metrics = RetrievalPrecision(**parameters).step(Context("answers"), drive, given, map).metrics
+    return metrics and metrics.values["answers"]
+
+
+@pytest.mark.parametrize(
+    ("place", "turn", "right"),
+    [
+        ((4.9, 0.0, 0.0), 0.0, 1.0),
+        ((0.0, -4.9, 0.0), 0.0, 1.0),
+        ((0.0, 5.1, 0.0), 0.0, 0.0),
+        ((4.0, 4.0, 0.0), 0.0, 0.0),
+        ((0.0, 0.0, 29.0), 0.0, 1.0),
+        ((0.0, 0.0, -30.5), 0.0, 0.0),
+        ((0.0, 0.0, 90.0), -70.0, 1.0),  # the robot stands turned to the right against it
+        ((0.0, 0.0, 90.0), 70.0, 0.0),
+        ((0.0, 0.0, -170.0), -170.0, 1.0),  # 20 degrees, the short way around
+    ],
+)
+def test_an_answer_is_near_within_five_metres_and_thirty_degrees(
+    place: tuple[float, float, float], turn: float, right: float
+) -> None:
+    found = told(map_of(place), [(0, 0.5, turn)])
+    assert (found["nearby_rate"], found["first_nearby_rate"]) == (right, right)
+
+
+def test_an_answer_at_the_limits_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    at = ReferenceGraph(
+        np.array([(3.0, 3.0, np.pi / 2)]),
+        np.ones((1, 1, 2), np.float32),
+        "histograms",
+        np.zeros((0, 2), np.int64),
+        "truth",
+    )
+    monkeypatch.setattr("omninav.stages.metrics.retrieval_precision.WITHIN_DEG", 90.0)
+    found = told(at, [(0, 0.5, 0.0)], truth=Pose(3.0, -2.0, 0.0))
+    assert (found["nearby_rate"], found["background_rate"]) == (1.0, 1.0)
+
+
+def test_the_first_answer_is_the_most_similar_one() -> None:
+    found = told(map_of((0, 0, 0), (9, 0, 0)), [(0, 0.9, 0), (1, 0.8, 0)])
+    assert (found["first_nearby_rate"], found["nearby_rate"]) == (1.0, 0.5)
+
+
+def test_figures_are_means_over_the_images_with_answers() -> None:
+    map = map_of((0, 0, 0), (4, 0, 10), (9, 0, 0), (0, 1, 180), (0, 9, 90))
+    found = told(map, [(0, 0.9, 0), (2, 0.8, 0), (3, 0.7, 0)], None, [], [(2, 0.6, 0), (1, 0.5, 0)])
+    assert found == {
+        "nearby_rate": pytest.approx((1 / 3 + 1 / 2) / 2),
+        "first_nearby_rate": 0.5,
+        "background_rate": pytest.approx(2 / 5),
+        "first_similarity": pytest.approx(0.75),
+        "last_similarity": pytest.approx(0.6),
+    }
+
+
+def test_without_truth_or_answers_there_is_nothing_to_say() -> None:
+    map = map_of((0, 0, 0))
+    assert told(map, [(0, 0.9, 0)], truth=None) is None
+    assert told(map, None, []) is None
