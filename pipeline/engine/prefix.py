@@ -47,8 +47,8 @@ def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str]
     """The names of the prefix's nodes; empty where the source reads outputs of the graph (a closed loop)
     or is not repeatable.
 
-    With `artifacts`, what follows from the logs and the artifacts: the prefix that runs share which differ in their
-    seed only. `without` these nodes (those `following` from draws of random numbers).
+    `artifacts`: count artifacts as inputs too, for the prefix that is shared by runs that differ only in their seed.
+    `without`: nodes to leave out (those that `following` finds behind draws of random numbers).
     """
     source = graph.source
     if source is None or source.name in without or graph.inputs_of(source.name):

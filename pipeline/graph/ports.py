@@ -34,7 +34,8 @@ def type_name(annotation: Any) -> str:
             return f"[{', '.join(type_name(item) for item in items)}]"
         return f"list of {type_name(items[0]) if items else 'anything'}"
     if origin in (dict, Mapping):
-        return f"mapping to {type_name(get_args(annotation)[1])}"
+        inner = type_name(get_args(annotation)[1])
+        return "mapping" if inner == "anything" else f"mapping to {inner}"
     return getattr(annotation, "__name__", str(annotation))
 
 

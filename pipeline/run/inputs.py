@@ -10,7 +10,7 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound
 
 @dataclass(frozen=True)
 class Input:
-    """A setting that a variant takes. In a file a plain text is the meaning of one that need not be given."""
+    """A setting that a variant takes. In YAML, a plain string declares an optional input with that meaning."""
 
     meaning: str
     required: bool = False

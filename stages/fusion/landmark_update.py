@@ -54,11 +54,11 @@ class LandmarkUpdateState(State):
 class LandmarkUpdate(Stage):
     """Updates a belief by the poses from which an image may have been taken.
 
-    Each Gaussian of the fix is right with its probability, and then the belief's mass around it counts as far as both
-    agree; with the rest the image says nothing, and the belief stays. Around each Gaussian the belief is one too: the
-    mean of both is that of a Kalman update, from which particles are drawn, as a particle filter alone, with particles
-    decimetres apart, could not take in millimetres; the covariance is that of their intersection, since images in a row
-    share the errors of the same landmarks, and a robot that stands sees nothing new. With `kidnapping_probability` the
+    The likelihood is a mixture: each Gaussian of the fix is right with its probability; otherwise the image says
+    nothing, and the belief stays. Around each Gaussian the belief is approximated by a Gaussian, and particles are
+    drawn from the fusion of both, since particles decimetres apart cannot represent millimetres. The fused mean is that
+    of a Kalman update. The fused covariance is that of covariance intersection, since consecutive images share the
+    errors of the same landmarks, and a robot that stands gains no information. With `kidnapping_probability` the
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
     Once `track` says that the robot was carried, it is as likely elsewhere as here, until poses that are together all

@@ -28,8 +28,8 @@ SURE, LIKELY = 0.95, 0.5
 BELIEVED, CONTRADICTED = 0.5, 0.02
 """Share of the belief around a pose above which both agree, and below which they contradict each other."""
 MAX_STEP, MAX_CONFIRMED = 2.0, 20.0
-"""Path, in length scales, that one more pose confirms, and path on which a robot that was surely on its track may see
-another place, at most."""
+"""Largest path, in length scales, that one pose confirms; and largest confirmed path, over which contradicting poses
+are left out."""
 MAX_SINCE = 100.0
 """Way since the last pose that confirmed the track, in length scales, after which it is forgotten."""
 DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
@@ -123,8 +123,8 @@ class UnbrokenTrack(Stage):
         fix: LandmarkFix | None,
         unit: float,
     ) -> tuple[Bools, bool]:
-        """Keep account of what landmarks say of the track; which poses (K,) it does not lead to, and whether the robot
-        was surely carried to this image."""
+        """Update the track by one image. Returns which poses (K,) are left out, and whether the robot was surely
+        carried to this image."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         driven = math.hypot(moved[0], moved[1])

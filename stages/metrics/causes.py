@@ -152,7 +152,7 @@ def not_recorded(part: Part) -> Verdict | None:
     """A run without `ImageEvidence`."""
     if part.log.known("match_lead") or part.state == "jumped":
         return None
-    return Verdict("not recorded", "nothing was recorded that says why")
+    return Verdict("not recorded", "the run recorded no evidence, so the cause is unknown")
 
 
 def off_the_map(part: Part) -> Verdict | None:
@@ -257,7 +257,7 @@ RULES: tuple[Callable[[Part], Verdict | None], ...] = (
 
 
 def landmarks_of(part: Part) -> str:
-    """The number of images with a pose by landmarks at the estimate, in words; empty where none are looked for."""
+    """The share of images with a pose from landmarks at the estimate, as text; empty where none are looked for."""
     if not part.log.known("landmarks"):
         return ""
     return f"; {100 * part.landmarks_agree:.0f} % of the images have landmarks there"

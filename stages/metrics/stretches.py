@@ -32,7 +32,7 @@ NEAR_M, NEAR_SCALES = 0.5, 2.0
 """A pose by landmarks lies at the estimate within the confidence's tolerance (m), a best match within so many length
 scales."""
 GAP_M, GAP_SHARE = 0.5, 0.1
-"""Distance (m, and share of the metres driven) from where odometry leads that no odometry which works has."""
+"""Distance (m, plus a share of the metres driven) from odometry's prediction that working odometry never exceeds."""
 NOT_RECORDED = (
     "What single images say was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
     "particle filter in a map has, as variant=omninav."

@@ -52,7 +52,7 @@ KIDNAPPING_PROBABILITY = 0.02
 or found itself again."""
 
 CARRIED_SINCE = 0.002
-"""The same of the odds by landmarks, as the next sure ones tell at once."""
+"""The same probability for the odds from landmarks: smaller, since the next sure pose reveals a kidnapping at once."""
 FOUND_OF_LEFT_OUT, FOUND_ELSEWHERE = 0.5, 0.05
 """Share of images with a pose by landmarks: on another day, of those that the map's own images have; and elsewhere."""
 HALF_FOUND = 5.0
@@ -60,8 +60,8 @@ HALF_FOUND = 5.0
 and stores all do up to 1.5 m, and a third from 2 to 3 m."""
 PLACES_ALIKE = 20.0
 """Places among which a wrong pose falls, one of which may be the estimate's: where the map looks like the image."""
-FOUND_BY_CHANCE = 0.002
-"""Probability that even a sure pose is wrong: landmarks may stand elsewhere today."""
+OUTLIER_PROBABILITY = 0.002
+"""Probability that a pose is wrong however many landmarks agree on it: they may have moved since the map was made."""
 NEW_WITHOUT = 0.2
 """Share of an image without a sure pose that is new evidence: it is blurred, or shows what has changed or misleads,
 where the one before was or did."""
@@ -257,11 +257,11 @@ def by_landmarks(
         found = FOUND_OF_LEFT_OUT * found_rate
         against = min(0.0, math.log((1.0 - found) / (1.0 - FOUND_ELSEWHERE)))
         return max(kept + NEW_WITHOUT * novelty * against, min(kept, -max_against)), 0.0
-    sure = min(float(fix.probabilities.sum()), 1.0 - FOUND_BY_CHANCE)
+    sure = min(float(fix.probabilities.sum()), 1.0 - OUTLIER_PROBABILITY)
     agreeing = float(fix.probabilities @ consistency(fix.poses, pose, *gate))
     elsewhere = max(sure - agreeing, 0.0)
     wrong = (1.0 - sure) * (agreeing / PLACES_ALIKE + elsewhere) / (agreeing + elsewhere)
-    by_chance = max(wrong, FOUND_BY_CHANCE)
+    by_chance = max(wrong, OUTLIER_PROBABILITY)
     told = math.log((agreeing + by_chance) / (elsewhere + by_chance))
     # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
     counted = novelty if told > 0.0 else NEW_WITHOUT * novelty

@@ -41,14 +41,14 @@ class WidenCovariance(Stage):
     that is off by a share of the appearance length scale, which no particle shows. So that share of the map's length
     scale, squared, is added to both variances of the position. While the estimate is more probably wrong than right,
     the robot may be anywhere in the map: the covariance is that of the map's references about the estimate, and of any
-    heading. Where landmarks have given the pose, the filter's covariance is theirs, and right; the longer ago, the more
-    of the share is added, up to the drift of odometry. How well it holds, and where the share is from:
+    heading. Where landmarks gave the pose, the filter's covariance is correct, and nothing is added. From there on,
+    odometry's drift since that pose is added, until it exceeds the share. Evaluation and choice of the share:
     docs/experiments/confidence.md.
     """
 
     floor: Annotated[float, Bounds(ge=0)] = 0.6
-    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map:
-    the larger, the wider the covariance."""
+    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map;
+    after a pose from landmarks, odometry's drift limits it."""
     min_confidence: Annotated[float, Bounds(ge=0, le=1)] = 0.5
     """Confidence below which the covariance covers the whole map; 0: never."""
 

@@ -27,10 +27,10 @@ from .topic_recording import TopicRecording
 from .topics import record_topics
 
 STEPS, MIN_STEPS, STEPS_PER_BYTE = 10_000, 2_000_000, 20
-"""SQLite asks after so many steps of its machine whether to go on; so many are a question's, and so many more for each
-byte of the file. A row takes some 25 bytes at least, and 30 steps."""
+"""SQLite calls the progress handler every `STEPS` steps of its virtual machine. A query may take `MIN_STEPS`, and
+`STEPS_PER_BYTE` more for each byte of the file: a row has at least 25 bytes and takes some 30 steps."""
 MIN_VALUE_BYTES = 1_000_000
-"""Of a value in a file of SQLite, however small the file is."""
+"""Size up to which a value in an SQLite file is always accepted, however small the file is."""
 
 
 class Rosbag(Format):

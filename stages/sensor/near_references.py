@@ -185,8 +185,7 @@ class NearReferences(Stage):
 
     With a `calibration` (likelihood=calibrated) the weight is the likelihood ratio of the right against a wrong place,
     which the map's own views have shown, in place of a power; `power`, `contrast` and the background's are not used.
-    Its logarithm is interpolated as similarities are; an unknown place has ratio 1, and no place has less, so that
-    `outliers` only lowers the right one's by their share.
+    Its logarithm is interpolated as similarities are; an unknown place has ratio 1, and no place has less.
     """
 
     power: Annotated[float, Bounds(gt=0)] | None = None

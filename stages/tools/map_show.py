@@ -118,7 +118,7 @@ def described_landmarks(map: ReferenceGraph) -> str:
     few = f", {int((sees == 0).sum()) + len(map) - len(sees)} references see none" if (sees == 0).any() else ""
     return (
         f"{len(landmarks)}, a reference sees {np.median(sees) if len(sees) else 0:.0f} (median){few}; "
-        f"bearings to {np.degrees(landmarks.sigma_rad):.2f} deg"
+        f"bearings to {np.degrees(landmarks.sigma_rad):.2f} deg, pose variances x {landmarks.variance_factor:.1f}"
     )
 
 

@@ -62,7 +62,8 @@ def _described(entry: Entry) -> Iterator[str]:
         yield from _parameter(parameter)
     if papers := _papers(cls):
         yield f"    from {papers}"
-    for use in [*options_with(entry), f"_target_: {entry.target}"]:
+    target = entry.target if entry.origin == "built in" else entry.name  # a path depends on the folder it is typed in
+    for use in [*options_with(entry), f"_target_: {target}"]:
         yield f"    use  {use}"
     yield ""
 

@@ -25,7 +25,7 @@ NEIGHBOURS = 1
 MIN_INLIERS = 20
 """Landmarks that must agree on a pose that is sure by itself."""
 MEDIAN_SQUARES = 2.366
-"""Median of the squared Mahalanobis distance of three normal errors."""
+"""Median of the chi-square distribution with 3 degrees of freedom."""
 VARIANCE_FACTOR = 2.5
 """Variance of poses over that of their bearings where too few images were left out to tell: that of most maps."""
 MIN_FOUND = 10

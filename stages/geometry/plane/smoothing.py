@@ -92,9 +92,9 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
 
 
 def odometry_sigma(estimates: Array, trust: Array, motions: Array) -> float:
-    """Standard deviation of odometry (N - 1, 3) per metre, by the way between trusted estimates (N, 3).
+    """Standard deviation per metre of odometry `motions` (N - 1, 3), from the scale of `estimates` (N, 3) against it.
 
-    Twice the share by which odometry is too long or too short (a guessed speed, another wheel), where that is much.
+    Twice the relative error of scale (a guessed speed, another wheel) where that exceeds `OFF_SCALE`.
     """
     path = chain(np.concatenate([np.zeros((1, 3)), motions]))
     ways, driven = (between(poses[:-SPAN], poses[SPAN:])[:, :2] for poses in (estimates, path))
