@@ -22,6 +22,7 @@ COMMANDS = (
     "live",
     "report",
     "explain",
+    "video",
     "compare",
     "resume",
     "experiments",
@@ -30,7 +31,7 @@ COMMANDS = (
 )
 """Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
 
-WITHOUT_CONFIGURATION = ("stages", "report", "explain", "compare", "resume", "experiments", "data", "doctor")
+WITHOUT_CONFIGURATION = ("stages", "report", "explain", "video", "compare", "resume", "experiments", "data", "doctor")
 """Those that compose none, and have no use for flags of it."""
 
 

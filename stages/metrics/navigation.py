@@ -56,8 +56,9 @@ class Navigation(MetricStage):
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Of a simulated robot that
-    knows poses: `lost_m_per_km`, metres per kilometre driven with an estimate more than 0.5 m off, or none. Truth of
-    the map's poses that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
+    knows poses: `lost_m_per_km`, metres per kilometre driven with an estimate more than 0.5 m off, or none, on the way
+    to all goals. Truth of the map's poses that is not known gives None. Gives nothing where no route was ever planned
+    and no truth is known.
     """
 
     def step(
@@ -113,7 +114,7 @@ class Navigation(MetricStage):
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
         if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
-            found["lost_m_per_km"] = lost_metres(drive.at(slice(begun, None)))
+            found["lost_m_per_km"] = lost_metres(drive)
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
 
 

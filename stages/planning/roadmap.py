@@ -148,7 +148,7 @@ class RoadmapPlanner(Stage):
             distance=left,
             ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3) if known else 1.0,
             nearness=1.0,
-            metres=math.hypot(x, y) if known else None,
+            metres=math.hypot(x, y) if known and sure else None,
             inliers=0 if fix is None else int(fix.inliers[0]),
             state="tracking" if sure else "lost",
             why="" if sure else f"the confidence in where it is is {confidence.probability:.2f}",

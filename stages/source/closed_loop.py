@@ -24,6 +24,7 @@ from omninav.stages.simulator.simulated_recording import DAY_0_NS, refuse_no_roo
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.command import Command
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Image
@@ -48,7 +49,7 @@ class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is. `ended`: ticks since its route has.
+    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given.
     """
 
     robot: F64 = field(default_factory=_nowhere)
@@ -57,6 +58,7 @@ class ClosedLoopState(State):
     odometry: F64 = field(default_factory=lambda: np.zeros(3))
     ticks: int = 0
     ended: int = 0
+    asked: int = 0
 
 
 class ClosedLoop(Source):
@@ -90,6 +92,8 @@ class ClosedLoop(Source):
     """Ticks a second."""
     rest_s: Annotated[float, Bounds(ge=0)] = 1.0
     """How long it goes on once the planned route, or a path without one, has ended: it has arrived, or given up."""
+    goals: tuple[tuple[float, float], ...] = ()
+    """Where it is asked to go on to, x, y (m), each once its route has ended: it has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
@@ -100,6 +104,7 @@ class ClosedLoop(Source):
         odometry: Pose
         motion: Motion | None = None
         scan: Scan
+        goal: GoalPoint | None = None
         truth: Pose
         tally: DriveTally
 
@@ -135,8 +140,13 @@ class ClosedLoop(Source):
         progress: PathProgress | None = None,
     ) -> Out | None:
         """Drive on under the last command, then perceive; None when the time, or the route, is over."""
-        simulation.ended += route is not None and route.state in ("arrived", "gave up")
-        simulation.ended += progress is not None and progress.arrived
+        goal = None
+        if (route is not None and route.state in ("arrived", "gave up")) or (progress is not None and progress.arrived):
+            if simulation.asked < len(self.goals):
+                goal = GoalPoint(*self.goals[simulation.asked])
+                simulation.asked += 1
+            else:
+                simulation.ended += 1
         if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
             return None
         motion = None
@@ -144,7 +154,7 @@ class ClosedLoop(Source):
             simulation.robot = at_rest(self._first)
         else:
             motion = self._drive(ctx, simulation, command or Command(0.0, 0.0))
-        out = self._perceive(ctx, simulation, motion)
+        out = self._perceive(ctx, simulation, motion, goal)
         simulation.ticks += 1
         return out
 
@@ -165,7 +175,9 @@ class ClosedLoop(Source):
             ctx.count("kidnapped")
         return Motion(*(float(value) for value in rolled))
 
-    def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:
+    def _perceive(
+        self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None, goal: GoalPoint | None
+    ) -> Out:
         pose, now = simulation.robot[:3], simulation.ticks / self.rate_hz
         people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
@@ -177,6 +189,7 @@ class ClosedLoop(Source):
             odometry=_pose(simulation.odometry),
             motion=motion,
             scan=scan_value(self.world, metres),
+            goal=goal,
             truth=_pose(pose),
             tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
         )

@@ -31,7 +31,7 @@ def test_every_command_explains_itself(words, capsys):
 
 
 def test_the_example_of_every_tool_fits_its_arguments():
-    assert {*TOOLS, "data", "explain", "simulate"} == {*tools()}
+    assert {*TOOLS, "data", "explain", "video", "simulate"} == {*tools()}
     for name in tools():
         tool_from(tool_class(name), tool_class(name).example.split())
 

@@ -21,7 +21,7 @@ from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
-NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate", "explain"}
+NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate", "explain", "video"}
 """Commands that compose no configuration."""
 OWN = {"experiment", "profile", "runs", "cache"}
 """What is typed for an experiment and not for its conditions."""

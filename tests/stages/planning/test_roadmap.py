@@ -100,6 +100,16 @@ def test_a_robot_that_does_not_know_where_it_is_has_no_route() -> None:
     assert (out.route.state, out.route.why) == ("gave up", "for 120 s it has not found out where it is")
 
 
+def test_a_robot_that_gets_lost_stops_at_once() -> None:
+    drive = Drive()
+    for _ in range(20):
+        drive.step()
+    before = drive.pose
+    assert drive.step(confidence=0.3).vector.metres is None
+    assert drive.status.state == "lost"
+    assert drive.pose.tolist() == before.tolist()
+
+
 def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_up() -> None:
     drive = Drive(start=(3.0, 3.0, 0.0))  # between two passes of the tour
     before = set(drive.step().route.places.tolist())

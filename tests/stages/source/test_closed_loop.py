@@ -68,6 +68,17 @@ def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
 
 
+def test_it_is_sent_on_from_goal_to_goal_and_ends_after_the_last():
+    loop = Loop(seconds=20.0, rest_s=0.4, goals=((1.0, 2.0), (3.0, 4.0)))
+    going, ended = (PlannedRoute(np.array([3]), state, 0) for state in ("under way", "gave up"))
+    outs = [
+        loop.source.step(loop.ctx, loop.state, None, way) for way in (None, ended, going, ended, going, *[ended] * 3)
+    ]
+    goals = [None if out is None or out.goal is None else (out.goal.x, out.goal.y) for out in outs]
+    assert goals == [None, (1.0, 2.0), None, (3.0, 4.0), None, None, None, None]
+    assert [out is not None for out in outs] == [True] * 7 + [False]
+
+
 def test_a_path_that_has_been_gone_ends_the_drive_a_moment_later():
     loop = Loop(seconds=20.0, rest_s=1.0)
     gone = [

@@ -1,0 +1,68 @@
+import cv2
+import numpy as np
+import pytest
+
+from omninav.pipeline import BadInput, Context
+from omninav.pipeline.mcap.writer import LogWriter
+from omninav.stages.plots.pose_messages import pose_messages
+from omninav.stages.tools.video import BLUE, ORANGE, MakeVideo, scenes_in
+
+SECOND = 10**9
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A run of ten seconds along x; from the sixth on it is lost and believes to be elsewhere."""
+    with LogWriter(tmp_path / "result.mcap") as log:
+        for k in range(11):
+            now = SECOND * (100 + k)
+            header = {"stamp": {"sec": 100 + k, "nanosec": 0}, "frame_id": "map"}
+            there, believed = pose_messages(np.array([[0.5 * k, 0.0, 0.0], [0.5 * k, 2.0 * (k >= 6), 0.0]]))
+            said = {
+                "/ground_truth/pose": ("geometry_msgs/msg/PoseStamped", {"header": header, "pose": there}),
+                "/estimate/pose": (
+                    "geometry_msgs/msg/PoseWithCovarianceStamped",
+                    {"header": header, "pose": {"pose": believed, "covariance": np.zeros(36)}},
+                ),
+                "/estimate/confidence": ("std_msgs/msg/Float64", {"data": 0.9 if k < 6 else 0.1}),
+                "/estimate/state": ("std_msgs/msg/String", {"data": "tracking" if k < 6 else "lost"}),
+            }
+            if k > 2:  # the first images are missing
+                jpeg = cv2.imencode(".jpg", np.full((40, 96, 3), 200, np.uint8))[1]
+                image = {"header": header, "format": "jpeg", "data": jpeg.ravel()}
+                said["/panorama/compressed"] = ("sensor_msgs/msg/CompressedImage", image)
+            for topic, (msgtype, fields) in said.items():
+                log.write(topic, msgtype, now, fields)
+    return tmp_path
+
+
+def test_a_video_shows_when_the_robot_is_lost(folder, capsys):
+    MakeVideo(run_folder=str(folder), out=str(folder / "video.mp4"), begin=2.0, speed=2.0).run(Context("video"))
+    assert "9 images" in capsys.readouterr().out
+    video = cv2.VideoCapture(str(folder / "video.mp4"))
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(2.0)
+    frames = [video.read()[1] for _ in range(9)]
+    assert [bool(frame[:380].mean() > 150) for frame in frames] == [False] + [True] * 8  # a strip of 960 x 400 pixels
+    bands = [frame[436, -20] for frame in frames]
+    colours = [min((BLUE, ORANGE), key=lambda colour: np.abs(band - np.array(colour, float)).sum()) for band in bands]
+    assert colours == [BLUE] * 4 + [ORANGE] * 5
+
+
+def test_a_scene_holds_the_last_of_each_topic(folder):
+    scenes = list(scenes_in(folder / "result.mcap"))
+    assert [scene["seconds"] for scene in scenes] == list(range(11))
+    assert [scene["/estimate/state"].data for scene in scenes[5:7]] == ["tracking", "lost"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"out": "video.gif"}, "type out=video.mp4"),
+        ({"run_folder": "nowhere"}, "no result.mcap"),
+        ({"begin": 20.0}, "no poses between 20 s"),
+        ({"out": "nowhere/video.mp4"}, "is its folder there"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_in_one_line(folder, settings, said):
+    with pytest.raises(BadInput, match=said):
+        MakeVideo(**{"run_folder": str(folder), "out": str(folder / "video.mp4"), **settings}).run(Context("video"))
