@@ -85,12 +85,7 @@ def truth_from(
 
 def read_trajectory(file: Path) -> Trajectory:
     """The trajectory in a file. Raises `UnreadableRecording` or another `BadInput`."""
-    head = read_small(file, MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
-    lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if lines and "," not in lines[0] and len(lines[0].split()) == 8:
-        times, poses, impossible, doubts = _tum(file)
-    else:
-        times, poses, impossible, doubts = _csv(file)
+    times, poses, impossible, doubts = trajectory_rows(file)
     known = np.flatnonzero((times != NO_TIME) & np.isfinite(poses[:, :2]).all(axis=1))
     rows = known[ascending_rows(times[known])]
     stamps, poses = times[rows], poses[rows]
@@ -100,6 +95,14 @@ def read_trajectory(file: Path) -> Trajectory:
     if np.isnan(poses[:, 2]).any():
         poses[:, 2] = track_directions((stamps - stamps[0]) / 1e9, poses[:, :2], TANGENT_S)
     return Trajectory(stamps, poses, impossible, [f"{file}: {doubt}" for doubt in doubts])
+
+
+def trajectory_rows(file: Path) -> Rows:
+    """The rows of a file as they stand, in TUM's format or a CSV table. Raises `BadInput`."""
+    head = read_small(file, MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
+    lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    tum = lines and "," not in lines[0] and len(lines[0].split()) == 8
+    return _tum(file) if tum else _csv(file)
 
 
 def _tum(file: Path) -> Rows:

@@ -53,7 +53,7 @@ def can_be_read(name):
     folder, _, stem = name.partition("/")
     for profile in ("full", "quick"):
         experiment = read_experiment(config["experiment"], profile)
-        measures_alone = folder == "recordings" or stem in ("home_store", "office")  # to start from
+        measures_alone = folder in ("peers", "recordings") or stem in ("home_store", "office")  # to start from
         assert experiment.claims or measures_alone
         assert experiment.conditions()
 

@@ -78,11 +78,11 @@ def test_figures_are_medians_over_the_times_that_it_was_found_again():
     assert found == {"times_lost": 4, "frames": 3.0, "metres": 1.5, "never": 1}
 
 
-def test_frames_without_truth_or_estimate_do_not_count():
-    drive = driven([0.1, 9.0, 9.0, 0.1])
+def test_frames_without_truth_do_not_count_and_those_without_an_estimate_are_in_no_share():
+    drive = driven([0.1, 9.0, 9.0, 0.1, 0.1])
     drive.truth[1] = np.nan
     drive.estimate[2] = np.nan
     found = LocalisedShare().step(Context("l"), drive).metrics.values
-    assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (1.0, 0)
+    assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (0.75, 0)
     drive.estimate[:] = np.nan
     assert LocalisedShare().step(Context("l"), drive).metrics is None

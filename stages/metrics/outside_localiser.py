@@ -1,0 +1,155 @@
+"""A localiser that is a program of its own, measured like every other."""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from omninav.pipeline import BadInput, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.graph.problems import cut
+from omninav.stages.recordings.localiser_folder import read_poses, write_folder
+from omninav.stages.recordings.recorded_images import RecordedImages
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.drive import Drive
+from omninav.stages.values.pose import Motion, Pose
+
+from .collect_drive import CollectDrive
+
+LOG = "localiser.log"
+"""What it printed, in the run's folder."""
+QUANTITIES = {
+    "peer.image_cpu_ms": Quantity(title="Processor time of an image", unit="ms", better="lower"),
+    "peer.map_cpu_s": Quantity(title="Processor time of all the rest, the map", unit="s", better="lower"),
+    "peer.cpu_s": Quantity(title="Processor time of the localiser", unit="s", better="lower"),
+    "peer.kept_mb": Quantity(title="Files that the localiser keeps", unit="MB", better="lower"),
+    "peer.lines": Quantity(title="Lines of its program", better="lower"),
+    "peer.without_pose": Quantity(title="Images without a pose", unit="%", better="lower"),
+}
+
+
+class OutsideLocaliser(Stage):
+    """Gives a program the images of a map and of a drive as files, and takes its poses for the drive's estimates.
+
+    It is called as `COMMAND FOLDER` after the last image, and reads and writes what `recordings/localiser_folder.py`
+    says. Under `peer`: its processor time with that of its children, in all (`cpu_s`), and where its `poses.csv` says
+    what each image took, of an image and of all the rest; the files that it leaves in the folder beside its poses;
+    lines of the files that the command names, without empty ones. Raises `BadInput` with its last words where it fails,
+    and where its poses cannot be read. Whoever stops the run stops it.
+    """
+
+    command: str | None = None
+    """The program with its words, as typed in a terminal; `python` is the one that runs this. The folder follows."""
+
+    class Out(Outputs):
+        """`drive`: with its poses."""
+
+        drive: Drive
+        metrics: Metrics
+
+    def inputs_digest(self) -> str | None:
+        """Hash of the files that the command names."""
+        return digest_text(*map(digest_file, self._files())) if self._files() else None
+
+    def step(
+        self,
+        ctx: Context,
+        map: RecordedImages,
+        images: RecordedImages,
+        ticks: Sequence[Tick],
+        truth: Sequence[Pose | None],
+        motion: Sequence[Motion | None],
+    ) -> Out:
+        """The whole run at once."""
+        if len({tick.log for tick in ticks}) > 1:
+            raise BadInput("a localiser of your own is given one log at a time: log=PATH")
+        with tempfile.TemporaryDirectory(prefix="omninav_peer_") as place:
+            folder = Path(place)
+            given = {*write_folder(folder, map, images)}
+            ctx.doing(f"{cut(self.command or '')}: a map of {len(map)} images, a drive of {len(images)}")
+            used = self._run(folder, (ctx.folder or folder) / LOG)
+            try:
+                poses, image_ms = read_poses(folder, images)
+            except BadInput as wrong:
+                raise BadInput(f"{cut(self.command or '')}: {wrong}".replace(f"{folder}{os.sep}", "")) from None
+            kept = [path for path in folder.rglob("*") if path.is_file() and path not in given]
+            size = sum(path.stat().st_size for path in kept if path.name not in (LOG, "poses.csv", "poses.tum"))
+        estimates = [
+            PoseEstimate(pose, np.zeros((3, 3)), 1.0, pose) if np.isfinite(row).all() else None
+            for row in poses
+            for pose in [Pose(*row.tolist())]
+        ]
+        drive = CollectDrive().step(ctx, ticks, truth, motion, estimates).drive
+        lines = [
+            line for file in self._files() for line in file.read_text(encoding="utf-8", errors="replace").splitlines()
+        ]
+        values = {
+            "image_cpu_ms": image_ms,
+            "map_cpu_s": None if used is None or image_ms is None else used - image_ms * len(images) / 1e3,
+            "cpu_s": used,
+            "kept_mb": size / 1e6,
+            "lines": sum(bool(line.strip()) for line in lines) or None,
+            "without_pose": float(np.isnan(poses[:, 0]).mean()),
+        }
+        return self.Out(drive=drive, metrics=Metrics({"peer": values}, QUANTITIES))
+
+    def _words(self) -> list[str]:
+        try:
+            words = shlex.split(self.command or "")
+        except ValueError as error:
+            raise BadInput(f"command: {cut(self.command or '')}: {error}") from None
+        if not words:
+            raise BadInput('command: no program; type command="python my_localiser.py"')
+        return words
+
+    def _files(self) -> list[Path]:
+        return [Path(word) for word in self._words() if Path(word).is_file()]
+
+    def _run(self, folder: Path, log: Path) -> float | None:
+        """Run it to its end, and give the seconds of processor time that it took; None where nothing counts them."""
+        before = _children_s()
+        with log.open("w+b") as output:
+            try:
+                ended = _wait(self._words(), folder, output)
+            except OSError as error:
+                raise BadInput(f"command: {cut(self.command or '')} cannot be run: {error.strerror}") from None
+            if ended:
+                output.seek(max(0, output.tell() - 2000))
+                words = output.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+                raise BadInput(f"{cut(self.command or '')} ended with {ended}: {words[-1]:.300}")
+        after = _children_s()
+        return None if before is None or after is None else after - before
+
+
+def _wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
+    """Run a program until it ends, or until somebody stops this one: then nothing of it goes on."""
+    own = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])}
+    own.pop("PYTHONSAFEPATH", None)  # which a command of ours sets for processes of ours
+    process = subprocess.Popen(
+        [*words, str(folder)], stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=own, start_new_session=True
+    )
+    try:
+        return process.wait()
+    except BaseException:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+        process.wait()
+        raise
+
+
+def _children_s() -> float | None:
+    """Processor time (s) of all programs that were run from here and have ended; None where nothing counts it."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime

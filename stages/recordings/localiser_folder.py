@@ -1,0 +1,107 @@
+"""The folder that a localiser of one's own is given, and where it leaves its poses: see docs/peers.md."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.graph.problems import BadInput, counted
+
+from .camera_yaml import parse_camera
+from .recorded_images import RecordedImages
+from .tables import Time, read_table
+from .truth_file import trajectory_rows
+
+Array = npt.NDArray[np.float64]
+POSES = ("poses.csv", "poses.tum")
+"""Files that hold its poses: the first that is there."""
+COST = "cpu_ms"
+"""The column of `poses.csv` with the processor time that each image took, which it may have."""
+SAME_TIME_S = 0.001
+"""A pose belongs to the image whose time is this near, seconds: programs write times with six digits and more."""
+
+
+def write_folder(folder: Path, map: RecordedImages, drive: RecordedImages) -> list[Path]:
+    """Write what the localiser is given. Returns the files. Raises `BadInput` where the map has no image with a pose.
+
+    `camera.yaml`, and `rays.npy` (height, width, 3): the direction in which each pixel looks, a unit vector of float32
+    (x forward, y left, z up), NaN where it sees nothing; `map/images.csv` (file, time, x, y, heading) and
+    `drive/images.csv` (file, time, odometry_x, odometry_y, odometry_heading), in seconds, metres and radians, with the
+    images beside them. Images of the map whose pose is not known are left out; odometry that is not known is empty.
+    """
+    placed = np.flatnonzero(np.isfinite(map.truth).all(axis=1))
+    if not len(placed):
+        raise BadInput("the tour has no true poses, which a localiser of your own is given: truth=FILE names some")
+    (folder / "camera.yaml").write_text(drive.camera, encoding="utf-8")
+    camera = parse_camera(drive.camera, "camera.yaml")
+    rays, _ = camera.unproject(camera.grid())
+    np.save(folder / "rays.npy", np.where(camera.mask()[..., None], rays, np.nan).astype(np.float32))
+    return [
+        folder / "camera.yaml",
+        folder / "rays.npy",
+        *_write_images(folder / "map", map, map.truth, placed, "file,time,x,y,heading"),
+        *_write_images(
+            folder / "drive",
+            drive,
+            drive.odometry,
+            np.arange(len(drive)),
+            "file,time,odometry_x,odometry_y,odometry_heading",
+        ),
+    ]
+
+
+def _write_images(
+    folder: Path, images: RecordedImages, poses: Array, rows: npt.NDArray[np.int64], head: str
+) -> list[Path]:
+    folder.mkdir()
+    lines, files = [head], []
+    for row in rows.tolist():
+        files.append(folder / f"{row:06d}.png")
+        files[-1].write_bytes(images.png(row))
+        stamp, pose = int(images.stamps[row]), poses[row]
+        numbers = [f"{number:.9f}" for number in pose] if np.isfinite(pose).all() else [""] * 3
+        lines.append(f"{files[-1].name},{stamp // 10**9}.{stamp % 10**9:09d},{','.join(numbers)}")
+    files.append(folder / "images.csv")
+    files[-1].write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return files
+
+
+def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, float | None]:
+    """Poses (N, 3) that the localiser left, NaN where it gave none; and the median processor time of an image (ms).
+
+    `poses.csv` (time, x, y and heading, or qx, qy, qz, qw; perhaps `cpu_ms`) or `poses.tum` (time x y z qx qy qz qw).
+    The time is None where the file does not state it. Raises `BadInput` where there is no such file, where it cannot be
+    read, and where one of its times is that of no image, or of an image that has a pose.
+    """
+    file = next((folder / name for name in POSES if (folder / name).is_file()), None)
+    if file is None:
+        raise BadInput(f"it left no {' and no '.join(POSES)} in the folder that it was given; docs/peers.md says how")
+    poses = np.full((len(drive), 3), np.nan)
+    if not file.stat().st_size:
+        return poses, None
+    times, rows, impossible, _ = trajectory_rows(file)
+    if impossible:
+        raise BadInput(f"{file.name}: {counted(impossible, 'quaternion')} of no rotation")
+    given = np.isfinite(rows[:, :2]).all(axis=1)
+    if np.isnan(rows[given, 2]).any():
+        raise BadInput(f"{file.name}: a pose without a heading; leave out the row of an image that has none")
+    gaps = np.abs(times[given, None] - drive.stamps[None])
+    image, gap = gaps.argmin(axis=1), gaps.min(axis=1)
+    if (gap > SAME_TIME_S * 1e9).any():
+        first, last = drive.stamps[[0, -1]] / 1e9
+        wrong = times[given][gap > SAME_TIME_S * 1e9][0] / 1e9
+        raise BadInput(
+            f"{file.name}: {wrong:.6f} s is the time of no image of drive/images.csv ({first:.6f} to {last:.6f} s)"
+        )
+    if len(np.unique(image)) < len(image):
+        raise BadInput(f"{file.name}: two poses of one image")
+    poses[image] = rows[given]
+    return poses, _cost(file)
+
+
+def _cost(file: Path) -> float | None:
+    table = read_table(file) if file.suffix == ".csv" else None
+    if table is None or COST not in table.names:
+        return None
+    took = table.nanoseconds(Time(COST, "ms"))
+    return float(np.median(took[took >= 0])) / 1e6 if (took >= 0).any() else None

@@ -1,0 +1,34 @@
+"""The images of a drive as they were taken: what a program is given that is no part of this one."""
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import Shape, Starts
+
+Array = npt.NDArray[np.float64]
+
+
+class RecordedImages(Value):
+    """N images in the order of their times, all of one camera, with what is known of each.
+
+    `camera`: its camera.yaml. `pngs`: their PNG bytes one after the other; image n lies from `ends[n]` to `ends[n +
+    1]`. `stamps`: ns. `odometry` in its own frame and `truth` in the map's: x, y (m), heading (rad), a row of NaN
+    where it is not known.
+    """
+
+    camera: str
+    pngs: Annotated[npt.NDArray[np.uint8], Shape("bytes")]
+    ends: Annotated[npt.NDArray[np.int64], Shape("N+1"), Starts("bytes")]
+    stamps: Annotated[npt.NDArray[np.int64], Shape("N")]
+    odometry: Annotated[Array, Shape("N", 3, finite=False)]
+    truth: Annotated[Array, Shape("N", 3, finite=False)]
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+    def png(self, row: int) -> bytes:
+        """The bytes of an image's file."""
+        return bytes(self.pngs[self.ends[row] : self.ends[row + 1]])
