@@ -136,7 +136,8 @@ class UnbrokenTrack(Stage):
             return np.zeros(len(poses), np.bool_), False
         how = carried(before, now, moved) if len(before[0]) else Carried(math.inf, False)
         state.carried = max(state.carried, how.at_most)
-        surely = how.surely and driven < NEAR[0] and abs(moved[2]) < NEAR[1]  # a narrow view turns out of what it saw
+        # a narrow view turns out of what it saw
+        surely = how.surely and driven < NEAR[0] and abs(float(moved[2])) < NEAR[1]
         if math.isinf(state.carried):
             state.confirmed, state.carried = 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before

@@ -108,7 +108,7 @@ def test_a_narrow_view_that_has_turned_out_of_what_it_saw_was_not_carried(turn, 
     belief = Particles(np.zeros((2, 3)), np.full(2, 0.5))
     first, other = seen_from(np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]))
     assert not stage.step(ctx, state, belief, first, None, None).track.carried
-    assert stage.step(ctx, state, belief, other, None, Motion(0.0, 0.0, turn)).track.carried == carried
+    assert stage.step(ctx, state, belief, other, None, Motion(0.0, 0.0, turn)).track.carried is carried
 
 
 def test_a_track_that_was_never_sure_rules_nothing_out():
