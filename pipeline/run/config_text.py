@@ -5,9 +5,9 @@ from typing import Any
 
 import yaml
 
-LINE = 130
+LINE = 185
 """Most characters of a part that is written in one line. A longer one that stands again is an alias."""
-WIDTH = 160
+WIDTH = 200
 """Characters after which a line is broken: such a part with its key and indent."""
 
 
