@@ -10,7 +10,7 @@ from omninav.stages.metrics.collect_drive import CollectDrive
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
@@ -42,7 +42,7 @@ def collected(
     truth: list[Pose | None],
     motion: list[Motion | None] | None = None,
     estimates: list[PoseEstimate | None] | None = None,
-    tallies: list[DriveTally | None] | None = None,
+    tallies: list[EpisodeStatistics | None] | None = None,
     matches: list[BestMatch | None] | None = None,
     confidences: list[PoseConfidence | None] | None = None,
     evidence: list[ImageEvidence | None] | None = None,

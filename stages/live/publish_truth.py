@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.stages.plots.pose_messages import header, ros_pose
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Pose
 
 from .transport import TransportName, connect
@@ -25,7 +25,7 @@ class PublishTruth(Stage):
         """Join the domain."""
         self._transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
 
-    def step(self, ctx: Context, tick: Tick, truth: Pose, tally: DriveTally) -> None:
+    def step(self, ctx: Context, tick: Tick, truth: Pose, tally: EpisodeStatistics) -> None:
         """One tick; it has the stamp that the driver gave it."""
         fields = {"header": header(tick.stamp), "pose": ros_pose(np.array([truth.x, truth.y, truth.heading]))}
         pose = "geometry_msgs/msg/PoseStamped"

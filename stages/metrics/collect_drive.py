@@ -10,7 +10,7 @@ from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
 from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
@@ -31,7 +31,7 @@ class CollectDrive(Stage):
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
         estimates: Sequence[PoseEstimate | None] | None = None,
-        tallies: Sequence[DriveTally | None] | None = None,
+        tallies: Sequence[EpisodeStatistics | None] | None = None,
         matches: Sequence[BestMatch | None] | None = None,
         confidences: Sequence[PoseConfidence | None] | None = None,
         evidence: Sequence[ImageEvidence | None] | None = None,

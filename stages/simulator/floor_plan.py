@@ -11,7 +11,7 @@ from omninav.stages.values.floor_plan import FloorPlan
 from .config import WorldConfig
 
 
-class WorldPlan(Stage):
+class FloorPlanOfWorld(Stage):
     """Gives the floor plan of a simulated world on a day, for plots."""
 
     world: WorldConfig | None = None
@@ -29,7 +29,7 @@ class WorldPlan(Stage):
         return self.Out(plan=None if self.world is None else plan_of(self.world, self.day))
 
 
-class DrivenPlan(Stage):
+class FloorPlanOfLog(Stage):
     """Gives the floor plan of recorded logs, for plots: the grid beside the first log that has one.
 
     Beside `drive.mcap` that is `drive.grid/map.yaml`, as `omninav simulate` writes it, or else `map.yaml`, in the

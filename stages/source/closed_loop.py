@@ -25,7 +25,7 @@ from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.command import Command
 from omninav.stages.values.commands import GoalPoint
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Image
 from omninav.stages.values.planned_route import PlannedRoute
@@ -106,7 +106,7 @@ class ClosedLoop(Source):
         scan: Scan
         goal: GoalPoint | None = None
         truth: Pose
-        tally: DriveTally
+        tally: EpisodeStatistics
 
     def setup(self, ctx: Context) -> None:
         """Build the world; the bodies in it are looked up by place."""
@@ -191,7 +191,7 @@ class ClosedLoop(Source):
             scan=scan_value(self.world, metres),
             goal=goal,
             truth=_pose(pose),
-            tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
+            tally=EpisodeStatistics(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
         )
 
     def _look(self, ctx: Context, robot: F64, now: float, people: tuple[Person, ...]) -> Image | None:

@@ -12,7 +12,7 @@ from omninav.stages.live.robot_driver import CameraStop, ClockJump, RobotDriver,
 from omninav.stages.live.transport import Arrival, TransportError
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.values.command import Command
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
@@ -133,7 +133,7 @@ def test_a_topic_whose_type_is_not_installed_is_left_out(wire, monkeypatch):
 def test_truth_and_collisions_have_the_stamps_of_the_driver(wire):
     stage = publish_truth.PublishTruth()
     stage.setup(Context("truth"))
-    stage.step(Context("truth"), Tick(0, 7_000_000_001), Pose(1.0, 2.0, 0.5), DriveTally(3, 10.0))
+    stage.step(Context("truth"), Tick(0, 7_000_000_001), Pose(1.0, 2.0, 0.5), EpisodeStatistics(3, 10.0))
     assert stamp_of(wire.on("/ground_truth/pose")[0]) == 7_000_000_001
     assert wire.on("/collisions")[0].data == 3
 

@@ -12,7 +12,7 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.live.publish_truth import PublishTruth
 from omninav.stages.live.transport import TransportError, connect, disconnect
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Pose
 
 from .conftest import WAIT_S, decode, encode, until
@@ -80,7 +80,7 @@ def test_the_simulated_robot_speaks_it(router: zenoh.Session):
     listener = router.declare_subscriber("5/ground_truth/pose/**", heard.append)
     ctx, truth = Context("truth"), PublishTruth(transport="zenoh", domain=5)
     truth.setup(ctx)
-    until(lambda: truth.step(ctx, Tick(0, 7), Pose(1.0, 2.0, 0.5), DriveTally(0, 0.0)) and heard)
+    until(lambda: truth.step(ctx, Tick(0, 7), Pose(1.0, 2.0, 0.5), EpisodeStatistics(0, 0.0)) and heard)
     assert decode(POSE, heard[0].payload.to_bytes()).pose.position.y == 2.0
     listener.undeclare()
 

@@ -6,7 +6,7 @@ from omninav.pipeline import Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.values.belief import PoseEstimate, SinglePose
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
 
@@ -23,7 +23,7 @@ def test_every_tick_has_its_row():
 
 def test_contacts_and_metres_of_a_simulated_robot_are_kept():
     ticks = [Tick(0, 0), Tick(1, 10**9)]
-    drive = collected(ticks, [None, None], tallies=[DriveTally(0, 0.0), DriveTally(2, 0.5)])
+    drive = collected(ticks, [None, None], tallies=[EpisodeStatistics(0, 0.0), EpisodeStatistics(2, 0.5)])
     assert drive.collisions.tolist() == [0, 2]
     assert drive.distance.tolist() == [0.0, 0.5]
 
@@ -47,7 +47,7 @@ def test_every_column_holds_what_the_tick_brought():
         [Pose(-1.0, -2.0, -0.3)],
         [Motion(0.1, 0.2, 0.3)],
         [estimate],
-        [DriveTally(6, 8.5)],
+        [EpisodeStatistics(6, 8.5)],
         [match],
         [PoseConfidence(0.25, "lost")],
     )

@@ -3,7 +3,7 @@ from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.drive_summary import DriveSummary
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Motion
 
 
@@ -12,13 +12,19 @@ def summary(drive):
 
 
 def test_a_simulated_robot_is_measured_by_its_tally():
-    drive = collected([Tick(0, 0), Tick(1, 10**9)], [None, None], tallies=[DriveTally(0, 0.0), DriveTally(2, 0.5)])
+    drive = collected(
+        [Tick(0, 0), Tick(1, 10**9)], [None, None], tallies=[EpisodeStatistics(0, 0.0), EpisodeStatistics(2, 0.5)]
+    )
     assert summary(drive) == {"collisions": 2, "distance_m": 0.5, "duration_s": 1.0}
 
 
 def test_the_last_tally_counts_and_the_last_tick_ends_the_drive():
     ticks = [Tick(k, 10**9 * (2 + 3 * k)) for k in range(4)]
-    drive = collected(ticks, [None] * 4, tallies=[DriveTally(0, 0.5), DriveTally(1, 1.0), DriveTally(3, 1.5), None])
+    drive = collected(
+        ticks,
+        [None] * 4,
+        tallies=[EpisodeStatistics(0, 0.5), EpisodeStatistics(1, 1.0), EpisodeStatistics(3, 1.5), None],
+    )
     assert summary(drive) == {"collisions": 3, "distance_m": 1.5, "duration_s": 9.0}
     assert summary(collected([], [])) == {"duration_s": 0.0, "distance_m": 0.0}
 

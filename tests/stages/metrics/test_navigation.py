@@ -11,7 +11,7 @@ from small_run import collected
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, lost_metres, shortest_metres
 from omninav.stages.values.commands import GoalPoint
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
@@ -29,7 +29,7 @@ def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
     counts, metres = (np.broadcast_to(each, len(spots)).tolist() for each in (collisions, driven))
-    tallies = [DriveTally(*each) for each in zip(counts, metres, strict=True)]
+    tallies = [EpisodeStatistics(*each) for each in zip(counts, metres, strict=True)]
     drive = collected(ticks, truth, tallies=tallies if tallied else None)
     metrics = Navigation().step(Context("navigation"), drive, ways, map).metrics
     return metrics.values["navigation"]
@@ -123,7 +123,7 @@ def test_the_last_route_that_was_planned_counts_and_it_is_the_third():
 
 def test_of_a_tally_that_ends_early_the_last_entry_counts():
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(4)]
-    tallies = [DriveTally(0, 0.5), DriveTally(0, 1.5), DriveTally(1, 2.5), None]
+    tallies = [EpisodeStatistics(0, 0.5), EpisodeStatistics(0, 1.5), EpisodeStatistics(1, 2.5), None]
     drive = collected(ticks, [Pose(0.0, 0.0, 0.0)] * 4, tallies=tallies)
     way = PlannedRoute(PLACES, "under way", 0)
     found = Navigation().step(Context("navigation"), drive, [way] * 4, CORNER).metrics.values["navigation"]

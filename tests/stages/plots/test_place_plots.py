@@ -13,7 +13,7 @@ from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap, planned_
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.commands import GoalPoint
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
@@ -36,7 +36,7 @@ def green(figure) -> int:
 
 
 def drawn(contact=99, **rest):
-    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [DriveTally(int(k >= contact), 0.15 * k) for k in range(20)]
+    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [EpisodeStatistics(int(k >= contact), 0.15 * k) for k in range(20)]
     return TrajectoryOverMap().step(CTX, collected(TICKS, TRUTH, motion, tallies=tallies), plan=PLAN, **rest).figure
 
 

@@ -13,7 +13,7 @@ from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 from omninav.stages.simulator.world_grid import WorldGrid
-from omninav.stages.source.grid import PlaceGrid, along_path, free_space
+from omninav.stages.source.occupancy_grid_loader import OccupancyGridLoader, along_path, free_space
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -109,30 +109,30 @@ def test_values_without_bounds_are_refused_by_name(tmp_path, key, value, said):
     text = "".join(f"{key}: {value}\n" if line.startswith(f"{key}:") else f"{line}\n" for line in YAML.splitlines())
     file = written(tmp_path, [[254]], text)
     with pytest.raises(BadInput, match=said) as raised:
-        PlaceGrid(grid=str(file), log="drive.mcap").inputs_digest()
+        OccupancyGridLoader(grid=str(file), log="drive.mcap").inputs_digest()
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 900
 
 
 def test_a_grid_that_leaves_no_room_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(BadInput, match=r"no cell is free and 0\.2 m from obstacles"):
-        PlaceGrid(grid=str(written(tmp_path, [[0, 0]]))).inputs_digest()
+        OccupancyGridLoader(grid=str(written(tmp_path, [[0, 0]]))).inputs_digest()
 
 
 def test_another_image_is_another_grid(tmp_path):
     file = written(tmp_path, [[254, 254]])
-    first = PlaceGrid(grid=str(file), clearance_m=0.0).inputs_digest()
+    first = OccupancyGridLoader(grid=str(file), clearance_m=0.0).inputs_digest()
     written(tmp_path, [[254, 0]])
-    assert PlaceGrid(grid=str(file), clearance_m=0.0).inputs_digest() != first
+    assert OccupancyGridLoader(grid=str(file), clearance_m=0.0).inputs_digest() != first
 
 
 def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path):
     file = written(tmp_path, [[254] * 8] * 6)
-    stage = PlaceGrid(grid=str(tmp_path), log="drive.mcap", resolution_m=1.0, clearance_m=0.0)
+    stage = OccupancyGridLoader(grid=str(tmp_path), log="drive.mcap", resolution_m=1.0, clearance_m=0.0)
     out = stage.step(CTX)
     assert out.grid.cells.shape == (3, 4)
     assert len(out.free.centres) == 12
-    assert stage.inputs_digest() == PlaceGrid(grid=str(file)).inputs_digest()
+    assert stage.inputs_digest() == OccupancyGridLoader(grid=str(file)).inputs_digest()
 
 
 def test_free_space_keeps_clear_of_obstacles_and_is_what_is_connected_to_the_references():
@@ -163,13 +163,13 @@ def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
 
 def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path):
     known = WorldGrid(world=DEMO, resolution_m=0.1).step(CTX).grid
-    out = PlaceGrid(resolution_m=0.1).step(CTX, known)
+    out = OccupancyGridLoader(resolution_m=0.1).step(CTX, known)
     read = read_occupancy(write_grid(World(DEMO, 0), tmp_path, 0.1))
     assert out.grid.made_from == "world"
     np.testing.assert_array_equal(out.grid.cells, read.cells)
-    assert PlaceGrid().inputs_digest() is None
+    assert OccupancyGridLoader().inputs_digest() is None
     with pytest.raises(BadInput, match=r"grid: none is named; give grid=FOLDER/map.yaml"):
-        PlaceGrid().step(CTX)
+        OccupancyGridLoader().step(CTX)
 
 
 def test_a_world_gives_no_grid_of_a_log_or_beside_one_that_is_named():
@@ -179,22 +179,22 @@ def test_a_world_gives_no_grid_of_a_log_or_beside_one_that_is_named():
 
 def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
     with pytest.raises(BadInput, match=r"grid=FOLDER/map.yaml .* grid=from_tour") as raised:
-        PlaceGrid(log=str(tmp_path / "drive.mcap")).inputs_digest()
+        OccupancyGridLoader(log=str(tmp_path / "drive.mcap")).inputs_digest()
     assert "\n" not in str(raised.value)
     written(tmp_path / "tour.grid", [[0]])
     (tmp_path / "tour.mcap").touch()
     with pytest.raises(BadInput, match=f"grid={tmp_path}/tour.grid/map.yaml"):
-        PlaceGrid(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
+        OccupancyGridLoader(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
 
 
 def test_a_grid_that_is_not_there_is_named(tmp_path):
     with pytest.raises(BadInput, match=r"none.yaml is no file"):
-        PlaceGrid(grid=str(tmp_path / "none.yaml")).inputs_digest()
+        OccupancyGridLoader(grid=str(tmp_path / "none.yaml")).inputs_digest()
 
 
 def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
     ctx = Context("grid")
-    stage = PlaceGrid(grid="from_tour", log="drive.mcap", resolution_m=0.1)
+    stage = OccupancyGridLoader(grid="from_tour", log="drive.mcap", resolution_m=0.1)
     out = stage.step(ctx, None, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
     assert out.grid.made_from == "tour"
     assert ctx.counts["grid_is_a_stand_in"] == 1
@@ -215,13 +215,13 @@ def test_a_stand_in_without_edges_is_free_around_the_references_alone():
 
 def test_a_stand_in_without_a_map_is_refused():
     with pytest.raises(BadInput, match="from_tour needs a map"):
-        PlaceGrid(grid="from_tour").step(CTX)
+        OccupancyGridLoader(grid="from_tour").step(CTX)
 
 
 def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path):
     ctx = Context("grid")
     written(tmp_path, [[254] * 4] * 4)
-    out = PlaceGrid(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, map=a_map((50.0, 50.0)))
+    out = OccupancyGridLoader(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, map=a_map((50.0, 50.0)))
     assert len(out.free.centres) == 16
     assert ctx.counts["references_off_the_free_space"] == 1
 

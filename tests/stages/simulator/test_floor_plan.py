@@ -7,7 +7,7 @@ from world_files import DEMO
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import boxes, read_grid
-from omninav.stages.simulator.floor_plan import DrivenPlan, WorldPlan
+from omninav.stages.simulator.floor_plan import FloorPlanOfLog, FloorPlanOfWorld
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 
@@ -40,19 +40,19 @@ def test_boxes_cover_what_is_occupied_and_nothing_else():
 def test_the_grid_beside_a_log_is_its_plan(tmp_path):
     log = tmp_path / "drive.mcap"
     log.touch()
-    assert DrivenPlan(log=str(log)).step(CTX).plan is None
-    assert DrivenPlan(log=str(log)).inputs_digest() is None
+    assert FloorPlanOfLog(log=str(log)).step(CTX).plan is None
+    assert FloorPlanOfLog(log=str(log)).inputs_digest() is None
     grid(tmp_path, [[0]])
-    assert len(DrivenPlan(log=(str(tmp_path / "other"), str(log))).step(CTX).plan.outlines) == 1
+    assert len(FloorPlanOfLog(log=(str(tmp_path / "other"), str(log))).step(CTX).plan.outlines) == 1
     write_grid(World(DEMO, 1), tmp_path / "drive.grid")
-    stage = DrivenPlan(log=str(log))
+    stage = FloorPlanOfLog(log=str(log))
     assert len(stage.step(CTX).plan.outlines) > 5  # its own grid comes before the folder's
     assert stage.inputs_digest() is not None
 
 
 def test_without_a_log_the_plan_is_the_worlds():
-    plan = DrivenPlan(world=DEMO, day=(1, 2)).step(CTX).plan
-    np.testing.assert_array_equal(plan.outlines, WorldPlan(world=DEMO).step(CTX).plan.outlines)
+    plan = FloorPlanOfLog(world=DEMO, day=(1, 2)).step(CTX).plan
+    np.testing.assert_array_equal(plan.outlines, FloorPlanOfWorld(world=DEMO).step(CTX).plan.outlines)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Value
 
 
-class DriveTally(Value):
+class EpisodeStatistics(Value):
     """Contacts of a simulated robot with something so far, and the distance it drove (m): truth."""
 
     is_truth = True

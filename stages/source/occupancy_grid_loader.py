@@ -25,7 +25,7 @@ PATH_HALF_WIDTH = 2.0
 """Distance from the path up to which a stand-in is free, in length scales of the appearance."""
 
 
-class PlaceGrid(Stage):
+class OccupancyGridLoader(Stage):
     """Gives the occupancy grid of a place, and the free space that a robot reaches.
 
     Free space is what keeps clear of anything occupied and, with `map` wired, is connected to its references; that of a
