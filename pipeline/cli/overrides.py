@@ -223,7 +223,9 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
         return
     value = str(word.input_line).partition("=")[2]
     parents, name, inside = _deepest(config, path)
-    gone = next((each for each in replaced() if path == each or path.startswith(f"{each}.")), None)
+    gone = next(
+        (each for each in replaced() if path == each or (not word.is_add() and path.startswith(f"{each}."))), None
+    )
     if gone is not None:
         yield Problem(gone, "this setting is gone", replaced()[gone])
         return

@@ -66,7 +66,7 @@ class Reckoned(Protocol):
 def dead_reckon(
     compass: VisualCompass, speed: float, position: Reckoned, image: Image, camera: Camera, seconds: float | None
 ) -> AssumedMotion | None:
-    """The guessed motion to an image, with which `position` goes on; None at the first image of a log.
+    """The assumed motion to an image, by which `position` goes on; None at the first image of a log.
 
     `speed`: m/s. `seconds`: since the image before; None: there is none.
     """

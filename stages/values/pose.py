@@ -61,7 +61,7 @@ class UncertainMotion(Value):
 
 
 class AssumedPose(Pose):
-    """A pose that guessed motions led to, in a frame of its own."""
+    """A pose by dead reckoning from assumed motions, in a frame of its own."""
 
 
 PoseSource = Literal["truth", "odometry", "guess", "estimate"]
