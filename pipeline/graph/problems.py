@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-MAX_LISTED = 15
+MAX_LISTED = 20
 """Names that are listed behind the one that was probably meant."""
 
 
