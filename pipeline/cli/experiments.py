@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
+from omninav.pipeline.experiment.best import best_condition
+from omninav.pipeline.experiment.conditions import results_by_condition
 from omninav.pipeline.experiment.pages import Judged
 from omninav.pipeline.experiment.result import ExperimentResult, read_result, result_files
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
 from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
-from omninav.pipeline.experiment.verdicts import MIN_SCENARIOS, Verdict, in_words
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.experiment.verdicts import Verdict, in_words
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, counted
 
 from .composition import complete, read_words
 from .composition_cache import compose
@@ -28,6 +30,10 @@ if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
 
+MORE_WORLDS = "undecided"
+"""The profile that adds worlds for claims which the others leave undecided."""
+
+
 def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Run every condition and repetition of an experiment's file, and write its page. 1 where a job failed."""
     run = planned_experiment(config, arguments)
@@ -35,9 +41,14 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     verdicts = run.verdicts()
     if verdicts:
         show(verdict_table(run.experiment, verdicts))
-        few = (case.scenarios < MIN_SCENARIOS for v in verdicts.values() if v.holds is None for case in v.cases)
-        if any(few):
-            print(f"undecided: a verdict needs {MIN_SCENARIOS} scenarios")
+        left_open = [case for verdict in verdicts.values() if verdict.holds is None for case in verdict.cases]
+        if any(case.scenarios == 1 for case in left_open):
+            print("undecided: one scenario says nothing of the next; a verdict needs several")
+        if left_open and run.profile == FULL and MORE_WORLDS in run.experiment.profiles:
+            print(f"undecided: profile={MORE_WORLDS} judges by twelve more worlds as well, once")
+    best = best_condition(run.experiment, results_by_condition(run.conditions, bool(run.experiment.development)))
+    if best is not None:
+        print(f"best over {counted(len(run.experiment.development) or 1, 'scenario')}: {best[0].name}: {best[1]}")
     print(f"page: {shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
     return 0 if well else 1
 

@@ -3,7 +3,7 @@
 import json
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from omninav.pipeline.run.artifact_specification import without_plotted
 from omninav.pipeline.run.plan import Plan, plan
 
 from .repetition import artifact_key, condition_key, finished, known_digests
-from .specification import DEVELOPMENT, Condition, Experiment
+from .specification import Condition, Experiment
 from .verdicts import Results, key_of
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
@@ -40,6 +40,8 @@ class ConditionRun:
     """The hash of everything but the seed that decides the results."""
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
     """Results by seed."""
+    development: bool = False
+    """Whether its scenario is one of those on which choices were made."""
     error: str = ""
 
     @property
@@ -72,8 +74,15 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
             seeds=tuple(range(index * number, (index + 1) * number)),  # draws of stages differ, too
         )
         for condition in experiment.conditions()
-        for index, (scenario, own) in enumerate(experiment.all_scenarios.items())
+        for index, scenario, own in _numbered(experiment)
     ]
+
+
+def _numbered(experiment: Experiment) -> Iterator[tuple[int, str, str]]:
+    """Number, label and overrides of each scenario; those of development are numbered by themselves."""
+    beside = list(experiment.development)
+    for index, (scenario, own) in enumerate(experiment.all_scenarios.items()):
+        yield beside.index(scenario) if scenario in beside else index, scenario, own
 
 
 def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[list[ConditionRun]]:
@@ -117,7 +126,9 @@ def _run(
     words = " ".join(part for part in (condition.name, scenario, variant) if part)
     place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", words).strip("_")
     shared = experiment.shared and not variant
-    return ConditionRun(condition, scenario, variant or experiment.variant, typed, place, seeds, shared)
+    run = ConditionRun(condition, scenario, variant or experiment.variant, typed, place, seeds, shared)
+    run.development = scenario in experiment.development
+    return run
 
 
 def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose) -> None:
@@ -183,10 +194,10 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
 
 
 def results_by_condition(runs: Sequence[ConditionRun], development: bool = False) -> Results:
-    """What has run, by condition, and by scenario and seed: in the scenarios that count, or in that of development."""
+    """What has run, by condition, and by scenario and seed: in the scenarios that count, or in those of development."""
     found: dict[tuple[tuple[str, str], ...], dict[tuple[str, int], dict[str, Any]]] = {}
     for run in runs:
-        if (run.scenario == DEVELOPMENT) is development:
+        if run.development is development:
             of_condition = found.setdefault(key_of(run.condition.labels), {})
             of_condition |= {(run.scenario, seed): result for seed, result in run.results.items()}
     return found

@@ -1,4 +1,4 @@
-"""Bootstrap intervals of means over a hierarchy: scenarios are drawn first, then repetitions in each of them."""
+"""Intervals of means over a hierarchy, scenarios first and then repetitions in each of them, and of shares of runs."""
 
 from collections.abc import Sequence
 
@@ -9,13 +9,17 @@ Array = npt.NDArray[np.float64]
 
 RESAMPLES = 4999
 CONFIDENCE = 0.95
+MIN_GROUPS = 6
+"""Groups from which on they are resampled: of fewer no resample lies outside the figures, which enclose the mean less
+often than 95 % of the times (of five, 94 %; of two, half)."""
 
 
 def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = None) -> tuple[float, float]:
     """95 % interval of the mean over all figures, by resampling groups and then the figures in each (always the same).
 
     `groups`: the figures (n_g,) of each scenario. With `over`, figures of the same shapes: that of the ratio of the two
-    means, resampled in pairs. Equal figures, or a single one, give an interval of no width.
+    means, resampled in pairs. Equal figures, or a single one, give an interval of no width. Of two to five scenarios it
+    is Student's t of their means.
 
     The two-stage bootstrap of hierarchical data (Davison & Hinkley, Bootstrap Methods and their Application, 1997). Its
     percentiles are expanded (Hesterberg, What Teachers Should Know About the Bootstrap, 2015), because those of a plain
@@ -27,6 +31,8 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
         mean = float(whole[0][0]) if over is None else float(_ratios(whole[0], whole[1])[0])
         return mean, mean
     counts = [len(group) for group in columns[0]]
+    if over is None and 1 < len(counts) < MIN_GROUPS:
+        return student_interval([float(group.mean()) for group in columns[0]])
     drawn, there = _draws(counts)
     sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
     figures = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
@@ -37,6 +43,23 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
     else:  # between infinite figures there is nothing
         low, high = np.quantile(figures, shares, method="nearest")
     return float(low), float(high)
+
+
+def share_interval(met: int, of: int) -> tuple[float, float]:
+    """95 % interval (Wilson's) of the share of runs of which `met` of `of` did something."""
+    from scipy.stats import binomtest  # type: ignore[attr-defined]
+
+    interval = binomtest(met, of).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def student_interval(means: Sequence[float]) -> tuple[float, float]:
+    """95 % interval of the mean of a few independent figures."""
+    from scipy.stats import t  # type: ignore[attr-defined]
+
+    half = float(t.ppf((1.0 + CONFIDENCE) / 2.0, len(means) - 1)) * float(np.std(means, ddof=1)) / len(means) ** 0.5
+    middle = float(np.mean(means))
+    return middle - half, middle + half
 
 
 def _ratios(of: Array, over: Array) -> Array:

@@ -2,6 +2,7 @@
 
 import base64
 import math
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,10 +16,11 @@ from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.report.rendering import render
 
 from .conditions import ConditionRun
+from .intervals import share_interval
 from .plots import PagePlot, plots_of
 from .result import SUFFIX, Cell, ConditionRow, ExperimentResult, figures_of, result_text, rows_of
-from .specification import DEVELOPMENT, Claim, Experiment, Measure, figure_of
-from .verdicts import MIN_SCENARIOS, Case, Results, Verdict, in_words
+from .specification import Claim, Experiment, Measure, figure_of
+from .verdicts import RUNS_SHARE, Case, Results, Verdict, in_words
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """The CSS class of a verdict."""
@@ -99,7 +101,9 @@ def _repeated(experiment: Experiment) -> str:
     runs, seeds, scenarios = experiment.runs_of_a_condition, experiment.repetitions, experiment.scenarios
     named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
     several = f", {seeds} in each of {len(scenarios)} scenarios ({', '.join(scenarios)})" if scenarios else ""
-    return f"{runs} repetitions of each condition with {named}{several}"
+    beside = experiment.development
+    chosen_on = f", and in each of {len(beside)} of development ({', '.join(beside)})" if beside else ""
+    return f"{runs} repetitions of each condition with {named}{several}{chosen_on}"
 
 
 def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]) -> dict[str, Any]:
@@ -113,8 +117,8 @@ def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[Pa
         "context_columns": list(dict.fromkeys(name for row in result.conditions for name in row.context)),
         "styles": STYLES,
         "tiles": _tiles(experiment, result, list(verdicts.values())),
-        "repetitions": experiment.runs_of_a_condition,
-        "min_scenarios": MIN_SCENARIOS,
+        "repetitions": result.repeated.partition(" ")[0],
+        "repeated": re.sub(r"\bworld (?=\d)", "draw ", result.repeated),  # as scenarios were called until 2026-11-26
         "plots": plots,
     }
 
@@ -157,7 +161,8 @@ def _verdict(experiment: Experiment, claim: Claim, verdict: Verdict) -> dict[str
     said = " ".join(part for part in (claim.paper, claim.where and f"({claim.where})") if part)
     return {
         "claim": claim.statement,
-        "paper": f"{said}: “{claim.quote}”" if said and claim.quote else said or claim.quote,
+        "paper": (f"{said}: “{claim.quote}”" if said and claim.quote else said or claim.quote)
+        + (f" Struck: {claim.struck}." if claim.struck else ""),
         "measure": measure.title,
         "holds": in_words(verdict.holds),
         "rows": [_case(case, measure) for case in verdict.cases],
@@ -167,6 +172,9 @@ def _verdict(experiment: Experiment, claim: Claim, verdict: Verdict) -> dict[str
 def _case(case: Case, measure: Measure) -> dict[str, str]:
     digits = max(2, measure.digits) if case.ratio else measure.digits
     difference = interval = ""
+    if case.kept is not None:
+        share = ", ".join(f"{end:.2f}" for end in share_interval(case.kept, case.repetitions))
+        difference, interval = f"{case.kept} of {case.repetitions} runs", f"[{share}], {RUNS_SHARE:g} asked"
     if case.difference is not None and case.interval is not None:
         low, high = (f"{end:+.{digits}f}" for end in case.interval)
         difference, interval = f"{case.difference:+.{digits}f}", f"[{low}, {high}]"
@@ -211,7 +219,7 @@ def reference_text(content: PageContent, index: int) -> str:
     parts = []
     for label in content.experiment.labels(reference.over):
         runs = [run for run in content.references[index] if run.condition.labels[reference.over] == label]
-        counted = [run for run in runs if run.scenario != DEVELOPMENT]
+        counted = [run for run in runs if not run.development]
         found = [figure_of(measure, result) for run in counted for result in run.results.values()]
         known = [figure for figure in found if figure is not None]
         parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")

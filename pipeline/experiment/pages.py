@@ -1,7 +1,9 @@
 """Pages of many experiments from their result files: one each, an index, and the list of the papers' claims."""
 
+import re
 from collections.abc import Iterator, Sequence
 
+from .intervals import CONFIDENCE
 from .page import markdown_page, number
 from .result import ExperimentResult
 from .specification import Claim, Experiment
@@ -9,6 +11,8 @@ from .verdicts import Verdict, headline, in_words
 
 INDEX, CLAIMS = "results.md", "claims.md"
 """Files with the index and with the papers' claims."""
+TAIL = (1.0 - CONFIDENCE) / 2.0
+"""Share of 95 % intervals that lie wholly above what they are of, and as many below."""
 Judged = Sequence[tuple[Experiment, ExperimentResult]]
 """Experiments, each with its result."""
 
@@ -33,15 +37,23 @@ def index_page(judged: Judged) -> str:
             for held in (False, None)
         ]
         link = f"[{experiment.title}]({experiment.name}.md)"
-        scenarios = str(max((case.scenarios for each in verdicts.values() for case in each.cases), default=0))
+        scenarios = scenarios_of(result)
         rows.append((link, f"`{result.command}`", scenarios, f"**{headline(verdicts.values())}**", *titles))
     head = ("page", "command", "scenarios", "verdict", "does not hold", "undecided")
     return f"# All experiments\n\n{_table(head, rows)}"
 
 
+def scenarios_of(result: ExperimentResult) -> str:
+    """The scenarios that a result is of: `draw 1 to draw 6`."""
+    named = re.search(r"scenarios \(([^)]*)\)", result.repeated)
+    labels = re.sub(r"\bworld (?=\d)", "draw ", named[1]).split(", ") if named else []  # so called until 2026-11-26
+    in_a_row = len(labels) > 2 and all(label.startswith("draw ") for label in labels)
+    return f"{labels[0]} to {labels[-1].removeprefix('draw ')}" if in_a_row else ", ".join(labels)
+
+
 def claims_page(judged: Judged) -> str:
     """The papers' claims, paper by paper: each with its place, the experiment that judges it, verdict and figure."""
-    blocks = ["# What the papers claim, and what we find"]
+    blocks = ["# What the papers claim, and what we find", by_chance(judged)]
     for source in sources(judged):
         rows = [
             (
@@ -54,7 +66,7 @@ def claims_page(judged: Judged) -> str:
             for experiment, claim, verdict in claims_of(judged, source)
         ]
         table = _table(("claim", "where", "experiment", "verdict", "ours"), rows)
-        blocks += [f"## {source}", counts(judged, source), table]
+        blocks += [f"## {source}", counts(judged, source), table, *struck(judged, source)]
     return "\n\n".join(blocks)
 
 
@@ -64,12 +76,24 @@ def sources(judged: Judged) -> list[str]:
 
 
 def claims_of(judged: Judged, source: str) -> Iterator[tuple[Experiment, Claim, Verdict]]:
-    """A paper's claims with the verdicts on them; those that only we expect are left out."""
+    """A paper's claims with the verdicts on them; those that only we expect, or that are struck, are left out."""
     for experiment, result in judged:
         for key, verdict in result.judged(experiment).items():
             claim = experiment.claims[key]
-            if experiment.source == source and claim.where:
+            if experiment.source == source and claim.where and not claim.struck:
                 yield experiment, claim, verdict
+
+
+def struck(judged: Judged, source: str) -> list[str]:
+    """A sentence and a list: a paper's claims that do not count, with the reasons; nothing where there are none."""
+    lines = [
+        f"* {claim.paper} ([{experiment.title}]({experiment.name}.md)): {claim.struck}"
+        for experiment, _ in judged
+        if experiment.source == source
+        for claim in experiment.claims.values()
+        if claim.struck
+    ]
+    return ["Struck, and judged on their pages alone:", "\n".join(lines)] if lines else []
 
 
 def counts(judged: Judged, source: str) -> str:
@@ -77,6 +101,15 @@ def counts(judged: Judged, source: str) -> str:
     held = [verdict.holds for *_, verdict in claims_of(judged, source)]
     holding, failing, undecided = (held.count(each) for each in (True, False, None))
     return f"Of {len(held)} claims of this paper {holding} hold, {failing} do not, and {undecided} are undecided."
+
+
+def by_chance(judged: Judged) -> str:
+    """A sentence: how many verdicts on the papers' claims chance would give."""
+    number = sum(1 for source in sources(judged) for _ in claims_of(judged, source))
+    return (
+        f"Each of the {number} verdicts is on a 95 % interval. Were no figure different from what it is compared with, "
+        f"chance would give some {number * TAIL:.0f} that hold and {number * TAIL:.0f} that do not."
+    )
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

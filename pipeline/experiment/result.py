@@ -41,7 +41,7 @@ class Cell:
     ran: int = 0
     """Repetitions that have run."""
     development: float | None = None
-    """The figure in the scenario of development."""
+    """The figure in the scenarios of development: their mean, or that of the worst."""
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,20 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown, sugge
 
 from .series import Aggregate, figure_at
 
-DEVELOPMENT = "development"
-"""The scenario that is run and shown, and never judged: choices were made on it."""
 TYPED = ("common", "set", "scenarios", "development", "sweep")
 """Entries of a file that are overrides, or labels of overrides."""
 NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 """Pattern of an experiment's name: its pages and its folder are named after it."""
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
+MARGINS = {"cm": 5.0, "m": 0.05, "degrees": 2.0, "%": 1.0}
+"""Largest difference that does not matter to a robot, by the unit in which a measure's title ends.
+
+Five centimetres and two degrees are about the noise of a good drive along a taught path, and far below what a robot of
+0.5 m that passes doors of 1 m must know; 1 % of the steps is one image in a hundred.
+"""
+MARGIN_SHARE = 0.05
+"""The same of times, counts and sizes: a share of the other side."""
 Labels = dict[str, str]
 """A condition's label in each factor, or in some of them: `{filter: median, data: first}`."""
 
@@ -49,7 +55,17 @@ class Measure:
     pooled: bool = False
     """Whether the figure is the standard deviation over all frames of all repetitions."""
     over_runs: Literal["mean", "largest", "smallest"] = "mean"
-    """Which figure of the repetitions' is judged: with `largest`, that of the worst of them."""
+    """Which figure of the repetitions' is shown: with `largest`, that of the worst of them. Claims about a worst figure
+    count the runs that keep to the limit."""
+    margin: float | None = None
+    """Largest difference that does not matter, in the measure's unit; None: that of `MARGINS`."""
+
+    def margin_beside(self, other: float) -> float:
+        """The largest difference to a figure that does not matter."""
+        unit = self.title.rstrip(")").rpartition("(")[2].split()[-1:] if self.title.endswith(")") else []
+        known = MARGINS.get(unit[0]) if unit else None
+        margin = known if self.margin is None else self.margin
+        return MARGIN_SHARE * abs(other) if margin is None else margin
 
 
 Other = float | str | Mapping[str, Any]
@@ -61,7 +77,7 @@ class Claim:
     """Something the paper states (or that we expect), as a comparison that comes out true or false.
 
     It has one case for each condition with the labels of `of`, and makes one comparison, by the whole 95 % interval:
-    `at_most`, `at_least`, `below`, `above`, or `not_above` (better, or worse by less than `MARGIN` of the other side);
+    `at_most`, `at_least`, `below`, `above`, or `not_above` (better, or worse by no more than the measure's margin);
     with all other conditions `lowest`. It is false where the whole interval lies on the other side, else undecided.
     """
 
@@ -88,6 +104,8 @@ class Claim:
     """Place in the paper: section, figure, table, equation. With it the claim is listed among those of `source`."""
     quote: str = ""
     """The paper's own words, where they say more."""
+    struck: str = ""
+    """Reason for which it does not count among the paper's claims; it is judged and shown all the same."""
 
 
 @dataclass(frozen=True)
@@ -160,10 +178,11 @@ class Experiment:
     repetitions: int = 50
     """Each condition is run with this many seeds in each scenario, 0, 1, 2, … in the order of the scenarios."""
     scenarios: Mapping[str, str] = field(default_factory=dict)
-    """Label -> overrides: other data. Each condition is run in each of them, with seeds of its own. A claim is
-    decided by six or more, which intervals resample first."""
-    development: str = ""
-    """Overrides of one more scenario, on which choices were made: it stands beside the others and is never judged."""
+    """Label -> overrides: other data. Each condition is run in each of them, with seeds of its own. Intervals
+    resample them first."""
+    development: Mapping[str, str] = field(default_factory=dict)
+    """Label -> overrides of scenarios on which choices were made: their mean stands beside the others and is never
+    judged. Their seeds are 0, 1, 2, … too."""
     without: tuple[Mapping[str, Any], ...] = ()
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
@@ -175,6 +194,9 @@ class Experiment:
     curves: tuple[Curve, ...] = ()
     reference_runs: tuple[ReferenceRun, ...] = ()
     notes: tuple[str, ...] = ()
+    best: tuple[str, ...] = ()
+    """Measures by which the best condition over the scenarios of development is named: that with the least figure of
+    the first, among equals of the next."""
     shared: bool = True
     """Whether the repetitions of a condition share what does not depend on the seed (not where time is measured)."""
     cores: int | None = None
@@ -201,9 +223,8 @@ class Experiment:
 
     @property
     def all_scenarios(self) -> dict[str, str]:
-        """Scenarios, with the one of development last; a nameless one where there are none."""
-        beside = {DEVELOPMENT: self.development} if self.development else {}
-        return {**(self.scenarios or {"": ""}), **beside}
+        """Scenarios, with those of development last; a nameless one where there are none."""
+        return {**(self.scenarios or ({} if self.development else {"": ""})), **self.development}
 
     def labels(self, factor: str) -> list[str]:
         """The labels of a factor, in the file's order."""
@@ -257,7 +278,7 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     sweep = scaled.get("sweep") or {}
     if isinstance(sweep, Mapping):
         scaled["sweep"] = {factor: _without_null(labels) for factor, labels in sweep.items()}
-    for key in ("measures", "scenarios", "claims"):
+    for key in ("measures", "scenarios", "development", "claims"):
         scaled[key] = _without_null(scaled.get(key) or {})
     if isinstance(scaled["claims"], list):
         hint = "claims: {closer: {statement: …, measure: …}}"
@@ -305,11 +326,9 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     if not NAME.fullmatch(experiment.name):
         what = f"{shown(experiment.name)}, expected at most 100 letters, digits, '_' and '-': files are named after it"
         problems.append(Problem("experiment.name", what))
-    if DEVELOPMENT in experiment.scenarios:
-        hint = f"development: {experiment.scenarios[DEVELOPMENT]}"
-        problems.append(
-            Problem("experiment.scenarios", "development is an entry of its own, which is not judged", hint)
-        )
+    for label in experiment.scenarios.keys() & experiment.development.keys():
+        what = f"'{label}' is of development too, which is not judged"
+        problems.append(Problem("experiment.scenarios", what, "choose another label"))
     factors = list(experiment.sweep)
     if not 1 <= experiment.repetitions <= MAX_RUNS:
         problems.append(Problem("experiment.repetitions", f"expected at least 1, and at most {MAX_RUNS:,}"))
@@ -324,6 +343,7 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     labelled = [(f"without[{n}]", labels) for n, labels in enumerate(experiment.without)]
     labelled += [(f"curves[{n}].only", curve.only) for n, curve in enumerate(experiment.curves)]
     measured = [(f"page.drawn[{n}]", name) for n, name in enumerate(page.drawn)]
+    measured += [(f"best[{n}]", name) for n, name in enumerate(experiment.best)]
     for key, claim in experiment.claims.items():
         where = f"claims.{key}"
         if claim.where and not (experiment.source and claim.paper):

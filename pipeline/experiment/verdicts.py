@@ -1,12 +1,12 @@
-"""Claims against results: means, bootstrap intervals of paired differences, and whether each claim holds."""
+"""Claims against results: means, intervals of paired differences, shares of runs, and whether each claim holds."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from .intervals import Array, bootstrap_interval
+from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
 from .series import figure_at, pooled_deviation
 from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of, space_of
 
@@ -17,23 +17,21 @@ Results = Mapping[tuple[tuple[str, str], ...], Mapping[Repetition, Mapping[str, 
 Samples = Mapping[Repetition, float]
 """A measure's figure in each repetition."""
 
-MIN_SCENARIOS = 6
-"""Smallest number of scenarios that decide a claim: fewer do not say what the next one would give, however many seeds
-there are of each."""
 ROUNDING = 1e-9
-MARGIN = 0.05
-"""Share of the other side by which `not_above` may be above it: no amount of data shows that two figures are equal."""
+RUNS_SHARE = 0.75
+"""Share of the runs that must keep to the limit of a claim about the worst of them: the largest (in quarters) that
+twelve runs can show, when all do."""
 
 
 @dataclass(frozen=True)
 class Case:
     """A claim for one condition: our figure, what it is compared with, the difference's interval, whether it holds.
 
-    `difference` is ours less the other side; `interval` its 95 % bootstrap interval over `scenarios` and the seeds in
-    each (None of a largest figure, which no resampling makes larger). `holds` is None where a condition has no results,
-    and where the repetitions cannot decide. `judged` of `repetitions` have a figure (steps until converged are those of
-    the ones that converged): with fewer than all a claim may fail and does not hold. `ratio`: the figures are ratios of
-    means.
+    `difference` is ours less the other side; `interval` its 95 % interval over `scenarios` and the seeds in each. Of a
+    largest figure there is none: `kept` of the `repetitions` keep to the limit, and the interval of that share decides.
+    `holds` is None where a condition has no results, and where the repetitions cannot decide. `judged` of `repetitions`
+    have a figure (steps until converged are those of the ones that converged): with fewer than all a claim may fail and
+    does not hold. `ratio`: the figures are ratios of means.
     """
 
     where: str
@@ -48,6 +46,8 @@ class Case:
     ratio: bool = False
     scenarios: int = 0
     """Independent ones among the judged; 0 in files of before there were six."""
+    kept: int | None = None
+    """Repetitions that keep to the limit, of a claim about the worst of them; None of other claims."""
 
 
 @dataclass(frozen=True)
@@ -161,12 +161,17 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     if not ours or limit is None or (theirs is not None and sum(theirs.values()) == 0.0):
         return Case(where, None if ratio else _mean(measure, ours), limit, against, None, None, None)
     found = over_runs(measure, ours.values()) / (over_runs(measure, theirs.values()) if theirs is not None else 1.0)
-    interval = None
-    if measure.over_runs == "mean":
-        low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
-        interval = low - limit, high - limit
-    holds = _holds(side, interval or (found - limit, found - limit), abs(limit), ours, ran)
-    return Case(where, found, limit, against, found - limit, interval, holds, len(ours), ran, ratio, _scenarios(ours))
+    if measure.over_runs != "mean":
+        kept = sum(_keeps(side, figure - limit, measure.margin_beside(limit)) for figure in ours.values())
+        holds = decided_by_share(kept, ran) if _scenarios(ours) > 1 else None
+        case = Case(where, found, limit, against, found - limit, None, holds, len(ours), ran, ratio, _scenarios(ours))
+        return replace(case, kept=kept)
+    low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
+    interval = low - limit, high - limit
+    judged, scenarios = len(ours), _scenarios(ours)
+    few = ratio and scenarios < MIN_GROUPS
+    holds = None if few else decided(side, interval, measure.margin_beside(limit), scenarios, survivors=judged < ran)
+    return Case(where, found, limit, against, found - limit, interval, holds, judged, ran, ratio, scenarios)
 
 
 def _against_condition(
@@ -177,10 +182,13 @@ def _against_condition(
     against = f"{claim.scale:g} x {against}" if claim.scale != 1.0 else against
     ours = samples(experiment, results, claim.measure, labels)
     theirs = {s: claim.scale * v for s, v in samples(experiment, results, claim.measure, facing).items()}
-    return _against_samples(side, _where(experiment, labels), ours, theirs, against, ran=_ran(results, labels, facing))
+    measure, where = experiment.measures[claim.measure], _where(experiment, labels)
+    return _against_samples(measure, side, where, ours, theirs, against, ran=_ran(results, labels, facing))
 
 
-def _against_samples(side: Side, where: str, ours: Samples, theirs: Samples, against: str, ran: int) -> Case:
+def _against_samples(
+    measure: Measure, side: Side, where: str, ours: Samples, theirs: Samples, against: str, ran: int
+) -> Case:
     both = sorted(set(ours) & set(theirs))
     if not both:
         alone, beside = (float(np.mean(list(each.values()))) if each else None for each in (ours, theirs))
@@ -189,21 +197,44 @@ def _against_samples(side: Side, where: str, ours: Samples, theirs: Samples, aga
     interval = bootstrap_interval(_by_scenario(differences))
     mean = float(np.mean(list(differences.values())))
     ours_mean = float(np.mean([ours[each] for each in both]))
-    holds = _holds(side, interval, abs(ours_mean - mean), differences, ran)
     judged, scenarios = len(both), _scenarios(differences)
+    holds = decided(side, interval, measure.margin_beside(ours_mean - mean), scenarios, survivors=judged < ran)
     return Case(where, ours_mean, ours_mean - mean, against, mean, interval, holds, judged, ran, scenarios=scenarios)
 
 
-def _holds(side: Side, interval: tuple[float, float], other: float, judged: Samples, ran: int) -> bool | None:
-    """Whether a comparison comes out true, by the whole interval; None where the repetitions do not decide it."""
-    if _scenarios(judged) < MIN_SCENARIOS:
+def decided(
+    side: Side, interval: tuple[float, float], margin: float, scenarios: int, survivors: bool = False
+) -> bool | None:
+    """Whether a comparison comes out true, by the whole interval of the difference; None where that leaves it open.
+
+    One scenario says nothing of the next one, and nor do equal figures of fewer than six. With `survivors`, runs
+    without a figure, it may fail and does not hold.
+    """
+    low, high = interval
+    if scenarios < 2 or (scenarios < MIN_GROUPS and low == high):
         return None
-    low, high = interval if side in ("at_most", "below", "not_above") else (-interval[1], -interval[0])
-    strict = side in ("below", "above")  # equal is not better
-    allowed = MARGIN * other if side == "not_above" else 0.0
-    if high < 0.0 or (high <= allowed + ROUNDING and not strict):
-        return True if len(judged) == ran else None  # a claim about survivors holds for nobody else
-    return False if low > allowed + ROUNDING or (strict and low >= 0.0) else None
+    if _keeps(side, low, margin) and _keeps(side, high, margin):
+        return None if survivors else True
+    return None if _keeps(side, low, margin) or _keeps(side, high, margin) else False
+
+
+def decided_by_share(kept: int, ran: int) -> bool | None:
+    """Whether enough of the runs keep to a limit, by the interval of their share."""
+    low, high = share_interval(kept, ran)
+    return True if low >= RUNS_SHARE else False if high < RUNS_SHARE else None
+
+
+def _keeps(side: Side, difference: float, margin: float) -> bool:
+    """Whether a difference lies on the side that is claimed; equal is not better."""
+    match side:
+        case "below":
+            return difference < 0.0
+        case "above":
+            return difference > 0.0
+        case "at_least":
+            return difference >= -ROUNDING
+        case _:
+            return difference <= (margin if side == "not_above" else 0.0) + ROUNDING
 
 
 def _by_scenario(figures: Samples) -> list[Array]:
@@ -226,7 +257,8 @@ def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Resul
         if facing != labels:
             against = ", ".join(facing[factor] for factor in varied)
             theirs = samples(experiment, results, claim.measure, facing)
-            cases.append(_against_samples("not_above", where, ours, theirs, against, _ran(results, labels, facing)))
+            ran, measure = _ran(results, labels, facing), experiment.measures[claim.measure]
+            cases.append(_against_samples(measure, "not_above", where, ours, theirs, against, ran))
     if not cases:
         return Case(where, _mean(experiment.measures[claim.measure], ours), None, "no other", None, None, None)
     worst = {False: 0, None: 1, True: 2}

@@ -423,8 +423,8 @@ class WorldConfig:
     seed: int = 1
     """Of goods, textures, the jitter of each day's path and all noise."""
     draw: Annotated[int, Bounds(ge=0)] = 0
-    """Which world is drawn: 0 is for development, 1 to 6 are for tests. Each has another seed; in draws 2, 4, 6, …
-    routes that are not `random` are driven the other way round."""
+    """Which world is drawn: 0 and 7 to 17 are for development, the others for tests. Each has another seed; in draws
+    2, 4, 6, … routes that are not `random` are driven the other way round."""
     plan: Literal["paper", "drawn"] = "paper"
     """`paper`: walls, doors, rooms, aisles, lamps and routes as listed, of the papers' kind and size; `drawn`: by the
     seed, others in each draw."""

@@ -147,7 +147,7 @@ scenarios:
   d: nodes.counter.frames=26
   e: nodes.counter.frames=28
   f: nodes.counter.frames=30
-development: nodes.counter.frames=10
+development: {chosen on: nodes.counter.frames=10}
 repetitions: 2
 measures:
   error: {title: Error (m), path: [error_m], digits: 2}
@@ -246,7 +246,7 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
     assert "page: runs/dice_full/dice.html" in dice.said
     *verdicts, why, _ = dice.said.splitlines()[-5:]
     assert [line.split("  ")[0] for line in verdicts] == ["undecided"] * 3
-    assert why == "undecided: a verdict needs 6 scenarios"
+    assert why == "undecided: one scenario says nothing of the next; a verdict needs several"
     verdicts = read_result(folder / "dice.result.json").verdicts
     better, published, best = verdicts["better"], verdicts["published"], verdicts["best"]
     assert [case.holds for case in better] == [None, None]  # six seeds of one drive say nothing of another
@@ -283,7 +283,7 @@ def test_repetitions_that_share_nothing_give_the_same(dice: Finished):
 def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, place: Path):
     said = omninav("check", "--config-dir", "mine", "+experiment=laps", check=True).stdout
     assert (
-        "3 conditions (2 method, 2 noise), each with 2 repetitions in each of 6 scenarios, and in that of development"
+        "3 conditions (2 method, 2 noise), each with 2 repetitions in each of 6 scenarios and 1 scenario of development"
         in said
     )
     omninav("--config-dir", "mine", "+experiment=laps", check=True)
@@ -301,7 +301,10 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     page = (folder / "laps.md").read_text()
     assert f", {judged} of 12" in page
     assert f"({judged} of 12)" in page
-    assert "with seeds 0 to 11, 2 in each of 6 scenarios (a, b, c, d, e, f)" in page
+    assert (
+        "with seeds 0 to 11, 2 in each of 6 scenarios (a, b, c, d, e, f), and in each of 1 of development (chosen on)"
+        in page
+    )
     assert page.count(", development ") >= 3  # beside the figures of every condition, and in no verdict
     assert re.search(r"\*\*Time \(ms\)\*\*\n(.*\n){3}\| fair \| [1-9]", page)
     pictures = ["laps.png", "laps_curve_1.png", "laps_curve_2.png", "laps_last.png"]

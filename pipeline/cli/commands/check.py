@@ -116,7 +116,6 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Composes and checks each condition that an experiment would run."""
     from omninav.pipeline.cli.experiments import planned_experiment
     from omninav.pipeline.experiment.conditions import open_inputs
-    from omninav.pipeline.experiment.specification import DEVELOPMENT
 
     run = planned_experiment(config, arguments)
     experiment = run.experiment
@@ -125,8 +124,9 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
-    over = f" in each of {len(experiment.scenarios)} scenarios" if experiment.scenarios else ""
-    over += f", and in that of {DEVELOPMENT}" if experiment.development else ""
+    kinds = (experiment.scenarios, ""), (experiment.development, " of development")
+    numbers = [f"{counted(len(those), 'scenario')}{which}" for those, which in kinds if those]
+    over = f" in each of {' and '.join(numbers)}" if numbers else ""
     conditions = counted(len(experiment.conditions()), "condition")
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     references = len(run.all_runs) - len(run.conditions)

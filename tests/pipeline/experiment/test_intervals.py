@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm, t
 
-from omninav.pipeline.experiment.intervals import bootstrap_interval
+from omninav.pipeline.experiment.intervals import bootstrap_interval, share_interval
 
 
 def test_a_constant_difference_has_an_interval_of_no_width():
@@ -41,9 +41,23 @@ def test_it_misses_the_truth_as_rarely_as_it_says():
     assert high - low > 1.3 * (naive[1] - naive[0])
 
 
-def test_groups_of_different_sizes_count_by_their_figures():
-    low, high = bootstrap_interval([np.array([0.0, 0.0, 0.0]), np.array([1.0])])
-    assert (low, high) == (0.0, 1.0)
+def test_of_a_few_groups_it_is_student_s_of_their_means():
+    groups = [np.array([0.0, 2.0]), np.array([3.0]), np.array([5.0])]
+    low, high = bootstrap_interval(groups)
+    half = t.ppf(0.975, 2) * np.std([1.0, 3.0, 5.0], ddof=1) / np.sqrt(3)
+    assert (low, high) == pytest.approx((3.0 - half, 3.0 + half))
+
+
+@pytest.mark.parametrize(
+    ("kept", "of", "low", "high"), [(10, 12, 0.552, 0.953), (12, 12, 0.757, 1.0), (0, 6, 0.0, 0.390)]
+)
+def test_the_interval_of_a_share_is_wilson_s(kept: int, of: int, low: float, high: float):
+    """Against the closed form, with z = 1.96."""
+    z, share = norm.ppf(0.975), kept / of
+    middle, half = share + z**2 / 2 / of, z * np.sqrt(share * (1 - share) / of + z**2 / 4 / of**2)
+    closed = ((middle - half) / (1 + z**2 / of), (middle + half) / (1 + z**2 / of))
+    assert share_interval(kept, of) == pytest.approx(closed, abs=1e-9)
+    assert share_interval(kept, of) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_a_ratio_s_interval_is_paired():

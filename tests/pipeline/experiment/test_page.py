@@ -31,9 +31,16 @@ def test_a_sentence_about_reference_runs_leaves_the_development_world_out() -> N
     of = Condition({"tour": "one"}, "x=1")
     runs = [
         ConditionRun(
-            of, scenario, "other", (), Path(), (0,), results={0: {"metrics": {"error": e}, "timing": {}, "facts": {}}}
+            of,
+            scenario,
+            "other",
+            (),
+            Path(),
+            (0,),
+            results={0: {"metrics": {"error": e}, "timing": {}, "facts": {}}},
+            development=e == 9.0,
         )
-        for scenario, e in (("world 1", 1.0), ("world 2", 2.0), ("development", 9.0))
+        for scenario, e in (("draw 101", 1.0), ("draw 102", 2.0), ("draw 7", 9.0))
     ]
     content = PageContent(read_experiment(file, "full"), "full", [], [], [runs], [], "")
     assert reference_text(content, 0) == "Without: one 1.5."

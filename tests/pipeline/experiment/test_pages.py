@@ -9,7 +9,7 @@ import pytest
 from omninav.pipeline.cli.experiments import judged_experiments
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.page import markdown_page
-from omninav.pipeline.experiment.pages import Judged, claims_of, claims_page, counts, index_page, sources
+from omninav.pipeline.experiment.pages import Judged, by_chance, claims_of, claims_page, counts, index_page, sources
 from omninav.pipeline.experiment.result import ExperimentResult, result_text
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import Case, in_words
@@ -36,12 +36,15 @@ FILE = {
 }
 
 
+REPEATED = "3 repetitions of each condition with seeds 0 to 2, 1 in each of 3 scenarios (world 1, world 2, world 3)"
+
+
 def case(where: str, holds: bool | None, ours: float, scenarios: int = 7) -> Case:
     return Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.5), holds, 7, 7, scenarios=scenarios)
 
 
 def judged(**verdicts: tuple[Case, ...]) -> Judged:
-    result = ExperimentResult("one", "omninav +experiment=one", "full", "", "", verdicts, {})
+    result = ExperimentResult("one", "omninav +experiment=one", "full", "", REPEATED, verdicts, {})
     return [(read_experiment(FILE, "full"), result)]
 
 
@@ -72,12 +75,29 @@ def test_figures_have_three_digits_or_four(ours: float, shown: str) -> None:
     assert f"| holds | Error (cm): {shown}, beside 9 (the limit)" in claims_page(judged(whole=(case("", True, ours),)))
 
 
-def test_the_index_says_over_how_many_scenarios_claims_were_judged() -> None:
+def test_the_index_and_the_page_say_of_which_draws_a_result_is() -> None:
     found = judged(whole=(case("", None, 1.0, 3), case("", True, 1.0, 6)), ours=(case("", True, 1.0),))
     assert (
-        "| [One](one.md) | `omninav +experiment=one` | 7 | **1 of 2 hold, 1 undecided** |  | it holds |"
+        "| [One](one.md) | `omninav +experiment=one` | draw 1 to 3 | **1 of 2 hold, 1 undecided** |  | it holds |"
         in index_page(found)
     )
+    assert "1 in each of 3 scenarios (draw 1, draw 2, draw 3)" in str(markdown_page(*found[0])["one.md"])
+
+
+def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:
+    claims = {**FILE["claims"], "part": {**FILE["claims"]["part"], "struck": "the limit is ours"}}
+    (_, result), *_ = judged(whole=(case("", True, 3.0),), part=(case("", False, 5.25),))
+    found = [(read_experiment(FILE | {"claims": claims}, "full"), result)]
+    assert counts(found, "A paper 2004") == "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided."
+    assert "* and this ([One](one.md)): the limit is ours" in claims_page(found)
+    assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0])["one.md"])
+
+
+def test_the_claims_say_how_many_verdicts_chance_would_give(committed: Judged) -> None:
+    number = sum(len(list(claims_of(committed, source))) for source in sources(committed))
+    share = round(0.025 * number)
+    assert f"{number} verdicts" in by_chance(committed)
+    assert f"some {share} that hold and {share} that do not" in by_chance(committed)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +134,7 @@ def test_the_five_papers_have_claims_and_a_page_each(committed: Judged) -> None:
     pages = {page: page.read_text() for page in RESULTS.glob("*.md")}
     assert len(sources(committed)) == 5
     for source in sources(committed):
-        assert len(list(claims_of(committed, source))) > 40
+        assert len(list(claims_of(committed, source))) > 30
         (page,) = (text for text in pages.values() if f"{{{{ claims {source} }}}}" in text)
         assert len(re.findall(r"^\{\{ (?:table|plot) ", page, re.MULTILINE)) == 2
 

@@ -117,8 +117,8 @@ CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
             "experiment.sweep: 100,250 conditions, expected at most 100,000",
         ),
         (
-            {"scenarios": {"development": "z=1"}},
-            "experiment.scenarios: development is an entry of its own, which is not judged",
+            {"scenarios": {"one": "z=1"}, "development": {"one": "z=1"}},
+            "experiment.scenarios: 'one' is of development too, which is not judged",
         ),
     ],
 )
@@ -177,10 +177,12 @@ def test_every_seed_runs_in_every_scenario_and_that_of_development_stands_beside
     alone = read_experiment(FILE | {"repetitions": 3}, "full")
     assert (alone.runs_of_a_condition, alone.all_scenarios) == (3, {"": ""})
     two = read_experiment(
-        FILE | {"repetitions": 3, "scenarios": {"i": "z=1", "ii": "z=2"}, "development": "z=0"}, "full"
+        FILE | {"repetitions": 3, "scenarios": {"i": "z=1", "ii": "z=2"}, "development": {"iii": "z=0"}}, "full"
     )
     assert two.runs_of_a_condition == 6
-    assert list(two.all_scenarios.items()) == [("i", "z=1"), ("ii", "z=2"), ("development", "z=0")]
+    assert list(two.all_scenarios.items()) == [("i", "z=1"), ("ii", "z=2"), ("iii", "z=0")]
+    chosen_on = read_experiment(FILE | {"development": {"iii": "z=0"}}, "full")
+    assert chosen_on.all_scenarios == {"iii": "z=0"}
 
 
 def test_null_takes_a_measure_or_a_scenario_out():
@@ -188,11 +190,11 @@ def test_null_takes_a_measure_or_a_scenario_out():
     file = FILE | {
         "measures": more,
         "scenarios": {"i": "z=1", "ii": None},
-        "profiles": {"quick": {"measures": {"time": None}, "development": "z=0", "notes": ["few"]}},
+        "profiles": {"quick": {"measures": {"time": None}, "development": {"iii": "z=0"}, "notes": ["few"]}},
     }
     found = read_experiment(file, "quick")
     assert (list(found.measures), list(found.scenarios)) == (["error"], ["i"])
-    assert (found.development, found.notes) == ("z=0", ("few",))
+    assert (found.development, found.notes) == ({"iii": "z=0"}, ("few",))
     assert list(read_experiment(file, "full").measures) == ["error", "time"]
 
 

@@ -1,0 +1,50 @@
+"""The best of several conditions, by the rule of the procedure."""
+
+import pytest
+
+from omninav.pipeline.experiment.best import best_condition
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.verdicts import key_of
+
+FILE = {
+    "name": "test",
+    "title": "A test",
+    "about": "",
+    "variant": "none",
+    "sweep": {"value": {"1": "x=1", "2": "x=2", "3": "x=3"}},
+    "measures": {"lost": {"title": "Lost (%)", "path": ["lost"]}, "error": {"title": "Error (cm)", "path": ["error"]}},
+    "page": {"rows": [], "columns": "value"},
+    "best": ["lost", "error"],
+}
+
+
+def best(**figures: list[tuple[float, float | None]]) -> tuple[str, str] | None:
+    """Label and words of the best, of runs with these loss rates and errors by label."""
+    results = {
+        key_of({"value": label[1:]}): {
+            (f"draw {n}", n): {"metrics": {"lost": lost, "error": error}, "timing": {}, "facts": {}}
+            for n, (lost, error) in enumerate(runs)
+        }
+        for label, runs in figures.items()
+    }
+    found = best_condition(read_experiment(FILE, "full"), results)
+    return None if found is None else (found[0].labels["value"], found[1])
+
+
+@pytest.mark.parametrize(
+    ("figures", "label"),
+    [
+        ({"v1": [(0.0, 30.0)] * 2, "v2": [(1.0, 5.0)] * 2, "v3": [(0.5, 9.0)] * 2}, "1"),
+        ({"v1": [(0.0, 30.0)] * 2, "v2": [(0.0, 5.0), (0.0, 7.0)], "v3": [(1.0, 1.0)] * 2}, "2"),
+        ({"v1": [(0.0, None), (0.0, 1.0)], "v2": [(0.0, 50.0)] * 2}, "2"),
+    ],
+)
+def test_the_best_is_lost_least_and_among_equals_errs_least(figures: dict[str, list[tuple[float, float]]], label: str):
+    found = best(**figures)
+    assert found is not None
+    assert found[0] == label
+
+
+def test_it_is_named_with_its_figures_and_nothing_is_where_nothing_ran():
+    assert best(v2=[(0.0, 5.0), (2.0, 7.0)]) == ("2", "Lost (%) 1.0, Error (cm) 6.0")
+    assert best() is None
