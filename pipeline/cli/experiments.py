@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
 
-MORE_WORLDS = "undecided"
-"""The profile that adds worlds for claims which the others leave undecided."""
+MORE_SCENARIOS = "undecided"
+"""The profile that adds scenarios for claims which the others leave undecided."""
 
 
 def run_experiment(config: Any, arguments: Sequence[str]) -> int:
@@ -44,8 +44,8 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
         left_open = [case for verdict in verdicts.values() if verdict.holds is None for case in verdict.cases]
         if any(case.scenarios == 1 for case in left_open):
             print("undecided: one scenario says nothing of the next; a verdict needs several")
-        if left_open and run.profile == FULL and MORE_WORLDS in run.experiment.profiles:
-            print(f"undecided: profile={MORE_WORLDS} judges by twelve more worlds as well, once")
+        if left_open and run.profile == FULL and MORE_SCENARIOS in run.experiment.profiles:
+            print(f"undecided: profile={MORE_SCENARIOS} judges by more scenarios as well, once")
     best = best_condition(run.experiment, results_by_condition(run.conditions, bool(run.experiment.development)))
     if best is not None:
         print(f"best over {counted(len(run.experiment.development) or 1, 'scenario')}: {best[0].name}: {best[1]}")

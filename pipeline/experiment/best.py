@@ -1,4 +1,4 @@
-"""The best condition of an experiment over the worlds for development: by a rule that is written before it runs."""
+"""The best condition of an experiment over the scenarios of development: by a rule that is written before it runs."""
 
 import math
 

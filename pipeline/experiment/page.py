@@ -2,7 +2,6 @@
 
 import base64
 import math
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -118,7 +117,6 @@ def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[Pa
         "styles": STYLES,
         "tiles": _tiles(experiment, result, list(verdicts.values())),
         "repetitions": result.repeated.partition(" ")[0],
-        "repeated": re.sub(r"\bworld (?=\d)", "draw ", result.repeated),  # as scenarios were called until 2026-11-26
         "plots": plots,
     }
 

@@ -46,7 +46,7 @@ def index_page(judged: Judged) -> str:
 def scenarios_of(result: ExperimentResult) -> str:
     """The scenarios that a result is of: `draw 1 to draw 6`."""
     named = re.search(r"scenarios \(([^)]*)\)", result.repeated)
-    labels = re.sub(r"\bworld (?=\d)", "draw ", named[1]).split(", ") if named else []  # so called until 2026-11-26
+    labels = named[1].split(", ") if named else []
     in_a_row = len(labels) > 2 and all(label.startswith("draw ") for label in labels)
     return f"{labels[0]} to {labels[-1].removeprefix('draw ')}" if in_a_row else ", ".join(labels)
 

@@ -23,10 +23,10 @@ NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
 MARGINS = {"cm": 5.0, "m": 0.05, "degrees": 2.0, "%": 1.0}
-"""Largest difference that does not matter to a robot, by the unit in which a measure's title ends.
+"""Largest difference that does not matter, by the unit in which a measure's title ends.
 
-Five centimetres and two degrees are about the noise of a good drive along a taught path, and far below what a robot of
-0.5 m that passes doors of 1 m must know; 1 % of the steps is one image in a hundred.
+Five centimetres and two degrees are about what two good drives along one path differ by, and little for something that
+is 0.5 m wide and passes doors of 1 m; 1 % is one step in a hundred.
 """
 MARGIN_SHARE = 0.05
 """The same of times, counts and sizes: a share of the other side."""

@@ -36,7 +36,7 @@ FILE = {
 }
 
 
-REPEATED = "3 repetitions of each condition with seeds 0 to 2, 1 in each of 3 scenarios (world 1, world 2, world 3)"
+REPEATED = "3 repetitions of each condition with seeds 0 to 2, 1 in each of 3 scenarios (draw 1, draw 2, draw 3)"
 
 
 def case(where: str, holds: bool | None, ours: float, scenarios: int = 7) -> Case:
