@@ -218,7 +218,8 @@ def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] 
     """Go on with what was interrupted: a session with its next frame, any other run to its end.
 
     The bytes are those that it would have given unbroken. Of the stages that the folder names, those that `omninav
-    stages` lists are run, and others only where their module or file is in `trust`. Raises `BadInput`.
+    stages` lists are run, and others only where their module or file is in `trust`, programs (`command=`) only where
+    they are. Raises `BadInput`.
     """
     here, given = os.getcwd(), Path(os.path.realpath(folder))
     run = RunFolder(given)

@@ -8,7 +8,8 @@ A third party's stage is named `role.name`, as `match.gradient`; a value of whic
   `path/to/gradient.py:GradientMatch`.
 
 The working directory is on Python's path only while such a name is resolved that is not installed. What a run's folder
-names is resolved only where the stage is listed, or its name was typed (see `only_listed`).
+names is resolved only where the stage is listed, or its name was typed (see `only_listed`); a program that it names is
+run only where it was typed (`refuse_untyped`).
 """
 
 import functools
@@ -18,6 +19,7 @@ import importlib.util
 import inspect
 import os
 import pkgutil
+import shlex
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -106,6 +108,17 @@ def only_listed(typed: Collection[str]) -> Iterator[None]:
         yield
     finally:
         _TYPED.reset(token)
+
+
+def refuse_untyped(command: str) -> None:
+    """Raise `BadInput` for a program that a configuration from elsewhere names (`only_listed`) and nobody typed.
+
+    Call it where the program is only named, too: workers of an experiment no longer know where it came from.
+    """
+    typed = _TYPED.get()
+    if typed is not None and command not in typed:
+        again = f"if you trust it, type it again: omninav resume FOLDER {shlex.quote(command)}"
+        raise BadInput(f"{cut(command)} is a program, and is not run unasked; {again}")
 
 
 def is_listed(target: str) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from omninav.pipeline import BadInput, Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.pipeline.files import digest_file, digest_text
 from omninav.pipeline.graph.problems import cut
+from omninav.pipeline.graph.registry import refuse_untyped
 from omninav.stages.recordings.localiser_folder import read_poses, write_folder
 from omninav.stages.recordings.recorded_images import RecordedImages
 from omninav.stages.values.belief import PoseEstimate
@@ -107,6 +108,7 @@ class OutsideLocaliser(Stage):
             raise BadInput(f"command: {cut(self.command or '')}: {error}") from None
         if not words:
             raise BadInput('command: no program; type command="python my_localiser.py"')
+        refuse_untyped(self.command or "")
         return words
 
     def _files(self) -> list[Path]:

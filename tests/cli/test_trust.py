@@ -13,6 +13,7 @@ import yaml
 from conftest import DATA, ROOT, needs_data
 
 from omninav.pipeline.cli.main import main
+from omninav.pipeline.files import write_json
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.opening import open_recording
 
@@ -41,6 +42,11 @@ HYDRA = {
 @pytest.fixture(autouse=True)
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+
+
+def quoted(word: str) -> str:
+    """A value of a word as Hydra reads it back."""
+    return "'" + word.replace("'", "\\'") + "'"
 
 
 def mine(hydra: dict[str, object]) -> None:
@@ -155,6 +161,55 @@ def test_resume_runs_only_stages_that_are_listed_or_typed_again(
     with only_listed(["evil_here", "evil_here.py"]), pytest.raises((UnknownStage, BadInput)):
         resolve(target)
     assert Path("EXECUTED").exists() == target.startswith("evil_here")
+
+
+def test_a_program_that_a_folder_names_is_run_only_where_it_is_typed_again(capsys: pytest.CaptureFixture[str]) -> None:
+    program = f"{sys.executable} -c \"open('EXECUTED', 'w'); raise SystemExit('gave up')\""
+    recordings = [
+        f"{name}={ROOT / 'tests' / 'data' / file}.mcap" for name, file in (("tour", "tour"), ("log", "drive"))
+    ]
+    words = ["variant=peer", f"command={quoted(program)}", *recordings, "nodes.source.stride=8", "plots=none"]
+    assert main(words) == 2
+    again = Path("runs/latest").resolve()
+    for typed in ((), ("python",), (program,)):
+        Path("EXECUTED").unlink()
+        capsys.readouterr()
+        assert main(["resume", str(again), *typed]) == 2
+        assert Path("EXECUTED").exists() == (typed == (program,))
+        said = capsys.readouterr().err
+        assert ("gave up" if typed == (program,) else "is a program, and is not run unasked; if you trust it") in said
+        Path("EXECUTED").touch()
+
+
+def test_neither_an_experiments_folder_nor_a_report_runs_a_program_unasked(capsys: pytest.CaptureFixture[str]) -> None:
+    program = f"{sys.executable} -c \"import sys; open('EXECUTED', 'w'); open(sys.argv[1] + '/poses.csv', 'w')\""
+    recordings = [
+        f"{name}={ROOT / 'tests' / 'data' / file}.mcap" for name, file in (("tour", "tour"), ("log", "drive"))
+    ]
+    words = [f"command={quoted(program)}", *recordings, "nodes.source.stride=8", "cache=null"]
+    Path("conf/experiment").mkdir(parents=True)
+    experiment = {"name": "foreign", "title": "Foreign", "about": "Foreign.", "variant": "peer", "repetitions": 1}
+    experiment |= {
+        "sweep": {"images": {"few": "nodes.source.stride=8"}},
+        "page": {"rows": ["images"], "columns": "images"},
+    }
+    experiment |= {"measures": {"median": {"title": "Error", "path": ["position_error_m.median"]}}}
+    Path("conf/experiment/foreign.yaml").write_text("# @package experiment\n" + yaml.safe_dump(experiment))
+    Path("there").mkdir()
+    for start, said in (
+        (["--config-dir=conf", "+experiment=foreign"], "is a program, and is not run unasked"),
+        (["-m", "variant=peer"], "it is of a sweep, not of an experiment"),
+    ):
+        state = {"argv": ["omninav", *start, *words], "cwd": str(Path.cwd())}
+        write_json(Path("there/experiment.json"), state)
+        assert main(["resume", "there"]) != 0
+        pages = [page.read_text() for page in Path().glob("runs/foreign_full/*.html")]
+        assert said in "".join([capsys.readouterr().err, *pages])
+        assert not Path("EXECUTED").exists()
+    assert main(["variant=peer", *words, "plots=none"]) == 0
+    Path("EXECUTED").unlink()
+    assert main(["report", "runs/latest", "plots=few"]) == 2
+    assert not Path("EXECUTED").exists()
 
 
 @pytest.mark.parametrize(

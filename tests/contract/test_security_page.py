@@ -15,6 +15,7 @@ TESTS = {
         "test_an_installed_package_offers_a_stage_by_entry_point",
     ),
     "Stages that you type": (TRUST, "test_a_stage_of_ones_own_is_found_here_and_the_path_is_as_before"),
+    "Programs that you type": (TRUST, "test_a_program_that_a_folder_names_is_run_only_where_it_is_typed_again"),
     "Launchers and sweepers": (TRUST, "test_launchers_and_sweepers_of_installed_packages_take_their_parameters"),
     "Clusters": ("tests/pipeline/jobs/test_run.py", "test_what_crosses_to_a_cluster_is_text"),
     "Networks": ("tests/stages/features/test_onnx_encoder.py", "test_what_does_not_fit_is_refused_in_one_line"),

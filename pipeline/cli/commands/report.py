@@ -5,17 +5,22 @@ from pathlib import Path
 from omninav.pipeline.cli.jobs import show_sweep
 from omninav.pipeline.cli.terminal import show, shown
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.metrics_files import read_metrics
 
 
 def command(arguments: list[str]) -> int:
-    """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report again."""
+    """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report again.
+
+    That runs it once more: as of a run that goes on, other code than `omninav stages` lists is typed after the folder.
+    """
     plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
     named = [word for word in arguments if not word.startswith("plots=")]
     folder = Path(named[0] if named else "runs/latest").absolute()
     if plots:
-        _redraw(folder, plots[-1])
+        with only_listed(named[1:]):
+            _redraw(folder, plots[-1])
     if (folder / "sweep.html").is_file():
         show_sweep(folder)
         return 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from omninav.pipeline.cli.terminal import show_results
-from omninav.pipeline.cli.words import refuse_unreadable
+from omninav.pipeline.cli.words import read_flags, refuse_unreadable
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.ports import convert_fields
@@ -29,12 +29,12 @@ def command(arguments: list[str]) -> int:
     """Go on with the run in a folder, from where it was stopped.
 
     Of the stages that the folder names, those that `omninav stages` lists are run; others only where their module or
-    file is typed after the folder.
+    file is typed after the folder, and programs (`command=`) only where they are.
     """
     if not arguments:
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     given, *typed = arguments
-    if any(Path(word).is_dir() for word in typed):
+    if any(os.path.isdir(word) for word in typed):
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     here, folder = Path.cwd(), Path(os.path.realpath(given))
     if not folder.is_dir():
@@ -74,6 +74,8 @@ def _resume_experiment(folder: Path) -> int:
         raise BadInput(f"{file}: it does not say how the experiment was started; type its command again")
     words, place = list(state["argv"][1:]), Path(state["cwd"])
     refuse_unreadable(words)
+    if read_flags(words).multirun:  # whose jobs would know nothing of what was typed
+        raise BadInput(f"{file}: it is of a sweep, not of an experiment; type the sweep's command again")
     print(f"{one_line(shlex.join(['omninav', *words]))}   (in {place})", flush=True)
     os.chdir(place)
     return run(words)
