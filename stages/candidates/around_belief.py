@@ -17,6 +17,9 @@ from .background import with_background
 
 Ints = npt.NDArray[np.int64]
 
+BACKGROUND_REFERENCES = 128
+"""References compared of all that are neither near the belief nor similar, the same at each image."""
+
 
 @dataclass(kw_only=True, eq=False)
 class AroundBelief:
@@ -34,8 +37,6 @@ class AroundBelief:
     """The same around recovery particles."""
     compare_all_up_to: Annotated[int, Bounds(ge=0)] = 1000
     """References of a map up to which all are compared."""
-    background_references: Annotated[int, Bounds(ge=0)] = 128
-    """References compared of all others, the same at each image."""
 
     class Out(Outputs):
         """The references to compare with the view."""
@@ -63,4 +64,4 @@ class AroundBelief:
 
     def with_others(self, chosen: Ints, map: ReferenceGraph) -> Candidates:
         """The chosen references, and a sample of the others as background."""
-        return with_background(chosen, len(map), self.background_references)
+        return with_background(chosen, len(map), BACKGROUND_REFERENCES)

@@ -1,11 +1,9 @@
 """Selects the references that look like the view, anywhere in the map, and those near the belief."""
 
-from typing import Annotated
-
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import HEADINGS, turned_views
 from omninav.stages.geometry.plane.point_cells import distinct
@@ -25,6 +23,10 @@ LISTS = 64
 """Lists of similar references that are searched in a large map for each heading, without a belief."""
 SIMILAR_LISTS = 4
 """The same number with a belief."""
+SIMILAR_REFERENCES = 128
+"""References from the index beside those near the belief."""
+GLOBAL_REFERENCES = 4800
+"""References from the index where it is not known where the robot is."""
 
 
 class IndexedCandidates(AroundBelief, Stage):
@@ -33,14 +35,9 @@ class IndexedCandidates(AroundBelief, Stage):
     For maps that would take long to be compared whole. The index is asked with the view at all headings. Where the
     belief is near few references, these are compared, and a few more from the index, so that a robot whose belief is
     wrong is found, and known to be lost. Without a belief, and where it is spread so widely that more than
-    `global_references` are near it, those come from the index alone. Small maps are compared whole. Defaults:
+    `GLOBAL_REFERENCES` are near it, those come from the index alone. Small maps are compared whole. Defaults:
     docs/scaling.md.
     """
-
-    similar_references: Annotated[int, Bounds(ge=1)] = 128
-    """References from the index beside those near the belief."""
-    global_references: Annotated[int, Bounds(ge=1)] = 4800
-    """References from the index where it is not known where the robot is."""
 
     def setup(self, ctx: Context) -> None:
         """Forget the index of an earlier map."""
@@ -61,8 +58,8 @@ class IndexedCandidates(AroundBelief, Stage):
             return self.Out(candidates=Candidates())
         search, turned = self._ready(index, map), self._turned(features, map)
         around = self.around(map, near, length_scale)
-        known = 0 < len(around) <= self.global_references
-        asked = (self.similar_references, SIMILAR_LISTS) if known else (self.global_references, LISTS)
+        known = 0 < len(around) <= GLOBAL_REFERENCES
+        asked = (SIMILAR_REFERENCES, SIMILAR_LISTS) if known else (GLOBAL_REFERENCES, LISTS)
         similar = search.nearest(turned, *asked)
         chosen = distinct(np.concatenate([around, similar])) if known else similar
         return self.Out(candidates=self.with_others(chosen, map))

@@ -13,6 +13,8 @@ MIN_REFERENCES = 1000
 """Smallest map that gets an index, references."""
 REBUILD_GROWTH = 2.0
 """Growth of a map, as a factor, at which its index is built anew."""
+EXACT_UP_TO = 30_000
+"""References of a map up to which the short vectors of all are compared: 10 ms at 36 headings."""
 
 
 class BuildReferenceIndexState(State):
@@ -25,7 +27,7 @@ class BuildReferenceIndex(Stage):
     """Builds an index that finds the references similar to a view, at any heading, without comparing them all.
 
     Views become short vectors: the square roots of their histograms, on the principal axes of the map. All are compared
-    with the view's; in a map of more than `exact_up_to` they lie in an inverted file, with four bits for each two
+    with the view's; in a map of more than `EXACT_UP_TO` they lie in an inverted file, with four bits for each two
     dimensions (faiss; Jégou, Douze & Schmid 2011; `pip install 'omninav[index]'`, without which it takes longer). The
     index of a finished map is kept in the cache. That of a map that grows is built anew when the map has grown by
     `REBUILD_GROWTH`; until then references are appended to it.
@@ -33,8 +35,6 @@ class BuildReferenceIndex(Stage):
 
     dimensions: Annotated[int, Bounds(ge=2)] = 128
     """Numbers that are kept of each reference."""
-    exact_up_to: Annotated[int, Bounds(ge=0)] = 30_000
-    """References whose short vectors are compared one and all: 10 ms at 36 headings."""
 
     class Out(Outputs):
         """The index; absent for a small map."""
@@ -58,10 +58,10 @@ class BuildReferenceIndex(Stage):
         return self.Out(index=self._index)
 
     def _built(self, ctx: Context, map: ReferenceGraph, references: int) -> ReferenceIndex:
-        faiss = faiss_or_none() if references > self.exact_up_to else None
+        faiss = faiss_or_none() if references > EXACT_UP_TO else None
         if faiss is not None:
             return build(faiss, map, references, self.dimensions, ctx.progress)
-        if references > self.exact_up_to:
+        if references > EXACT_UP_TO:
             ctx.warn(
                 f"all {references} references are looked through at every image, because faiss is not installed; for "
                 "less time type pip install 'omninav[index]'"

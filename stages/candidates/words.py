@@ -1,10 +1,8 @@
 """Selects the references that hold the same visual words as the view, and those near the belief."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
@@ -16,6 +14,9 @@ from omninav.stages.values.visual_words import VisualWords, WordSimilarities
 
 from .around_belief import AroundBelief
 
+WORD_REFERENCES = 100
+"""References that are compared because they share most words with the view."""
+
 
 class WordCandidates(AroundBelief, Stage):
     """Selects the references that share most visual words with the view, anywhere in the map and at any heading.
@@ -24,9 +25,6 @@ class WordCandidates(AroundBelief, Stage):
     they find what colours in another light do not. References near a belief are compared too.
     Small maps are compared whole. References that a map has learned since its words were are compared in any case.
     """
-
-    word_references: Annotated[int, Bounds(ge=1)] = 100
-    """References that share most words with the view."""
 
     class Out(AroundBelief.Out):
         """The references to compare with the view, and how similar all are by their words."""
@@ -57,7 +55,7 @@ class WordCandidates(AroundBelief, Stage):
         out = WordSimilarities(similar)
         if len(map) <= self.compare_all_up_to:
             return self.Out(candidates=Candidates(), word_similarities=out)
-        best = np.argsort(-similar, kind="stable")[: self.word_references if similar.any() else 0]
+        best = np.argsort(-similar, kind="stable")[: WORD_REFERENCES if similar.any() else 0]
         around, since = self.around(map, near, length_scale), np.arange(len(words), len(map))
         chosen = distinct(np.concatenate([best, around, since]))
         return self.Out(candidates=self.with_others(chosen, map), word_similarities=out)

@@ -22,8 +22,8 @@ from omninav.stages.values.reference_index import InvertedLists, ReferenceIndex,
 faiss = pytest.importorskip("faiss")
 
 SEGMENTS, BINS, SPACING = 12, 16, 0.25
-EXACT: dict[str, int] = {}
-INVERTED = {"exact_up_to": 0}
+EXACT, INVERTED = 30_000, 0
+EXACT_UP_TO = "omninav.stages.candidates.reference_index.EXACT_UP_TO"
 FIELDS = {
     ShortVectors: ("mean", "axes", "vectors"),
     InvertedLists: ("mean", "axes", "centroids", "codebooks", "lists", "codes"),
@@ -48,22 +48,27 @@ def a_map(number: int = 4000) -> ReferenceGraph:
 MAP = a_map()
 
 
-def index_of(map: ReferenceGraph, state: BuildReferenceIndexState | None = None, **kw: Any) -> ReferenceIndex:
-    stage, ctx = BuildReferenceIndex(dimensions=64, **kw), Context("reference_index")
+def index_of(
+    map: ReferenceGraph, exact_up_to: int = EXACT, state: BuildReferenceIndexState | None = None
+) -> ReferenceIndex:
+    stage, ctx = BuildReferenceIndex(dimensions=64), Context("reference_index")
     stage.setup(ctx)
-    index = stage.step(ctx, map, state or BuildReferenceIndexState()).index
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(EXACT_UP_TO, exact_up_to)
+        index = stage.step(ctx, map, state or BuildReferenceIndexState()).index
     assert index is not None
     return index
 
 
 @pytest.fixture(autouse=True)
-def as_many_headings_as_segments(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_headings_and_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.candidates.index.GLOBAL_REFERENCES", 200)
     monkeypatch.setattr("omninav.stages.candidates.index.HEADINGS", SEGMENTS)
 
 
 @pytest.fixture(scope="module", params=[EXACT, INVERTED], ids=["exact", "inverted"])
 def index(request: pytest.FixtureRequest) -> ReferenceIndex:
-    return index_of(MAP, **request.param)
+    return index_of(MAP, request.param)
 
 
 def assert_same(one: ReferenceIndex | None, other: ReferenceIndex) -> None:
@@ -77,9 +82,8 @@ def selected(
     map: ReferenceGraph = MAP,
     near: Particles | None = None,
     turn: int = 1,
-    **kw: Any,
 ) -> Candidates:
-    stage, ctx = IndexedCandidates(**{"global_references": 200, **kw}), Context("candidates")
+    stage, ctx = IndexedCandidates(), Context("candidates")
     ctx.tick = Tick(index=turn, stamp=0)
     stage.setup(ctx)
     return stage.step(ctx, SegmentHistograms(view), map, index, near).candidates
@@ -116,7 +120,7 @@ def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> 
 
 
 def test_the_index_is_the_same_in_every_run(index: ReferenceIndex) -> None:
-    again = index_of(a_map(), **(EXACT if isinstance(index, ShortVectors) else INVERTED))
+    again = index_of(a_map(), EXACT if isinstance(index, ShortVectors) else INVERTED)
     assert_same(index, again)
     one, other = (chosen(selected(each, MAP.features[5])).tobytes() for each in (index, again))
     assert one == other
@@ -134,9 +138,12 @@ def test_the_background_is_the_same_at_each_image(index: ReferenceIndex) -> None
     assert len(sampled[0] & sampled[1]) > 0.85 * 128
 
 
-def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(index: ReferenceIndex) -> None:
+def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(
+    index: ReferenceIndex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("omninav.stages.candidates.index.SIMILAR_REFERENCES", 20)
     near = particles_at(100.0)
-    among = chosen(selected(index, MAP.features[3000], near=near, similar_references=20))
+    among = chosen(selected(index, MAP.features[3000], near=near))
     assert 3000 in among
     assert set(around(near)) <= set(among)
     assert len(among) <= len(around(near)) + 20
@@ -162,9 +169,12 @@ def test_references_that_a_map_has_learned_since_are_found(index: ReferenceIndex
 
 
 @pytest.mark.parametrize("form", [EXACT, INVERTED], ids=["exact", "inverted"])
-def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill(form: dict[str, int]) -> None:
+def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill(
+    form: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(EXACT_UP_TO, form)
     map, state, ctx = a_map(1200), BuildReferenceIndexState(), Context("reference_index")
-    stage = BuildReferenceIndex(dimensions=64, **form)
+    stage = BuildReferenceIndex(dimensions=64)
     stage.setup(ctx)
     sizes = []
     for n, view in enumerate(views(1300, seed=5)):
@@ -172,7 +182,7 @@ def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a
             sizes.append(len(stage.step(ctx, map, state).index or ()))
         map.insert(Pose(float(n), 5.0, 0.0), view, "histograms")
     assert sizes == [1200] * 12 + [2400]
-    resumed = index_of(map, BuildReferenceIndexState(references=2400), **form)
+    resumed = index_of(map, form, BuildReferenceIndexState(references=2400))
     assert_same(stage.step(ctx, map, state).index, resumed)
 
 
@@ -194,7 +204,8 @@ def test_without_faiss_all_references_of_a_large_map_are_looked_through_and_it_i
         return real(name, *args, **kw)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    stage, ctx = BuildReferenceIndex(exact_up_to=2000), Context("reference_index")
+    monkeypatch.setattr(EXACT_UP_TO, 2000)
+    stage, ctx = BuildReferenceIndex(), Context("reference_index")
     stage.setup(ctx)
     indices = [stage.step(ctx, MAP, BuildReferenceIndexState()).index for _ in range(2)]
     assert isinstance(indices[0], ShortVectors)
@@ -209,7 +220,7 @@ def test_an_index_of_another_map_is_refused(index: ReferenceIndex) -> None:
 
 
 def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:
-    index = index_of(MAP, **INVERTED)
+    index = index_of(MAP, INVERTED)
     assert isinstance(index, InvertedLists)
     lists = index.lists.copy()
     lists[7] = len(index.centroids)
@@ -221,7 +232,7 @@ def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", [EXACT, INVERTED], ids=["exact", "inverted"])
 @pytest.mark.parametrize("shape", [(1, 5), (1, 1), (36, 3)])
-def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int], form: dict[str, int]) -> None:
+def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int], form: int) -> None:
     features = np.random.default_rng(0).random((1500, *shape)).astype(np.float32) * 255
     map = ReferenceGraph(np.zeros((1500, 3)), features, "colours", np.zeros((0, 2), np.int64), "truth")
-    assert len(index_of(map, **form)) == 1500
+    assert len(index_of(map, form)) == 1500
