@@ -1,6 +1,5 @@
 """Maps without a common frame, brought into one by places that look alike."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
-from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
+from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -22,8 +21,6 @@ MIN_EXCESS = 0.7
 """Share of the similarity above the background that two references keep where they close a loop."""
 MIN_GAP = 5.0
 """Way along a drive, in length scales, after which they may."""
-CLOSURE_SIGMA, CLOSURE_SIGMA_DEG = 0.5, 5.0
-"""Standard deviations of a closure: length scales, degrees."""
 SAMPLES = 1000
 """References that look for a partner."""
 MIN_WEIGHT = 0.1
@@ -71,9 +68,8 @@ def aligned(maps: Sequence[ReferenceGraph]) -> Alignment | None:
         gaps = poses[closures.pairs[:, 0], :2] - poses[closures.pairs[:, 1], :2]
         left = np.hypot(gaps[:, 0], gaps[:, 1]) < MIN_GAP * unit
         return Alignment(poses, int((left & across).sum()), tuple(joined.tolist()))
-    spread = CLOSURE_SIGMA * unit, math.radians(CLOSURE_SIGMA_DEG)
     motions = np.concatenate([np.zeros((1, 3)), between(own[:-1], own[1:])])
     usable = joined[drives[closures.pairs]].all(axis=1)
     closures = Closures(closures.pairs[usable], closures.turns[usable])
-    poses, weights = straightened_drives(poses, drives, closures, *spread, motions)
+    poses, weights = straightened_drives(poses, drives, closures, *closure_sigmas(unit), motions)
     return Alignment(poses, int(((weights >= MIN_WEIGHT) & across[usable]).sum()), tuple(joined.tolist()))

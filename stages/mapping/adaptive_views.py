@@ -39,6 +39,8 @@ MERGE_BELOW = 7.81
 """Squared Mahalanobis distance below which components are merged."""
 FITS_BELOW = 7.81
 """Squared Mahalanobis distance up to which a component fits the state."""
+FORGET_GAIN = 2.0
+"""Sum of a state's sigmas at which it forgets with `beta_forget`, in distances over which views are similar."""
 
 
 class AdaptiveViews(Stage):
@@ -54,7 +56,8 @@ class AdaptiveViews(Stage):
     3. Weights of views within the threshold: w = beta S + (1 - beta S) w of components that fit the state, at squared
        distance <= `FITS_BELOW` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
        With `forgetting: active`, components of all other views near the state: w = (1 - b) w with b = beta_forget
-       max(1 - distance / forget_fade_m, 0) forget_gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
+       max(1 - distance / s, 0) `FORGET_GAIN` s / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11); s is the
+       distance over which views are similar, as measured with the threshold.
     4. Components below `min_weight` are removed, and views without any (erratum 9: after the weights have grown).
 
     Updates wait until there is a threshold, all but a map's first. The paper does not learn from a state of several
@@ -75,13 +78,6 @@ class AdaptiveViews(Stage):
     their means and the minimal covariance ("coding a stable and reliable estimation", section 2.2)."""
     beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.2
     """Rate of active forgetting."""
-    forget_radius_m: Annotated[float, Bounds(gt=0)] | None = None
-    """Distance from the state within which components are forgotten; null: the distance over which views are similar,
-    as measured with the threshold (0.3 m where it is not)."""
-    forget_fade_m: Annotated[float, Bounds(gt=0)] | None = None
-    """Distance over which forgetting falls to 0; null: the same."""
-    forget_gain_m: Annotated[float, Bounds(gt=0)] | None = None
-    """Sum of a state's sigmas at which it forgets with `beta_forget`; null: twice that distance."""
     min_sigma_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Smallest standard deviation of a state's position: a view looks similar over some distance."""
     min_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
@@ -170,9 +166,8 @@ class AdaptiveViews(Stage):
             FITS_BELOW,
             self.forgetting != "none",
             self.beta_forget if self.forgetting == "active" else 0.0,
-            self.forget_radius_m or length_scale_m,
-            self.forget_fade_m or length_scale_m,
-            self.forget_gain_m or 2.0 * length_scale_m,
+            length_scale_m,
+            FORGET_GAIN * length_scale_m,
             weights,
         )
         touched: Ints = map.ids[np.unique(map.owner[weights != map.weights])]
@@ -251,7 +246,6 @@ def _update_weights(
     fits_below: float,
     passive: bool,
     beta_forget: float,
-    radius: float,
     fade: float,
     gain: float,
     out: Array,
@@ -277,7 +271,7 @@ def _update_weights(
             if beta_forget > 0.0:
                 for k in range(len(shares)):
                     distance = np.hypot(places[c, 0] - means[k, 0], places[c, 1] - means[k, 1])
-                    if distance < radius and distance < fade:
+                    if distance < fade:
                         spread = np.sqrt(covariances[k, 0, 0]) + np.sqrt(covariances[k, 1, 1])
                         lost = beta_forget * (1.0 - distance / fade) * gain / spread
                         kept *= 1.0 - shares[k] * min(lost, 1.0)

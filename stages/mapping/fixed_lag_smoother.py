@@ -23,6 +23,9 @@ from .unimodality import unimodal_state
 Array = npt.NDArray[np.float64]
 Pose = tuple[Array, Array]
 
+MIN_IMPROVEMENT = 2.0
+"""Gain in certainty from which a state is propagated: the root of the determinants' ratio."""
+
 
 class FixedLagSmootherState(State):
     """The last views with their states as known by now, and the motions between them.
@@ -58,8 +61,6 @@ class FixedLagSmoother(Stage):
     """Correct states that become more certain by the present one."""
     odometry_gate: Annotated[float, Bounds(ge=0)] = 16.3
     """Squared Mahalanobis distance, 3 degrees of freedom, up to which odometry explains a state; 16.3: 99.9 %."""
-    min_improvement: Annotated[float, Bounds(gt=1)] = 2.0
-    """Gain in certainty from which a state is propagated: the root of the determinants' ratio."""
     max_views: Annotated[int, Bounds(ge=0)] = 500
     """Past views that are kept."""
 
@@ -111,7 +112,7 @@ class FixedLagSmoother(Stage):
         # The states since the last one, up to row `latest`, that was about as certain as the present one, `end`.
         if not self.back_propagate:
             return []
-        enough = self.min_improvement**2 * volume(end)
+        enough = MIN_IMPROVEMENT**2 * volume(end)
         after = path.jumps[-1][0] if path.jumps else -1
         certain = (row for row in range(latest, -1, -1) if volume(unimodal_state(path.past[row].state)) <= enough)
         first = next(certain, latest)

@@ -15,27 +15,24 @@ from .pose_of_view import Supervised, pose_of_view
 
 
 class ImageDatabaseState(State):
-    """The last image taken: its first reference, and the robot's pose."""
+    """The last image taken: its first reference, and the robot's position."""
 
     reference: int = -1
     x: float = 0.0
     y: float = 0.0
-    heading: float = 0.0
 
 
 class ImageDatabase(Stage):
     """Adds one reference for each image of a tour, described by its features only.
 
     Wolf, Burgard & Burkhardt 2005, section VI: images from different positions in the environment. An image is taken
-    where the robot has moved or turned far enough since the last one. A panorama is one reference; each window is one
+    where the robot has moved far enough since the last one. A panorama is one reference; each window is one
     of its own, at the robot's heading plus the window's direction. Edges join references in the order of the drive.
     Raises BadInput where `supervised` is `truth` and the tour has none.
     """
 
     min_distance_m: Annotated[float, Bounds(ge=0)] = 0.0
-    """Distance between two images that are taken; 0: this rule is off, and with both off every image is taken."""
-    min_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 0.0
-    """Or turn between them; 0: off."""
+    """Distance between two images that are taken; 0: every image is taken."""
     supervised: Supervised = "auto"
     """Source of the poses: `truth`, `odometry`, or `auto`: truth where the tour has it. The map keeps it."""
 
@@ -75,14 +72,8 @@ class ImageDatabase(Stage):
             for number, reference in enumerate(added):
                 map.join(last.reference + number, reference)
         first = len(map) == len(added)
-        last.reference, last.x, last.y, last.heading = added[0], pose.x, pose.y, pose.heading
+        last.reference, last.x, last.y = added[0], pose.x, pose.y
         return self.Out(map=map, events=ReferenceEvent(added[0], "first" if first else "far"))
 
     def _far(self, pose: Pose, last: ImageDatabaseState) -> bool:
-        if last.reference < 0 or (self.min_distance_m <= 0.0 and self.min_turn_deg <= 0.0):
-            return True
-        moved = math.hypot(pose.x - last.x, pose.y - last.y)
-        turned = math.degrees(abs(float(wrap(pose.heading - last.heading))))
-        return (self.min_distance_m > 0.0 and moved >= self.min_distance_m) or (
-            self.min_turn_deg > 0.0 and turned >= self.min_turn_deg
-        )
+        return last.reference < 0 or math.hypot(pose.x - last.x, pose.y - last.y) >= self.min_distance_m

@@ -14,6 +14,9 @@ from omninav.stages.values.maps import ReferenceEvent
 from omninav.stages.values.topological_map import LoopHypotheses
 from omninav.stages.values.visual_words import PlaceWords, VisualWords, words_of
 
+DESCRIPTORS_PER_WORD = 16
+"""Descriptors that a vocabulary is learned from, for each word."""
+
 
 class LearnVisualWords(Stage):
     """Learns a vocabulary from the local features of a map's own references, and finds the words of each.
@@ -25,8 +28,6 @@ class LearnVisualWords(Stage):
 
     words: Annotated[int, Bounds(ge=1)] = 2048
     """Size of the vocabulary."""
-    descriptors_per_word: Annotated[int, Bounds(ge=1)] = 16
-    """Descriptors that the vocabulary is learned from, for each word."""
 
     class Out(Outputs):
         """The vocabulary, and the words of each reference in the map's order."""
@@ -43,15 +44,15 @@ class LearnVisualWords(Stage):
             if event is not None
         ]
         ctx.doing("learning visual words")
-        made = vocabulary_and_words(views, self.words, self.descriptors_per_word)
+        made = vocabulary_and_words(views, self.words)
         ctx.fact("visual_words", len(made.centres))
         return self.Out(words=made)
 
 
-def vocabulary_and_words(views: Sequence[npt.NDArray[np.uint8]], words: int, descriptors_per_word: int) -> VisualWords:
+def vocabulary_and_words(views: Sequence[npt.NDArray[np.uint8]], words: int) -> VisualWords:
     """A vocabulary of so many words, learned from the views' own descriptors (N, D), and the words of each view."""
     together = np.concatenate([view for view in views if len(view)] or [np.empty((0, 128), np.uint8)])
-    rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * descriptors_per_word)).astype(np.int64)
+    rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * DESCRIPTORS_PER_WORD)).astype(np.int64)
     return words_of(views, learned_words(root_descriptors(together[rows]), words))
 
 
@@ -63,8 +64,6 @@ class LearnPlaceWords(Stage):
 
     words: Annotated[int, Bounds(ge=1)] = 2048
     """Size of the vocabulary."""
-    descriptors_per_word: Annotated[int, Bounds(ge=1)] = 16
-    """Descriptors that the vocabulary is learned from, for each word."""
 
     class Out(Outputs):
         """The vocabulary, and the words of each view."""
@@ -75,5 +74,5 @@ class LearnPlaceWords(Stage):
         """The whole tour at once."""
         ctx.doing("learning visual words")
         descriptors = [found.descriptors for found in views.features]
-        made = vocabulary_and_words(descriptors, self.words, self.descriptors_per_word)
+        made = vocabulary_and_words(descriptors, self.words)
         return self.Out(words=PlaceWords(made, hypotheses.place, views.poses, views.pose_source))

@@ -14,6 +14,9 @@ from omninav.stages.values.topological_map import LoopHypotheses
 
 Ints = npt.NDArray[np.int64]
 
+NEIGHBOUR_DISTANCE = 20.0
+"""Views along the drive within which another hypothesis is a neighbour."""
+
 
 class LoopClosure(Stage):
     """Groups views into places, and decides by evidence which parts of a drive are the same place.
@@ -42,10 +45,6 @@ class LoopClosure(Stage):
     """Whether the subclusters of an accepted hypothesis become one place, or two that are linked."""
     ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
     """Ignorance of a hypothesis before its neighbours have spoken."""
-    max_gap: Annotated[int, Bounds(ge=0)] = 0
-    """Views in a row that may belong elsewhere, within a subcluster."""
-    neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
-    """Views along the drive within which another hypothesis is a neighbour."""
 
     class Out(Outputs):
         """The place of each view, and what became of each hypothesis."""
@@ -56,7 +55,7 @@ class LoopClosure(Stage):
         """The whole tour at once."""
         distances, owners = views.distances, views.owners
         cluster = place_clusters.complete_linkage(distances, self.place_size)
-        subcluster = subclusters_of(cluster, views, self.max_gap)
+        subcluster = subclusters_of(cluster, views)
         number = int(subcluster.max()) + 1
         medoids = place_clusters.medoids(distances, subcluster)
         found = place_clusters.hypotheses(cluster, subcluster, medoids)
@@ -73,7 +72,7 @@ class LoopClosure(Stage):
         )
         initial = dempster_shafer.masses(similarity, 1.0 - self.ignorance)
         gaps = place_clusters.between_hypotheses(ends, views.orders)
-        masses = dempster_shafer.gather(initial, gaps, self.neighbour_distance)
+        masses = dempster_shafer.gather(initial, gaps, NEIGHBOUR_DISTANCE)
         informed = dempster_shafer.unknown(masses) < dempster_shafer.unknown(initial)
         accepted = (dempster_shafer.support(masses) > self.min_support) & informed
         joined = [pairs[accepted]] if self.accepted == "merge" else []
@@ -99,8 +98,8 @@ class LoopClosure(Stage):
         )
 
 
-def subclusters_of(cluster: Ints, views: ComparedViews, max_gap: int) -> Ints:
+def subclusters_of(cluster: Ints, views: ComparedViews) -> Ints:
     """Subclusters (N,) along the drive; of a known map's views those of one place and one cluster."""
-    along = place_clusters.subclusters(cluster, views.tours, max_gap)
+    along = place_clusters.subclusters(cluster, views.tours)
     known = len(cluster) + views.owners * (int(cluster.max()) + 1) + cluster
     return place_clusters.renumbered(np.where(views.owners >= 0, known, along))

@@ -1,6 +1,5 @@
 """Straightens a map whose poses are odometry by the places that the drive came back to."""
 
-import math
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -10,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage,
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
-from omninav.stages.geometry.plane.drive_graph import straightened_drives
+from omninav.stages.geometry.plane.drive_graph import closure_sigmas, straightened_drives
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -23,6 +22,8 @@ QUANTITIES = {
 
 MIN_EXCESS = 0.7
 """Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
+MIN_GAP = 5.0
+"""Way along the drive, in length scales, after which two references may close a loop."""
 
 
 class StraightenMap(Stage):
@@ -37,12 +38,6 @@ class StraightenMap(Stage):
     graph-based SLAM". Defaults: docs/experiments/straightened_maps.md.
     """
 
-    min_gap: Annotated[float, Bounds(gt=0)] = 5.0
-    """Way along the drive, in length scales, after which two references may close a loop."""
-    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
-    """Standard deviation of a closure's position, in length scales."""
-    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
-    """Standard deviation of its heading."""
     headings: Annotated[int, Bounds(ge=1)] = 36
     """Headings at which references are compared."""
     samples: Annotated[int, Bounds(ge=1)] = 1000
@@ -66,15 +61,14 @@ class StraightenMap(Stage):
         driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
         closures = closures_by_appearance(
             map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], self.headings,
-            MIN_EXCESS, self.min_gap * unit, self.samples,
+            MIN_EXCESS, MIN_GAP * unit, self.samples,
         )  # fmt: skip
         if not len(closures.pairs):
             ctx.fact(
                 "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"
             )
             return self.Out(map=map)
-        spread = self.closure_sigma * unit, math.radians(self.closure_sigma_deg)
-        poses, weights = straightened_drives(map.poses, np.zeros(len(map), np.int64), closures, *spread)
+        poses, weights = straightened_drives(map.poses, np.zeros(len(map), np.int64), closures, *closure_sigmas(unit))
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         values = {
             "closures": len(closures.pairs),

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
-from omninav.stages.geometry.plane.drive_graph import placed_drives, straightened_drives
+from omninav.stages.geometry.plane.drive_graph import closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
@@ -30,6 +30,10 @@ QUANTITIES = {
 }
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
+MIN_GAP = 5.0
+"""Way along one drive between the two views of a closure, in distances over which views become new."""
+SIGMA_DEG = 3.0
+"""Standard deviation with which the map learns a straightened heading."""
 
 
 class StraightenSessions(Stage):
@@ -49,16 +53,8 @@ class StraightenSessions(Stage):
 
     max_distance: Annotated[float, Bounds(ge=0, le=1)] = 0.6
     """Distance up to which two views close a loop, as a share of the novelty threshold; 0: the map is left as it is."""
-    min_gap: Annotated[float, Bounds(gt=0)] = 5.0
-    """Way along one drive between the two, in distances over which views become new."""
-    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
-    """Standard deviation of a closure's position, in the same unit."""
-    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
-    """Standard deviation of its heading."""
     sigma_m: Annotated[float, Bounds(gt=0)] = 0.1
     """Standard deviation with which the map learns a straightened position."""
-    sigma_deg: Annotated[float, Bounds(gt=0)] = 3.0
-    """The same of its heading."""
     samples: Annotated[int, Bounds(ge=1)] = 1000
     """Views that look for others, evenly spaced over drives of more."""
 
@@ -83,16 +79,13 @@ class StraightenSessions(Stage):
         if threshold is None or not threshold.settled or not threshold.metres or not self.max_distance:
             return self.Out(updates=updates)
         unit = threshold.metres
-        closures = closures_between(sessions, self.max_distance * threshold.distance, self.min_gap * unit, self.samples)
+        closures = closures_between(sessions, self.max_distance * threshold.distance, MIN_GAP * unit, self.samples)
         if not len(closures.pairs):
             return self._as_it_is(ctx, sessions, updates, last)
         drives = sessions.drives
         own = compose(sessions.believed[0], sessions.by_odometry)
-        start, joined = placed_drives(own, drives, closures, self.min_gap * unit)
-        sigma_rad = math.radians(self.closure_sigma_deg)
-        poses, weights = straightened_drives(
-            start, drives, closures, self.closure_sigma * unit, sigma_rad, sessions.motions
-        )
+        start, joined = placed_drives(own, drives, closures, MIN_GAP * unit)
+        poses, weights = straightened_drives(start, drives, closures, *closure_sigmas(unit), sessions.motions)
         kept = int((weights >= MIN_WEIGHT).sum())
         if not kept:
             return self._as_it_is(ctx, sessions, updates, last)
@@ -122,7 +115,7 @@ class StraightenSessions(Stage):
         return self.Out(updates=MapUpdates(items, open_from, sessions=sessions) if last else updates)
 
     def _updates(self, sessions: Sessions, poses: Array, learned: Bools) -> tuple[MapUpdate, ...]:
-        covariance = np.diag([self.sigma_m, self.sigma_m, math.radians(self.sigma_deg)]) ** 2
+        covariance = np.diag([self.sigma_m, self.sigma_m, math.radians(SIGMA_DEG)]) ** 2
         return tuple(
             MapUpdate(
                 sessions.view(row),

@@ -2,18 +2,19 @@
 
 import math
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.appearance.visual_distance import compare
-from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
+from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.values.compared_views import ComparedViews
 
 Array = npt.NDArray[np.float64]
 
+MIN_GAP = 10
+"""Views of one tour between the two of a closure."""
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
 QUANTITIES = {
@@ -32,13 +33,6 @@ class StraightenViews(Stage):
     and links do not depend on poses, which are for scoring and drawing. Poses that are ground truth stay, and so do
     those of a tour that comes back to no place. Manifest fact `map_straightened`.
     """
-
-    min_gap: Annotated[int, Bounds(ge=2)] = 10
-    """Views of one tour between the two of a closure."""
-    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
-    """Standard deviation of a closure's position, in ways from one view to the next."""
-    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
-    """Standard deviation of its heading."""
 
     class Out(Outputs):
         """The views with straightened poses, or as they were."""
@@ -60,11 +54,10 @@ class StraightenViews(Stage):
             )
             return self.Out(views=views)
         drives = np.unique(views.tours, return_inverse=True)[1].astype(np.int64)
-        start, joined = placed_drives(views.poses, drives, found, self.min_gap * unit)
+        start, joined = placed_drives(views.poses, drives, found, MIN_GAP * unit)
         usable = joined[drives[found.pairs]].all(axis=1)
         found = Closures(found.pairs[usable], found.turns[usable])
-        spread = self.closure_sigma * unit, math.radians(self.closure_sigma_deg)
-        poses, weights = straightened_drives(start, drives, found, *spread)
+        poses, weights = straightened_drives(start, drives, found, *closure_sigmas(unit))
         moved = np.hypot(*(poses - views.poses)[:, :2].T)
         values = {
             "closures": len(weights),
@@ -80,7 +73,7 @@ class StraightenViews(Stage):
         limit = float(np.median(usual[np.isfinite(usual)])) if np.isfinite(usual).any() else 0.0
         pairs = []
         for view in range(1, len(views)):
-            near = (views.tours[:view] == views.tours[view]) & (np.arange(view) > view - self.min_gap)
+            near = (views.tours[:view] == views.tours[view]) & (np.arange(view) > view - MIN_GAP)
             distances = np.where(near, math.inf, views.distances[view, :view])
             if distances.min() <= limit:
                 pairs.append((int(distances.argmin()), view))

@@ -50,10 +50,8 @@ class UnimodalQueue(Stage):
     state has one component."""
     min_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
     """Share of the weight near the heaviest component."""
-    max_sigma_m: Annotated[float, Bounds(ge=0)] = 0.0
-    """Largest standard deviation of a unimodal state's position; 0: any."""
     max_sigma_deg: Annotated[float, Bounds(gt=0)] = 45.0
-    """Largest standard deviation of its heading; an unknown heading has 104 degrees."""
+    """Largest standard deviation of a unimodal state's heading; an unknown heading has 104 degrees."""
     reconstruct: bool = True
     """Reconstruct the states between two unimodal ones; else their views are dropped."""
     odometry_gate: Annotated[float, Bounds(ge=0)] = 16.3
@@ -105,8 +103,7 @@ class UnimodalQueue(Stage):
         if unimodal is None:
             return None
         mean, covariance = unimodal
-        sigmas = np.sqrt(np.diag(covariance))
-        if sigmas[2] > math.radians(self.max_sigma_deg) or (self.max_sigma_m and max(sigmas[:2]) > self.max_sigma_m):
+        if math.sqrt(covariance[2, 2]) > math.radians(self.max_sigma_deg):
             return None
         return GaussianMixture(mean[None], covariance[None], np.ones(1))
 

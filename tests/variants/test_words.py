@@ -48,7 +48,7 @@ def test_words_are_of_the_map_that_is_used(variant: str, tmp_path: Path, shared_
         "another stage's": (
             *(["~artifacts.map.nodes"] if variant == "omniview_mcl_as_printed" else []),  # those of its own stage
             "artifacts.map.choices.mapping=image_database",
-            "+artifacts.map.nodes.mapping.min_turn_deg=5",
+            "+artifacts.map.nodes.mapping.min_distance_m=0.3",
         ),
         "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
     }

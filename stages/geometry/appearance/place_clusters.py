@@ -44,19 +44,13 @@ def groups(number: int, pairs: Ints) -> Ints:
     return renumbered(connected_components(graph, directed=False)[1])
 
 
-def subclusters(cluster: Ints, tour: Ints, max_gap: int = 0) -> Ints:
+def subclusters(cluster: Ints, tour: Ints) -> Ints:
     """Parts (N,) of clusters that the drive passed through without leaving them (section 4.4.2), in the drive's order.
 
-    `tour` (N,): views of different tours were not driven one after the other. Up to `max_gap` views in between may
-    belong elsewhere.
+    `tour` (N,): views of different tours were not driven one after the other.
     """
-    number = len(cluster)
-    rows = []
-    for step in range(1, max_gap + 2):
-        first = np.arange(max(number - step, 0))
-        same = (cluster[first] == cluster[first + step]) & (tour[first] == tour[first + step])
-        rows.append(np.column_stack([first[same], first[same] + step]))
-    return groups(number, np.concatenate(rows))
+    first = np.flatnonzero((cluster[:-1] == cluster[1:]) & (tour[:-1] == tour[1:]))
+    return groups(len(cluster), np.column_stack([first, first + 1]))
 
 
 def medoid(distances: Array, rows: Ints) -> int:

@@ -21,6 +21,8 @@ MIN_SIGMAS = (0.005, 0.005, 0.0025)
 """Standard deviations of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
 MIN_CLOSURES = 3
 """Closures that agree on where a drive began, to join it to others."""
+CLOSURE_SIGMA, CLOSURE_SIGMA_DEG = 0.5, 5.0
+"""Standard deviations of a closure: of its position, in distances over which views change, and of its heading."""
 HEADING_SCALE = math.radians(20.0)
 """Difference of heading at which closures agree half on where a drive began."""
 
@@ -39,6 +41,11 @@ def odometry_sigmas(motions: Array) -> Array:
     sigmas: Array = np.asarray(MIN_SIGMAS) + np.asarray(SIGMAS_PER_METRE) * length[:, None]
     sigmas[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
     return sigmas
+
+
+def closure_sigmas(unit_m: float) -> tuple[float, float]:
+    """Standard deviations (m, rad) of a closure between views that change over `unit_m`."""
+    return CLOSURE_SIGMA * unit_m, math.radians(CLOSURE_SIGMA_DEG)
 
 
 def placed_drives(own: Array, drives: Ints, closures: Closures, scale_m: float) -> tuple[Array, Bools]:

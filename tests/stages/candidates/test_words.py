@@ -12,7 +12,13 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.maps import ReferenceGraph
 
 VIEWS = seen_along(300)
-WORDS = vocabulary_and_words([view.descriptors for view in VIEWS], 400, 16)
+WORDS = vocabulary_and_words([view.descriptors for view in VIEWS], 400)
+
+
+@pytest.fixture(autouse=True)
+def few_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.candidates.words.WORD_REFERENCES", 20)
+    monkeypatch.setattr("omninav.stages.candidates.around_belief.BACKGROUND_REFERENCES", 50)
 
 
 def a_map(references: int = 300) -> ReferenceGraph:
@@ -23,7 +29,7 @@ def a_map(references: int = 300) -> ReferenceGraph:
 
 
 def output(view=VIEWS[100], near: Particles | None = None, references: int = 300, **kw):
-    stage, ctx = WordCandidates(**{"compare_all_up_to": 0, "word_references": 20, **kw}), Context("candidates")
+    stage, ctx = WordCandidates(**{"compare_all_up_to": 0, **kw}), Context("candidates")
     ctx.tick = Tick(index=1, stamp=0)
     stage.setup(ctx)
     return stage.step(ctx, view, a_map(references), WORDS, near)
@@ -41,7 +47,7 @@ def particles_at(x: float) -> Particles:
 
 
 def test_references_that_share_words_are_found_without_a_belief() -> None:
-    found = chosen(output(background_references=50).candidates)
+    found = chosen(output().candidates)
     assert set(range(96, 105)) <= found
     assert len(found) == 20
 
@@ -51,12 +57,12 @@ def test_a_kidnapped_robot_is_found_and_the_belief_looked_after() -> None:
     some = AroundBelief()
     some.setup(Context("candidates"))
     around = some.around(a_map(), near, None)
-    found = chosen(output(near=near, background_references=50).candidates)
+    found = chosen(output(near=near).candidates)
     assert set(around.tolist()) | {99, 100, 101} <= found
 
 
 def test_others_represent_the_rest_of_the_map() -> None:
-    weights = output(background_references=50).candidates.sampling_weight
+    weights = output().candidates.sampling_weight
     assert weights.sum() == pytest.approx(300)
 
 
@@ -69,11 +75,11 @@ def test_small_maps_are_compared_whole_and_similarities_are_given_all_the_same()
 def test_an_image_without_features_is_looked_for_near_the_belief() -> None:
     assert output(NOTHING).candidates.references is None
     near = particles_at(60.0)
-    assert len(chosen(output(NOTHING, near, background_references=50).candidates)) < 60
+    assert len(chosen(output(NOTHING, near).candidates)) < 60
 
 
 def test_references_learned_since_are_compared_in_any_case() -> None:
-    assert {300, 301, 302} <= chosen(output(references=303, background_references=50).candidates)
+    assert {300, 301, 302} <= chosen(output(references=303).candidates)
 
 
 def test_words_of_another_map_are_refused() -> None:

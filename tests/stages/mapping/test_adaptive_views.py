@@ -15,6 +15,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, NoveltyThreshold, Spectrum
 
+FORGET_GAIN = "omninav.stages.mapping.adaptive_views.FORGET_GAIN"
 LIMIT = NoveltyThreshold(1.0)
 FREE = {"min_sigma_m": 0.0, "min_sigma_deg": 0.0}
 
@@ -30,10 +31,10 @@ def state(*means, sigma=0.1, weights=None):
     return GaussianMixture(means, covariances, np.full(len(means), 1.0) if weights is None else np.array(weights))
 
 
-def learn(map, view, state, **options):
+def learn(map, view, state, threshold=LIMIT, **options):
     stage = AdaptiveViews(**{**FREE, **options})
     lessons = MapUpdates((MapUpdate(view, state, 0),))
-    return stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events
+    return stage.step(Context("mapping"), lessons, threshold, map, PendingUpdates()).events
 
 
 def test_a_new_view_is_inserted_with_its_state_and_weight_beta():
@@ -142,7 +143,7 @@ def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
     np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.08 + 0.92 * 0.54, 0.46])
 
 
-def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty():
+def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty(monkeypatch):
     def made():
         map = ViewMixtures.empty()
         for name, x in enumerate((0.0, 0.3, 0.6)):
@@ -150,13 +151,8 @@ def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty():
             map.add_component(name, np.array([x, 0.0, 2.0]), np.eye(3) * 0.01, 0.5, 3.0)
         return map
 
-    active = {
-        "forgetting": "active",
-        "forget_radius_m": 0.5,
-        "forget_fade_m": 0.4,
-        "beta_forget": 0.2,
-        "forget_gain_m": 0.1,
-    }
+    monkeypatch.setattr(FORGET_GAIN, 0.25)
+    active = {"forgetting": "active", "threshold": NoveltyThreshold(1.0, True, 0.4), "beta_forget": 0.2}
     map = made()
     learn(map, view(0, 0), state([0, 0, 0], sigma=0.1), **active)
     # b = 0.2 (1 - d / 0.4) 0.1 / (0.1 + 0.1): 0.1 at 0 m, 0.025 at 0.3 m, nothing at 0.6 m; headings do not matter.
@@ -169,12 +165,13 @@ def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty():
     np.testing.assert_allclose(map.weights[:3], 0.5)
 
 
-def test_a_very_certain_state_removes_at_most_the_whole_weight():
+def test_a_very_certain_state_removes_at_most_the_whole_weight(monkeypatch):
+    monkeypatch.setattr(FORGET_GAIN, 2.0 / 0.3)
     map = ViewMixtures.empty()
     map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
     map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
     # b = 0.2 * 2 / 0.002 = 200: without a limit the weight would be negative (erratum 11).
-    event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active", forget_gain_m=2.0)
+    event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active")
     assert event.removed.tolist() == [0]
     assert event.why == "forgotten"
     assert map.ids.tolist() == [1]
@@ -240,7 +237,8 @@ def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing()
     assert (len(map), map.steps) == (0, 0)
 
 
-def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row():
+def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row(monkeypatch):
+    monkeypatch.setattr(FORGET_GAIN, 5.0 / 0.3)
     rng = np.random.default_rng(0)
     map, waiting = ViewMixtures.empty(), PendingUpdates()
 
@@ -253,7 +251,7 @@ def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_upd
 
     for _ in range(1000):
         forgetting, beta = str(rng.choice(["active", "passive", "none"])), rng.uniform(0.1, 1.0)
-        stage = AdaptiveViews(forgetting=forgetting, beta=beta, forget_gain_m=5.0, max_views=12, **FREE)
+        stage = AdaptiveViews(forgetting=forgetting, beta=beta, max_views=12, **FREE)
         least = 10.0 ** rng.uniform(-6, -1)
         stage.step(Context("m"), MapUpdates(tuple(random_lesson(least) for _ in range(10))), LIMIT, map, waiting)
         assert (map.weights >= 0).all()
@@ -283,25 +281,26 @@ def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
         assert map.threshold == (threshold if threshold.settled else None)
 
 
-@pytest.mark.parametrize(("radius", "fade", "weight"), [(0.5, 0.4, 0.475), (0.3, 0.4, 0.5), (0.5, 0.3, 0.5)])
-def test_forgetting_ends_at_its_radius_and_where_it_has_faded(radius, fade, weight):
+@pytest.mark.parametrize(("scale_m", "weight"), [(0.4, 0.475), (0.3, 0.5), (0.2, 0.5)])
+def test_forgetting_ends_where_it_has_faded(monkeypatch, scale_m, weight):
     # At 0.3 m (0.18, 0.24), a limit itself excluded: b = 0.2 (1 - 0.3 / 0.4) 0.2 / 0.2.
+    monkeypatch.setattr(FORGET_GAIN, 0.2 / scale_m)
     map = ViewMixtures.empty()
     map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
     map.add_component(0, np.array([0.18, 0.24, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
-    options = {"forget_radius_m": radius, "forget_fade_m": fade, "forget_gain_m": 0.2}
-    learn(map, view(0, 0), state([0, 0, 0]), **options)
+    learn(map, view(0, 0), state([0, 0, 0]), NoveltyThreshold(1.0, True, scale_m))
     assert map.weights[0] == pytest.approx(weight)
 
 
-def test_forgetting_goes_by_both_sigmas_of_each_mode_and_its_weight():
+def test_forgetting_goes_by_both_sigmas_of_each_mode_and_its_weight(monkeypatch):
+    monkeypatch.setattr(FORGET_GAIN, 0.4 / 0.3)
     # b = 0.2 * 0.4 / (0.1 + 0.3) = 0.2 of a mode of half the weight.
     map = ViewMixtures.empty()
     map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
     map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
     covariances = np.stack([np.diag([0.01, 0.09, 0.01])] * 2)
     split = GaussianMixture(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]), covariances, np.array([3.0, 3.0]))
-    learn(map, view(0, 0), split, forget_gain_m=0.4)
+    learn(map, view(0, 0), split)
     assert map.weights[0] == pytest.approx(0.5 * (1.0 - 0.5 * 0.2))
     assert map.weights[1:] == pytest.approx([0.05, 0.05])
 

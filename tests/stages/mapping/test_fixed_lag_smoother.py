@@ -191,12 +191,14 @@ def test_a_path_begins_anew_without_odometry_and_holds_so_many_views() -> None:
     assert jumping.path.jumps == []  # what lay before it is forgotten
 
 
-def grown(min_improvement: float, first: float = 0.02, **options: Any) -> dict[int, GaussianMixture]:
+def grown(min_improvement: float, first: float = 0.02) -> dict[int, GaussianMixture]:
     """Less certain from image to image (0.02, 0.1, 0.2, 0.3 m, or `first` at the beginning), then a view at 4 m."""
-    drive = Straight(min_improvement=min_improvement, **options)
+    drive = Straight()
     for x, sigma in enumerate((first, 0.1, 0.2, 0.3)):
         assert not drive.to(at(x, 0.0, sigma)).items
-    return {update.index: update.state for update in drive.to(at(4.0), (0,)).items}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("omninav.stages.mapping.fixed_lag_smoother.MIN_IMPROVEMENT", min_improvement)
+        return {update.index: update.state for update in drive.to(at(4.0), (0,)).items}
 
 
 def test_states_since_the_last_one_that_was_as_certain_become_so() -> None:

@@ -45,8 +45,6 @@ def test_pictures_are_as_far_apart_as_asked() -> None:
     map = learned(ImageDatabase(min_distance_m=0.45), STRAIGHT, SegmentHistograms(views(4)))
     assert np.allclose(map.poses[:, 0], [0.0, 0.5, 1.0, 1.5, 2.0])
     turning: Tour = [(0.0, 0.0, math.radians(10.0 * number)) for number in range(37)]
-    map = learned(ImageDatabase(min_distance_m=0.45, min_turn_deg=25.0), turning, SegmentHistograms(views(4)))
-    assert np.allclose(np.degrees(map.poses[:, 2]), np.arange(0, 361, 30))
     assert len(learned(ImageDatabase(min_distance_m=0.45), turning, SegmentHistograms(views(4)))) == 1
 
 
@@ -80,7 +78,7 @@ def test_the_paper_s_936_images_take_at_most_4_megabytes(kind: str, tmp_path: Pa
     assert (tmp_path / "map.omap").stat().st_size <= 4e6
 
 
-def test_either_rule_takes_an_image_and_the_limit_itself_counts() -> None:
+def test_an_image_at_the_limit_itself_is_taken() -> None:
     tour: Tour = [(0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (0.3, 0.4, 0.4), (0.3, 0.4, 0.6), (0.6, 0.4, 0.6)]
     seen = SegmentHistograms(views(4))
 
@@ -90,15 +88,6 @@ def test_either_rule_takes_an_image_and_the_limit_itself_counts() -> None:
 
     assert taken(min_distance_m=0.5) == [0, 1]
     assert taken(min_distance_m=0.51) == [0, 4]
-    assert taken(min_turn_deg=30.0) == [0, 3]
-    assert taken(min_distance_m=0.5, min_turn_deg=30.0) == [0, 1, 3]
-    assert taken(min_distance_m=0.3, min_turn_deg=20.0) == [0, 1, 2, 4]
-
-
-def test_a_turn_across_the_seam_is_the_shorter_one() -> None:
-    tour: Tour = [(0.0, 0.0, 3.0), (0.0, 0.0, -3.0), (0.0, 0.0, -2.4)]
-    map = learned(ImageDatabase(min_turn_deg=30.0), tour, SegmentHistograms(views(4)))
-    assert map.poses[:, 2].tolist() == [3.0, -2.4]
 
 
 def test_events_name_the_first_reference_of_each_image_and_tours_are_not_joined() -> None:
@@ -122,8 +111,3 @@ def test_an_image_without_a_pose_is_passed_over() -> None:
     assert map.poses[:, 0].tolist() == [0.0, 2.0]
     assert map.edges.tolist() == [[0, 1]]
     assert ctx.counts == {"view_without_pose": 1}
-
-
-def test_a_turn_at_the_limit_is_far_enough() -> None:
-    tour: Tour = [(0.0, 0.0, 0.0), (0.0, 0.0, math.pi / 2)]
-    assert len(learned(ImageDatabase(min_turn_deg=90.0), tour, SegmentHistograms(views(4)))) == 2

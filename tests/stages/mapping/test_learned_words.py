@@ -63,7 +63,10 @@ def test_a_map_of_one_image_knows_it() -> None:
     assert len(learned([])) == 0
 
 
-def test_a_vocabulary_is_learned_from_descriptors_at_even_steps_from_the_first_to_the_last() -> None:
+def test_a_vocabulary_is_learned_from_descriptors_at_even_steps_from_the_first_to_the_last(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("omninav.stages.mapping.learned_words.DESCRIPTORS_PER_WORD", 3)
     looks = np.random.default_rng(0).integers(0, 200, (5, 128)).astype(np.uint8)
-    made = vocabulary_and_words([looks[:2], looks[:0], looks[2:]], 1, 3)
+    made = vocabulary_and_words([looks[:2], looks[:0], looks[2:]], 1)
     np.testing.assert_array_equal(made.centres, learned_words(root_descriptors(looks[[0, 2, 4]]), 1))

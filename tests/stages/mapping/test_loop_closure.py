@@ -65,9 +65,10 @@ def test_support_must_exceed_what_is_asked() -> None:
     ]
 
 
-def test_nothing_is_decided_of_a_hypothesis_that_no_neighbour_has_spoken_of() -> None:
+def test_nothing_is_decided_of_a_hypothesis_that_no_neighbour_has_spoken_of(monkeypatch: pytest.MonkeyPatch) -> None:
     # 2 views away is beyond a reach of 1.5.
-    found = closed(made_views(ROUND), neighbour_distance=1.5, **PAPER)
+    monkeypatch.setattr("omninav.stages.mapping.loop_closure.NEIGHBOUR_DISTANCE", 1.5)
+    found = closed(made_views(ROUND), **PAPER)
     assert (found.masses == found.initial).all()
     assert (found.masses[:, 0] > 0.5).all()
     assert not found.accepted.any()
@@ -94,12 +95,6 @@ def test_distances_are_scaled_by_their_spread_within_subclusters(form: str, simi
     medoids = closed(made_views(between_looks(looks)), similarity=form, place_size=0.6, between="medoids")
     assert medoids.pairs.tolist() == [[0, 4]]
     assert medoids.distances == pytest.approx([0.3])
-
-
-@pytest.mark.parametrize(("gap", "parts"), [(0, [0, 0, 1, 2]), (1, [0, 0, 1, 0])])
-def test_a_view_that_looks_different_for_once_may_be_passed_over(gap: int, parts: list[int]) -> None:
-    found = closed(made_views(between_looks([0.0, 0.1, 9.0, 0.2])), max_gap=gap)
-    assert found.subcluster.tolist() == parts
 
 
 def test_places_of_a_known_map_stay_together_and_are_not_questioned() -> None:

@@ -12,6 +12,8 @@ from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.straightened_map import StraightenMap
 from omninav.stages.values.maps import ReferenceGraph
 
+MIN_GAP = "omninav.stages.mapping.straightened_map.MIN_GAP"
+
 LAP = np.concatenate([np.tile([0.2, 0.0, 0.0], (24, 1)), np.tile([0.2, 0.0, np.pi / 8], (8, 1))])
 TRUTH = chain(np.tile(LAP, (4, 1))[:110])  # a stadium, one and three quarters times around
 
@@ -83,22 +85,24 @@ def test_it_says_by_how_much_references_were_moved_and_the_first_was_not():
     assert ctx.facts["map_straightened"] == f"by {values['closures']} closures, {moved.max():.2f} m at most"
 
 
-def test_views_of_one_direction_and_places_that_are_too_near_along_the_drive_close_no_loop():
+def test_views_of_one_direction_and_places_that_are_too_near_along_the_drive_close_no_loop(monkeypatch):
     map = bent()
     window = ReferenceGraph(map.poses, map.features[:][:, :1], "histograms", np.zeros((0, 2), np.int64), "odometry")
     out, ctx = straightened(window)
     assert out.map is window
     assert "all around" in ctx.facts["map_straightened"]
     ctx = Context("straightened")
-    assert StraightenMap(min_gap=500.0).step(ctx, map, []).map is map
+    monkeypatch.setattr(MIN_GAP, 500.0)
+    assert StraightenMap().step(ctx, map, []).map is map
     assert "no loop closure was found" in ctx.facts["map_straightened"]
 
 
-def test_the_way_along_the_drive_is_what_keeps_neighbours_apart():
+def test_the_way_along_the_drive_is_what_keeps_neighbours_apart(monkeypatch):
     # The stadium is 6.4 m round: a reference and the one a round later are 6.4 m of way apart.
-    map, stage = bent(), StraightenMap(min_gap=1e-3)
-    near = stage.step(Context("straightened"), map, []).metrics.values["straightened"]["closures"]
-    assert near > straightened(map)[0].metrics.values["straightened"]["closures"]
+    map = bent()
+    far = straightened(map)[0].metrics.values["straightened"]["closures"]
+    monkeypatch.setattr(MIN_GAP, 1e-3)
+    assert straightened(map)[0].metrics.values["straightened"]["closures"] > far
 
 
 def test_fewer_references_that_look_for_others_find_fewer():
@@ -106,8 +110,10 @@ def test_fewer_references_that_look_for_others_find_fewer():
     assert 0 < few["closures"] <= 20
 
 
-def test_closures_that_are_held_to_be_vague_move_less():
-    vague = StraightenMap(closure_sigma=300.0, closure_sigma_deg=170.0).step(Context("straightened"), bent(), [])
+def test_closures_that_are_held_to_be_vague_move_less(monkeypatch):
+    monkeypatch.setattr("omninav.stages.geometry.plane.drive_graph.CLOSURE_SIGMA", 300.0)
+    monkeypatch.setattr("omninav.stages.geometry.plane.drive_graph.CLOSURE_SIGMA_DEG", 170.0)
+    vague, _ = straightened(bent())
     assert error(vague.map) > 0.8 * error(bent())
 
 

@@ -178,8 +178,8 @@ def test_as_a_log_begins_the_map_is_learned_again_from_the_drives_before_it():
 
 
 def test_views_are_learned_with_the_spread_that_is_asked_for():
-    item = at_log(drive(None, TWICE), sigma_m=0.3, sigma_deg=6.0)[0].updates.items[0]
-    assert item.state.covariances[0] == pytest.approx(np.diag([0.3, 0.3, np.radians(6.0)]) ** 2)
+    item = at_log(drive(None, TWICE), sigma_m=0.3)[0].updates.items[0]
+    assert item.state.covariances[0] == pytest.approx(np.diag([0.3, 0.3, np.radians(3.0)]) ** 2)
     assert item.state.weights.tolist() == [1.0]
 
 
@@ -251,21 +251,21 @@ def test_closures_of_which_none_is_left_straighten_nothing():
     assert ctx.facts["map_straightened"].startswith("no: ")
 
 
-def test_the_limits_of_closures_are_in_units_of_the_threshold():
+def test_the_limits_of_closures_are_in_units_of_the_threshold(monkeypatch):
     sessions = drive(None, TWICE)
-    by = {
-        (distance, gap): at_log(sessions, ticks=[], max_distance=distance, min_gap=gap)[0].metrics
-        for distance, gap in ((0.3, 5.0), (0.6, 5.0), (0.6, 2.0))
-    }
-    for (distance, gap), metrics in by.items():
+    for distance, gap in ((0.3, 5.0), (0.6, 2.0), (0.6, 5.0)):
+        monkeypatch.setattr("omninav.stages.mapping.straightened_sessions.MIN_GAP", gap)
+        metrics = at_log(sessions, ticks=[], max_distance=distance)[0].metrics
         found = closures_between(sessions, distance * 4.0, gap * 0.4, 1000)
         assert metrics.values["straightened"]["closures"] == len(found.pairs)
     few = at_log(sessions, ticks=[], samples=60)[0].metrics.values["straightened"]["closures"]
     assert few == len(closures_between(sessions, 2.4, 2.0, 60).pairs)
 
 
-def test_closures_that_are_held_to_be_vague_move_less():
-    vague, _ = at_log(drive(None, TWICE), closure_sigma=300.0, closure_sigma_deg=170.0)
+def test_closures_that_are_held_to_be_vague_move_less(monkeypatch):
+    monkeypatch.setattr("omninav.stages.geometry.plane.drive_graph.CLOSURE_SIGMA", 300.0)
+    monkeypatch.setattr("omninav.stages.geometry.plane.drive_graph.CLOSURE_SIGMA_DEG", 170.0)
+    vague, _ = at_log(drive(None, TWICE))
     assert error(learned(vague), TWICE) > 0.8 * error(compose(TWICE[0], drive(None, TWICE).by_odometry), TWICE)
 
 

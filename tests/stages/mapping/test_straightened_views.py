@@ -12,6 +12,8 @@ from omninav.stages.geometry.plane.drive_graph import Closures, straightened_dri
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.straightened_views import StraightenViews
 
+MIN_GAP = "omninav.stages.mapping.straightened_views.MIN_GAP"
+
 SQUARE = [(4.0, 4.0), (16.0, 4.0), (16.0, 16.0), (4.0, 16.0), (4.0, 4.0)]
 WORLD = Landmarks(scattered(20.0, 20.0, 250))
 
@@ -75,39 +77,44 @@ def test_views_of_one_spot_and_a_single_view_stay():
     assert not ctx.facts
 
 
-def closures(looks, tours=None, **options):
+def closures(looks, tours=None):
     """Number of closures of views a metre apart of which two that follow each other are usually 1 apart in looks."""
     made = made_views(between_looks(looks), tours=tours)
     ctx = Context("straightened", np.random.default_rng(0))
-    metrics = StraightenViews(**options).step(ctx, made).metrics
+    metrics = StraightenViews().step(ctx, made).metrics
     return 0 if metrics is None else metrics.values["straightened"]["closures"]
 
 
-def test_a_closure_is_as_alike_as_two_that_follow_each_other_and_some_views_apart():
+def test_a_closure_is_as_alike_as_two_that_follow_each_other_and_some_views_apart(monkeypatch):
+    monkeypatch.setattr(MIN_GAP, 4)
     # There and back again: the limit is 1. On the way back each view has its place on the way there.
     looks = [0, 1, 2, 3, 4, 5, 6, 7, 8, 7, 6, 5, 4, 3, 2, 1, 0]
-    assert closures(looks, min_gap=4) == 7  # views 10 to 16; 9 is 2 after 7, and 5 is not alike
-    assert closures(looks, min_gap=12) == 3  # views 14 to 16; 12 before 13 is a look of 1 for one of 3
+    assert closures(looks) == 7  # views 10 to 16; 9 is 2 after 7, and 5 is not alike
+    monkeypatch.setattr(MIN_GAP, 12)
+    assert closures(looks) == 3  # views 14 to 16; 12 before 13 is a look of 1 for one of 3
 
 
-def test_tours_that_look_elsewhere_are_not_moved_by_the_others():
+def test_tours_that_look_elsewhere_are_not_moved_by_the_others(monkeypatch):
+    monkeypatch.setattr(MIN_GAP, 2)
     first, second = [0, 1, 2, 3, 4, 5], [100, 101, 102, 103]
-    assert closures(first + second, [1] * 6 + [2] * 4, min_gap=2) == 0
+    assert closures(first + second, [1] * 6 + [2] * 4) == 0
 
 
-def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual():
+def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual(monkeypatch):
+    monkeypatch.setattr(MIN_GAP, 4)
     there = [0, 1, 2, 3, 4, 5, 6, 7, 8]
     distances = between_looks([*there, 0.5, 1.5, 2.5, 3.5])
     distances[8, 9] = distances[9, 8] = np.inf
-    out = StraightenViews(min_gap=4).step(Context("straightened"), made_views(distances))
+    out = StraightenViews().step(Context("straightened"), made_views(distances))
     assert out.metrics.values["straightened"]["closures"] == 4
 
 
-def test_poses_are_those_of_odometry_and_closures_in_units_of_the_way_between_views():
+def test_poses_are_those_of_odometry_and_closures_in_units_of_the_way_between_views(monkeypatch):
+    monkeypatch.setattr(MIN_GAP, 4)
     # Round a square of eight views twice, 2 m from view to view, by odometry that turns too far.
     around = chain(np.tile([2.0, 0.0, np.pi / 4 + 0.03], (16, 1)))[:16]
     made = made_views(between_looks(list(range(8)) * 2), poses=around)
-    out = StraightenViews(min_gap=4).step(Context("straightened"), made)
+    out = StraightenViews().step(Context("straightened"), made)
     closures = Closures(np.array([(n, n + 8) for n in range(8)]), np.zeros(8))
     poses, weights = straightened_drives(around, np.zeros(16, np.int64), closures, 0.5 * 2.0, np.radians(5.0))
     np.testing.assert_allclose(out.views.poses, poses, atol=1e-9)

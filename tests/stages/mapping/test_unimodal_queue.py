@@ -111,19 +111,16 @@ def test_a_single_component_as_wide_as_the_map_is_not_unimodal():
     assert not given(UnimodalQueue(length=0), belief(0, covariance=anywhere))
     adrift = np.diag([9.0, 9.0, 0.1])
     assert given(UnimodalQueue(length=0), belief(0, covariance=adrift))
-    assert not given(UnimodalQueue(length=0, max_sigma_m=1.0), belief(0, covariance=adrift))
 
 
-def test_a_state_of_which_both_spreads_are_small_enough_is_unimodal():
+def test_a_state_whose_heading_is_certain_enough_is_unimodal():
     def spread(x: float, y: float, degrees: float) -> GaussianMixture:
         return belief(0, covariance=np.diag([x, y, np.radians(degrees)]) ** 2)
 
-    stage = UnimodalQueue(length=0, max_sigma_m=1.0, max_sigma_deg=10.0)
-    assert given(stage, spread(0.9, 0.9, 9.0))
-    for wide in (spread(1.1, 0.5, 9.0), spread(0.5, 1.1, 9.0), spread(0.5, 0.5, 11.0)):
-        assert not given(stage, wide)
+    stage = UnimodalQueue(length=0, max_sigma_deg=10.0)
+    assert given(stage, spread(30.0, 30.0, 9.0))
+    assert not given(stage, spread(0.5, 0.5, 11.0))
     assert given(UnimodalQueue(length=0), spread(30.0, 30.0, 44.0))
-    assert given(UnimodalQueue(length=0, max_sigma_m=0.05), spread(0.04, 0.04, 9.0))  # 0.16 rad are no metres
 
 
 def test_a_component_without_company_is_taken_as_it_is_and_given_with_its_tick():
