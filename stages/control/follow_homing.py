@@ -29,6 +29,8 @@ STOP_DISTANCE_M = 0.15
 """Free distance straight ahead at which the robot stops, metres."""
 BLOCKED_AFTER_S = 2.0
 """Time for which the robot waits for a free direction, or goes on towards a lost target, seconds."""
+WANDER_AFTER_S = 5.0
+"""Time after which a robot whose target is lost wanders, seconds."""
 DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
 """Time for which the robot drives towards a doubtful target, seconds, and the share of its speed with which it does."""
 
@@ -63,8 +65,6 @@ class FollowHoming(Stage):
     """Of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
-    wander_after_s: Annotated[float, Bounds(gt=0)] = 5.0
-    """Time after which a robot whose target is lost wanders."""
     search_s: Annotated[float, Bounds(gt=0)] = 60.0
     """Time without a break for which a target may be lost or doubtful; then the robot stands, until it is sure of it
     again or has another."""
@@ -97,7 +97,7 @@ class FollowHoming(Stage):
             ctx.count("gave_up")
             return self._stand("lost", f"the target was not seen in {self.search_s:g} s: {vector.why}")
         if not self._approaches(vector, lost_s, sought_s):
-            if wander is not None and lost_s >= self.wander_after_s:
+            if wander is not None and lost_s >= WANDER_AFTER_S:
                 ctx.count("wandered_lost")
                 return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
             ctx.count("stood_lost")
@@ -135,7 +135,7 @@ class FollowHoming(Stage):
     def _approaches(self, vector: HomingVector, lost_s: float, sought_s: float) -> bool:
         """Tells that the robot drives towards its target; towards a doubtful one it does so by turns with wandering."""
         if vector.state == "doubtful":
-            return sought_s % (self.wander_after_s + DOUBTFUL_S) < DOUBTFUL_S
+            return sought_s % (WANDER_AFTER_S + DOUBTFUL_S) < DOUBTFUL_S
         return vector.is_found or (lost_s < BLOCKED_AFTER_S and vector.metres is not None)
 
     def _free_direction(self, vector: HomingVector, scan: Scan | None, left: float) -> tuple[float | None, float]:

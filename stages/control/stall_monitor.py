@@ -15,6 +15,10 @@ CLOSER = 0.9
 """Share of the smallest distance so far that counts as having come closer."""
 NARROW_MARGIN = 0.2
 """Share of the margin with which a direct way still counts as free."""
+DETOUR_S = 10.0
+"""Time around an obstacle that may lead no closer, seconds."""
+STALLED_AFTER_S = 30.0
+"""Time in all that may lead no closer, seconds."""
 
 
 class StallMonitorState(State):
@@ -36,7 +40,7 @@ class StallMonitor(Stage):
     """Reports a blocked way when the robot has driven for some time without getting closer to its target.
 
     What stands in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
-    soon as it has another target, or after `detour_s`, so that it tries again if nobody plans again. The time in which
+    soon as it has another target, or after `DETOUR_S`, so that it tries again if nobody plans again. The time in which
     the target is lost does not count.
     """
 
@@ -44,10 +48,6 @@ class StallMonitor(Stage):
     """Of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides."""
-    detour_s: Annotated[float, Bounds(gt=0)] = 10.0
-    """Time around an obstacle that may lead no closer."""
-    stalled_after_s: Annotated[float, Bounds(gt=0)] = 30.0
-    """Time in all that may lead no closer."""
 
     class Out(Outputs):
         """`blocked`, with the reason; absent where nothing speaks against driving on."""
@@ -67,7 +67,7 @@ class StallMonitor(Stage):
         elapsed, state.stamp = tick.stamp - state.stamp, tick.stamp
         if vector is None or (progress is not None and (progress.docking or progress.arrived)):
             return self.Out()
-        if vector.number != state.target or state.blocked >= self.detour_s * 1e9:
+        if vector.number != state.target or state.blocked >= DETOUR_S * 1e9:
             state.target, state.closest = vector.number, math.inf
         if vector.ratio < CLOSER * state.closest:
             state.closest, state.stalled, state.detour, state.blocked = vector.ratio, 0, 0, 0
@@ -75,10 +75,10 @@ class StallMonitor(Stage):
             state.stalled += elapsed
             state.detour += elapsed if self._obstructed(vector, scan) else 0
         why = ""
-        if state.detour > self.detour_s * 1e9:
-            why = f"something stands in the way, and going around it for {self.detour_s:g} s led no closer"
-        elif state.stalled > self.stalled_after_s * 1e9:
-            why = f"{self.stalled_after_s:g} s have led no closer"
+        if state.detour > DETOUR_S * 1e9:
+            why = f"something stands in the way, and going around it for {DETOUR_S:g} s led no closer"
+        elif state.stalled > STALLED_AFTER_S * 1e9:
+            why = f"{STALLED_AFTER_S:g} s have led no closer"
         if not why:
             return self.Out()
         state.blocked += elapsed

@@ -35,9 +35,8 @@ def scan(*blocks: tuple[float, float, float]) -> Scan:
 class Robot:
     """The stages of driving, wired as in the variants, at five ticks a second."""
 
-    def __init__(self, detour_s=10.0, stalled_after_s=30.0, wander_after_s=5.0, wanders=False, search_s=60.0) -> None:
-        self.monitor = StallMonitor(detour_s=detour_s, stalled_after_s=stalled_after_s)
-        self.follow, self.wanders = FollowHoming(wander_after_s=wander_after_s, search_s=search_s), wanders
+    def __init__(self, wanders=False, search_s=60.0) -> None:
+        self.monitor, self.follow, self.wanders = StallMonitor(), FollowHoming(search_s=search_s), wanders
         self.monitored, self.followed, self.wandered = StallMonitorState(), FollowHomingState(), WallAvoiderState()
         self.ticks = 0
 
@@ -112,9 +111,10 @@ def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
     assert robot.drive(vector(0.0), progress(), scan()).command.speed == 0.4
 
 
-def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long() -> None:
+def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long(monkeypatch: pytest.MonkeyPatch) -> None:
     # The target lies 1 m ahead, behind a wall that is free to the left and to the right: a way to everywhere but there.
-    robot, wall = Robot(detour_s=4.0), scan((-50.0, 50.0, 0.5))
+    monkeypatch.setattr("omninav.stages.control.stall_monitor.DETOUR_S", 4.0)
+    robot, wall = Robot(), scan((-50.0, 50.0, 0.5))
     said = [robot.drive(vector(0.0, metres=1.0), progress(), wall) for _ in range(23)]
     assert {out.status.state for out in said[:21]} == {"driving"}
     assert all(out.command.turning for out in said[:21])
@@ -124,29 +124,33 @@ def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long() -> No
     assert another.status.state == "driving"
 
 
-def test_who_comes_closer_on_the_way_around_is_not_blocked() -> None:
-    robot, wall = Robot(detour_s=2.0), scan((-50.0, 50.0, 0.5))
+def test_who_comes_closer_on_the_way_around_is_not_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.stall_monitor.DETOUR_S", 2.0)
+    robot, wall = Robot(), scan((-50.0, 50.0, 0.5))
     ratios = 0.95 ** np.arange(40)
     said = [robot.drive(vector(0.0, ratio, metres=ratio), progress(), wall) for ratio in ratios]
     assert {out.status.state for out in said} == {"driving"}
 
 
-def test_if_nothing_else_is_planned_it_tries_again_after_a_while() -> None:
-    robot, wall = Robot(detour_s=4.0), scan((-50.0, 50.0, 0.5))
+def test_if_nothing_else_is_planned_it_tries_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.stall_monitor.DETOUR_S", 4.0)
+    robot, wall = Robot(), scan((-50.0, 50.0, 0.5))
     said = [robot.drive(vector(0.0, metres=1.0), progress(), wall) for _ in range(80)]
     states = [out.status.state for out in said]
     assert states == ["driving"] * 21 + ["blocked"] * 20 + ["driving"] * 21 + ["blocked"] * 18
 
 
-def test_neither_may_it_turn_and_turn_in_the_open_for_ever() -> None:
-    robot = Robot(stalled_after_s=6.0)
+def test_neither_may_it_turn_and_turn_in_the_open_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.stall_monitor.STALLED_AFTER_S", 6.0)
+    robot = Robot()
     said = [robot.drive(vector(3.0), progress(), scan()) for _ in range(33)]
     assert [out.status.state for out in said] == ["driving"] * 31 + ["blocked"] * 2
     assert said[-1].status.why == "6 s have led no closer"
 
 
-def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
-    robot = Robot(wander_after_s=1.0, wanders=True)
+def test_who_is_lost_for_long_wanders_until_the_target_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.follow_homing.WANDER_AFTER_S", 1.0)
+    robot = Robot(wanders=True)
     lost = vector(state="lost", why="2 of 9 matches agree")
     said = [robot.drive(lost, progress(), scan((-20.0, 0.0, 0.6))) for _ in range(7)]
     assert [(out.command.speed, out.command.turning) for out in said[:5]] == [(0.0, 0.0)] * 5
@@ -156,7 +160,7 @@ def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
 
 
 def test_towards_a_doubtful_target_it_goes_slowly_for_a_while_and_again_as_it_wanders() -> None:
-    robot = Robot(wander_after_s=5.0, wanders=True)
+    robot = Robot(wanders=True)
     doubtful = vector(0.0, state="doubtful", why="8 of 20 matches agree")
     said = [robot.drive(doubtful, progress(), scan()) for _ in range(60)]
     assert [out.status.state for out in said] == ["driving"] * 25 + ["lost"] * 35  # a planner waits from then on
@@ -174,8 +178,11 @@ def test_a_target_that_is_lost_now_and_then_is_not_given_up() -> None:
     assert not any("not seen" in out.status.why for out in said)
 
 
-def test_a_search_ends_and_a_target_that_is_seen_then_is_driven_to_all_the_same() -> None:
-    robot = Robot(wander_after_s=1.0, wanders=True, search_s=4.0)
+def test_a_search_ends_and_a_target_that_is_seen_then_is_driven_to_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("omninav.stages.control.follow_homing.WANDER_AFTER_S", 1.0)
+    robot = Robot(wanders=True, search_s=4.0)
     lost = vector(state="lost", why="2 of 9 matches agree")
     said = [robot.drive(lost, progress(), scan()) for _ in range(30)]
     assert [out.command.speed > 0.0 for out in said] == [False] * 5 + [True] * 15 + [False] * 10
@@ -186,8 +193,9 @@ def test_a_search_ends_and_a_target_that_is_seen_then_is_driven_to_all_the_same(
     assert "not seen" not in robot.drive(another, progress(), scan()).status.why
 
 
-def test_a_lost_robot_stands_where_no_wander_command_is_wired() -> None:
-    robot = Robot(wander_after_s=1.0)
+def test_a_lost_robot_stands_where_no_wander_command_is_wired(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.follow_homing.WANDER_AFTER_S", 1.0)
+    robot = Robot()
     lost = vector(state="lost", why="2 of 9 matches agree")
     said = [robot.drive(lost, progress(), scan()) for _ in range(60)]
     assert {(out.command.speed, out.command.turning) for out in said} == {(0.0, 0.0)}
@@ -210,8 +218,9 @@ def test_it_stops_before_what_stands_straight_ahead_while_it_turns_to_a_free_dir
     assert out.command.speed == 0.0
 
 
-def test_time_in_which_the_target_is_lost_does_not_count_as_stalled() -> None:
-    robot = Robot(stalled_after_s=2.0)
+def test_time_in_which_the_target_is_lost_does_not_count_as_stalled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.control.stall_monitor.STALLED_AFTER_S", 2.0)
+    robot = Robot()
     for _ in range(30):
         robot.drive(vector(state="lost", why="none"), progress(), scan())
     said = [robot.drive(vector(), progress(), scan()).status.state for _ in range(13)]
