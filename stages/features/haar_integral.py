@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.geometry.appearance.haar_integrals import AngularWeights, Kernel, padded
+from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 
@@ -122,8 +122,6 @@ class HaarIntegral(UnderGreyWorld, Stage):
     """Factors by which the kernels are enlarged; [1.0, 1.41, 2.0] recognises views from up to half the distance."""
     angles: Annotated[int, Bounds(ge=1)] = 36
     """Rotations of a kernel."""
-    angular_weights: AngularWeights = "equal"
-    """`linear`: weighted means against the discretisation of the angle (`geometry/appearance/haar_integrals.py`)."""
     root: bool = True
     """Take the square root of the product, whose values fill the bins more evenly."""
     histogram: Literal["joint", "separate"] = "joint"
@@ -191,7 +189,7 @@ class HaarIntegral(UnderGreyWorld, Stage):
     ) -> Floats:
         """Histograms of an image's segments: (segments, scales x kernels x bins)."""
         kernels = [
-            Kernel((scale * one, scale * other), self.angles, self.angular_weights, self.root)
+            Kernel((scale * one, scale * other), self.angles, self.root)
             for scale in self.scales
             for one, other in self.kernels
         ]

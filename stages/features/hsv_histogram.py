@@ -16,6 +16,9 @@ from .segments import segment_edges
 
 Floats = npt.NDArray[np.float32]
 
+HUE_BINS = 16
+"""Bins of the hue, as in the paper (Gross & Koenig 2004, section 2)."""
+
 
 @compiled(nogil=True)
 def _count(
@@ -67,7 +70,6 @@ def _count(
 def hsv_histograms(
     pixels: Pixels,
     segments: int,
-    hue_bins: int = 16,
     value_bins: int = 4,
     joint: bool = False,
     min_saturation: int = 0,
@@ -75,22 +77,22 @@ def hsv_histograms(
 ) -> Floats:
     """Histograms of hue and value per segment, each segment's summing to 1: (segments, bins) float32.
 
-    `joint` False: `hue_bins` + `value_bins` bins, half of the mass in each part; a pixel whose hue is not defined
+    `joint` False: `HUE_BINS` + `value_bins` bins, half of the mass in each part; a pixel whose hue is not defined
     (saturation below `min_saturation` or value below `min_value`, of 255; S = 0 or V = 0 never is) gives its share to
-    V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels (spread
+    V. `joint` True: `HUE_BINS` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels (spread
     over all hues, grey would resemble noise of all colours). So grey segments compare by value in both: two of one
     value intersect by 1, white and black by 0. OpenCV's hue is 0..179 and circular: bins are equal arcs, of which the
     first starts at red (erratum 22 in docs/papers.md).
     """
     hsv = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV))
-    hue_bin = np.arange(256) * hue_bins // 180
+    hue_bin = np.arange(256) * HUE_BINS // 180
     value_bin = np.arange(256) * value_bins // 256
     return _count(
         hsv,
         segment_edges(pixels.shape[1], segments),
         hue_bin,
         value_bin,
-        hue_bins,
+        HUE_BINS,
         value_bins,
         joint,
         max(1, min_saturation),
@@ -110,8 +112,6 @@ class HsvHistogram(UnderGreyWorld, Stage):
     bins: Literal["separate", "joint"] = "separate"
     """The paper's "16 bins for H and 4 bins for V": two histograms (20 bins) or a joint one (64, and 4 for pixels
     without a hue), erratum 22."""
-    hue_bins: Annotated[int, Bounds(ge=1, le=180)] = 16
-    """Bins of the hue."""
     value_bins: Annotated[int, Bounds(ge=1, le=256)] = 4
     """Bins of the brightness."""
     min_saturation: Annotated[int, Bounds(ge=0, le=255)] = 64
@@ -129,7 +129,6 @@ class HsvHistogram(UnderGreyWorld, Stage):
         histograms = hsv_histograms(
             self.constant(panorama.pixels),
             self.segments,
-            self.hue_bins,
             self.value_bins,
             self.bins == "joint",
             self.min_saturation,

@@ -5,7 +5,7 @@ at a pixel is that of its own neighbourhood (erratum 40 in docs/papers.md).
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -16,8 +16,6 @@ from omninav.pipeline.engine.compiled import compiled
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
-
-AngularWeights = Literal["equal", "linear"]
 
 
 class Taps(NamedTuple):
@@ -69,7 +67,6 @@ def _means(
     first_weights: Floats,
     second: Ints,
     second_weights: Floats,
-    linear: bool,
     root: bool,
     out: Floats,
 ) -> None:
@@ -79,21 +76,13 @@ def _means(
     # A neighbour at distance 0 is the pixel itself, whatever the angle: it is read once.
     still = (first == first[0]).all() and (first_weights == first_weights[0]).all()
     one, other, total = np.empty(length, np.float32), np.empty(length, np.float32), np.empty(length, np.float32)
-    others = np.empty((angles if linear else 0, length), np.float32)
     for row in range(rows):
         at = start + row * stride
-        for p in range(angles if linear else 0):
-            _row_of_taps(flat, at, second[p], second_weights[p], others[p])
         total[:] = np.float32(0)
         for p in range(angles):
             if p == 0 or not still:
                 _row_of_taps(flat, at, first[p], first_weights[p], one)
-            if linear:
-                before, here, after = others[p - 1], others[p], others[p + 1 if p + 1 < angles else 0]
-                for x in range(length):
-                    other[x] = (before[x] + np.float32(4) * here[x] + after[x]) * np.float32(1.0 / 6.0)
-            else:
-                _row_of_taps(flat, at, second[p], second_weights[p], other)
+            _row_of_taps(flat, at, second[p], second_weights[p], other)
             if root:
                 for x in range(length):
                     total[x] += np.sqrt(one[x] * other[x])
@@ -112,7 +101,6 @@ def _means_at(
     first_weights: Floats,
     second: Ints,
     second_weights: Floats,
-    linear: bool,
     root: bool,
     out: Floats,
 ) -> None:
@@ -131,11 +119,7 @@ def _means_at(
         for c in range(channels):
             total = np.float32(0)
             for p in range(angles):
-                there = other[p, c]
-                if linear:
-                    after = other[p + 1 if p + 1 < angles else 0, c]
-                    there = (other[p - 1, c] + np.float32(4) * there + after) * np.float32(1.0 / 6.0)
-                total += np.sqrt(one[p, c] * there) if root else one[p, c] * there
+                total += np.sqrt(one[p, c] * other[p, c]) if root else one[p, c] * other[p, c]
             out[n, c] = total * share
 
 
@@ -151,14 +135,11 @@ def padded(pixels: npt.NDArray[np.uint8], by: int, wraps_rows: bool, wraps_colum
 class Kernel(NamedTuple):
     """A product of two neighbours, f = M(0, r1) M(r2, at 90 degrees), and how it is integrated over its rotations.
 
-    `radii`: (r1, r2) pixels. `angles`: how many rotations. `weights` equal: their plain mean; linear: the mean of the
-    product of two factors that are linear between angles, which is a weighted one (1/6, 4/6, 1/6). `root`: the
-    integrand is the square root of the product.
+    `radii`: (r1, r2) pixels. `angles`: how many rotations. `root`: the integrand is the square root of the product.
     """
 
     radii: tuple[float, float]
     angles: int = 36
-    weights: AngularWeights = "equal"
     root: bool = False
 
     @property
@@ -185,7 +166,7 @@ class Kernel(NamedTuple):
         stride = columns * channels
         out = np.empty((rows - 2 * m, (columns - 2 * m) * channels), np.float32)
         taps = self._taps(stride, channels)
-        _means(padded.ravel(), stride, m * stride + m * channels, *taps, self.weights == "linear", self.root, out)
+        _means(padded.ravel(), stride, m * stride + m * channels, *taps, self.root, out)
         return out.reshape(rows - 2 * m, columns - 2 * m, channels)
 
     def means_at(self, padded: Floats, rows: Ints, columns: Ints) -> Floats:
@@ -194,5 +175,5 @@ class Kernel(NamedTuple):
         stride = wide * channels
         out = np.empty((len(rows), channels), np.float32)
         starts = (rows + m) * stride + (columns + m) * channels
-        _means_at(padded.ravel(), starts, *self._taps(stride, channels), self.weights == "linear", self.root, out)
+        _means_at(padded.ravel(), starts, *self._taps(stride, channels), self.root, out)
         return out

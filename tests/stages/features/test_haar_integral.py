@@ -85,11 +85,10 @@ def test_the_means_are_equation_4_word_for_word(radii: tuple[float, float], angl
     assert np.allclose(means, plain_means(pixels, radii, angles, root), atol=2e-6)
 
 
-@pytest.mark.parametrize("weights", ["equal", "linear"])
 @pytest.mark.parametrize("root", [False, True])
-def test_single_pixels_get_the_means_that_the_whole_picture_has_there(weights: str, root: bool) -> None:
+def test_single_pixels_get_the_means_that_the_whole_picture_has_there(root: bool) -> None:
     rng = np.random.default_rng(1)
-    kernel = Kernel((3.0, 4.0), 16, weights, root)
+    kernel = Kernel((3.0, 4.0), 16, root)
     picture = wrapped(rng.integers(0, 256, (20, 30, 3), dtype=np.uint8), kernel.margin + 1)
     rows, columns = rng.integers(0, 20, 50), rng.integers(0, 30, 50)
     assert np.allclose(kernel.means_at(picture, rows, columns), kernel.means(picture)[rows, columns], atol=1e-6)
@@ -105,33 +104,6 @@ def test_a_pixel_by_itself_is_seen_where_the_kernel_turned_around_a_pixel_meets_
     expected = np.zeros((7, 9))
     expected[3, 4] = expected[3, 5] = 0.25
     assert np.allclose(means, expected, atol=1e-6)
-
-
-def test_linear_weights_are_the_integral_of_factors_that_are_linear_between_angles() -> None:
-    pixels = np.random.default_rng(2).integers(0, 256, (9, 9, 3), dtype=np.uint8)
-    few = Kernel((3.0, 3.0), 4, "linear").means(wrapped(pixels, 4))[4, 4, 0]
-    around = [(4, 7), (7, 4), (4, 1), (1, 4)]
-    values = pixels[[r for r, _ in around], [c for _, c in around], 0] / 255.0
-    fine = (np.arange(400_000) + 0.5) / 100_000
-    one = np.interp(fine, np.arange(5), np.append(values, values[0]))
-    other = np.interp((fine + 1) % 4, np.arange(5), np.append(values, values[0]))
-    assert few == pytest.approx(float((one * other).mean()), abs=1e-6)
-
-
-def test_linear_weights_leave_a_third_of_what_too_few_angles_make_of_a_turn() -> None:
-    # Brightness 1/2 + 1/2 cos 4 (theta - t) around a pixel, read at 8 angles: cos^2 4 (p pi/4 - t) is the same at all
-    # of them, so that the mean hangs on the turn t, by 1/4 from t = 0 to pi / 8. The neighbours of each angle have the
-    # opposite sign: weighted, (4 - 2) / 6 of that.
-    y, x = np.mgrid[-22:23, -22:23].astype(np.float32)
-    swing = {}
-    for weights in ("equal", "linear"):
-        means = []
-        for turn in (0.0, math.pi / 8):
-            picture = np.repeat((0.5 + 0.5 * np.cos(4 * (np.arctan2(y, x) - turn)))[..., None], 3, axis=2)
-            means.append(Kernel((20.0, 20.0), 8, weights).means(picture.astype(np.float32))[1, 1, 0])
-        swing[weights] = means[0] - means[1]
-    assert swing["equal"] == pytest.approx(1 / 4, abs=0.01)
-    assert swing["linear"] == pytest.approx(1 / 12, abs=0.01)
 
 
 @pytest.mark.parametrize("histogram", ["joint", "separate"])
