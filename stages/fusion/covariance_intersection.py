@@ -1,11 +1,11 @@
 """Fuses mixtures from several sources into one belief by weighted covariance intersection."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.probability.gaussians import (
     farther_apart,
@@ -20,6 +20,13 @@ Array = npt.NDArray[np.float64]
 Rule = Literal["det_ratio", "det_min"]
 MAX_DISTANCE = 7.81
 """Squared Mahalanobis distance below which two components correspond: 95 % with 3 degrees of freedom."""
+MERGE_BELOW = 2.0
+"""Squared Mahalanobis distance below which components of the result are merged: two equal Gaussians closer than 2 (two
+sigma) have a single peak."""
+DROP_BELOW = 0.01
+"""Share of the heaviest component's weight below which components are dropped."""
+MAX_COMPONENTS = 200
+"""Components that stay, the heaviest, which bounds the work."""
 
 
 def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: float = 1.0) -> float:
@@ -168,20 +175,13 @@ class CovarianceIntersection(Stage):
     Gross, Koenig & Mueller 2005, section 2.1, with errata 1 to 5: see `fuse`. The sources are fused in the order of the
     ports, each with its own sum of weights. Then the weights are normalised, so that components without support fade,
     close components are merged (closest first, with the spread of their means), light ones are dropped, and at most
-    `max_components` stay. Covariances do not shrink where sources agree (erratum 4).
+    `MAX_COMPONENTS` stay. Covariances do not shrink where sources agree (erratum 4).
     """
 
     alpha: Rule = "det_ratio"
     """Weight of the second covariance: `det_ratio` (the paper's), or `det_min`, the smallest determinant."""
     weighted: bool = True
     """Whether `det_ratio` uses the components' weights (Gross, Koenig & Mueller) or not (Porta & Kroese)."""
-    merge_below: Annotated[float, Bounds(ge=0)] = 2.0
-    """Squared Mahalanobis distance below which components of the result are merged; two equal Gaussians closer than 2
-    (two sigma) have a single peak. 0: none."""
-    drop_below: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    """Components lighter than this share of the heaviest are dropped."""
-    max_components: Annotated[int, Bounds(ge=0)] = 200
-    """The heaviest components that stay, which bounds the work; 0: all."""
 
     class Out(Outputs):
         """The belief after all sources; weights sum to 1."""
@@ -207,10 +207,10 @@ class CovarianceIntersection(Stage):
 
     def _simplified(self, means: Array, covariances: Array, weights: Array) -> tuple[Array, Array, Array]:
         weights = weights / weights.sum()
-        means, covariances, weights = merged(means, covariances, weights, self.merge_below)
-        kept = np.flatnonzero(weights >= self.drop_below * float(weights.max()))
-        if self.max_components and len(kept) > self.max_components:
-            kept = kept[np.sort(np.argsort(-weights[kept], kind="stable")[: self.max_components])]
+        means, covariances, weights = merged(means, covariances, weights, MERGE_BELOW)
+        kept = np.flatnonzero(weights >= DROP_BELOW * float(weights.max()))
+        if len(kept) > MAX_COMPONENTS:
+            kept = kept[np.sort(np.argsort(-weights[kept], kind="stable")[:MAX_COMPONENTS])]
         return means[kept], covariances[kept], weights[kept] / weights[kept].sum()
 
 

@@ -18,6 +18,9 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 Array = npt.NDArray[np.float64]
 Where = Literal["uniform", "truth", "origin"] | StartPose
 
+INITIAL_SIGMA_M, INITIAL_SIGMA_DEG = 0.01, 0.5
+"""Standard deviations of the pose at which a map is begun; 0.1 m and 0.1 rad where there is a map."""
+
 
 @dataclass(kw_only=True, eq=False)
 class GrowingPrior:
@@ -30,10 +33,6 @@ class GrowingPrior:
     at: Where = "uniform"
     """First pose: `uniform` (with an empty map the log's first true pose, else the origin; later anywhere in the map),
     `truth`, `origin`, or [x, y, heading, sigma_xy, sigma_heading] (m, rad)."""
-    initial_sigma_m: Annotated[float, Bounds(gt=0)] = 0.01
-    """Standard deviation of the pose at which a map is begun; 0.1 m where there is a map."""
-    initial_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
-    """Standard deviation of the heading at which a map is begun; 0.1 rad where there is a map."""
 
     def known(
         self, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None
@@ -44,7 +43,7 @@ class GrowingPrior:
             if len(map):
                 return None
             at = "origin" if truth is None else "truth"
-        metres, radians = (0.1, 0.1) if len(map) else (self.initial_sigma_m, float(np.radians(self.initial_sigma_deg)))
+        metres, radians = (0.1, 0.1) if len(map) else (INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG)))
         if at == "origin":
             return np.zeros(3), np.array([metres, metres, radians])
         if at == "truth":
@@ -104,9 +103,7 @@ class MixtureInMap(GrowingPrior, Stage):
             mean, covariance, _ = moments(map.means, map.covariances, map.weights)
             covariance[2, :2] = covariance[:2, 2] = 0.0
             covariance[2, 2] = np.pi**2 / 3.0
-            covariance = floored(
-                covariance, (self.initial_sigma_m, self.initial_sigma_m, float(np.radians(self.initial_sigma_deg)))
-            )
+            covariance = floored(covariance, (INITIAL_SIGMA_M, INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG))))
         else:
             mean, covariance = known[0].copy(), np.diag(known[1] ** 2)
             mean[2] = wrap(mean[2])

@@ -14,6 +14,8 @@ Array = npt.NDArray[np.float64]
 
 KLD_ERROR = 0.05
 """Kullback-Leibler distance allowed with `adapt: kld` (Fox 2001)."""
+MIN_PARTICLES = 500
+"""Particles, at least, with `adapt: kld`; the paper's number for tracking."""
 CELL_M = 0.25
 """Width of the cells counted with `adapt: kld`, metres."""
 CELL_DEG = 10.0
@@ -47,8 +49,6 @@ class ImportanceResampling(Stage):
 
     number: Annotated[int, Bounds(ge=1)] = 5000
     """Particles, at most."""
-    min_particles: Annotated[int, Bounds(ge=1)] = 500
-    """Particles, at least, with `adapt: kld`."""
     adapt: Literal["kld", "none"] = "none"
     """`kld`: the number follows from the cells that the belief occupies (Fox 2001, 99 % confidence)."""
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
@@ -114,4 +114,4 @@ class ImportanceResampling(Stage):
         if self.adapt == "none":
             return self.number
         cells = occupied_cells(poses, CELL_M, math.radians(CELL_DEG))
-        return min(max(kld_number(cells, KLD_ERROR, 0.99), self.min_particles), self.number)
+        return min(max(kld_number(cells, KLD_ERROR, 0.99), MIN_PARTICLES), self.number)

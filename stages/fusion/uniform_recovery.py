@@ -12,6 +12,9 @@ from omninav.stages.values.belief import Likelihood, Particles
 
 Array = npt.NDArray[np.float64]
 
+RANDOM_PARTICLES = 50
+"""Particles drawn from the proposals at each image, as in the paper (section VI-C)."""
+
 
 class UniformRecovery(Stage):
     """Bootstrap filter: resamples at every image and replaces some particles by random ones.
@@ -25,8 +28,6 @@ class UniformRecovery(Stage):
 
     number: Annotated[int, Bounds(ge=1)] = 5000
     """Particles."""
-    random_particles: Annotated[int, Bounds(ge=0)] = 50
-    """Particles drawn from the proposals at each image."""
 
     class Out(Outputs):
         """The belief after the image."""
@@ -35,7 +36,7 @@ class UniformRecovery(Stage):
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation; without proposals, as of a robot that was not carried, none is random."""
-        number = 0 if proposals is None else min(self.random_particles, self.number)
+        number = 0 if proposals is None else min(RANDOM_PARTICLES, self.number)
         poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, number, proposals)
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
 

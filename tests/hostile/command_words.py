@@ -23,7 +23,7 @@ VARIANT = b"""\
 # @package _global_
 defaults: [retrieval_mcl, _self_]
 nodes:
-  fusion: {random_particles: 50}
+  fusion: {number: 5000}
 wires:
   match: {features: features.features}
 """
@@ -33,7 +33,7 @@ def words() -> Sequence[Files]:
     """Words that `check` finds nothing wrong with."""
     log, grid = f"log={DRIVE}\ntour={TOUR}\n".encode(), f"grid={GRID}\n".encode()
     return [
-        {"words": b"variant=retrieval_mcl\n" + log + grid + b"seed=3\nnodes.fusion.random_particles=50"},
+        {"words": b"variant=retrieval_mcl\n" + log + grid + b"seed=3\nnodes.fusion.number=5000"},
         {"words": b"variant=omniview_mcl\n" + log + b"match=selective\nnodes.match.headings=72\nstart=uniform"},
     ]
 

@@ -134,8 +134,11 @@ def test_components_correspond_up_to_95_per_cent_and_light_ones_go_below_a_hundr
         one, other = (
             GaussianMixture(np.array([[x, 0.0, 0.0]]), 0.5 * np.eye(3)[None], np.ones(1)) for x in (0.0, apart)
         )
-        stage = CovarianceIntersection(merge_below=0.0)
-        return stage.step(context(), one, GaussianMixture(other.means, other.covariances, np.array([weight]))).belief
+        return (
+            CovarianceIntersection()
+            .step(context(), one, GaussianMixture(other.means, other.covariances, np.array([weight])))
+            .belief
+        )
 
     assert [len(fused(squared**0.5)) for squared in (7.8, 7.82)] == [1, 2]
     assert [len(fused(99.0, weight)) for weight in (0.0101, 0.0099)] == [2, 1]

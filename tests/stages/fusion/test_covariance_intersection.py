@@ -27,6 +27,7 @@ from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
 
+MODULE = "omninav.stages.fusion.covariance_intersection"
 UNIT = np.eye(3)
 CTX = Context("fusion")
 rules: st.SearchStrategy[Rule] = st.sampled_from(["det_ratio", "det_min"])
@@ -266,26 +267,34 @@ def test_alpha_has_the_weights_unless_they_are_switched_off() -> None:
 # the stage
 
 
-def test_near_components_become_one_and_light_ones_go() -> None:
-    out = CovarianceIntersection(drop_below=0.05).step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief
+def test_near_components_become_one_and_light_ones_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    three = mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02))
+    monkeypatch.setattr(f"{MODULE}.DROP_BELOW", 0.05)
+    out = CovarianceIntersection().step(CTX, three, None).belief
     assert len(out) == 1
     assert out.weights.tolist() == [1.0]
     assert out.means[0, 0] == pytest.approx(0.12 * 0.48 / 0.98)
-    kept = CovarianceIntersection(drop_below=0.0, merge_below=0.0)
-    assert len(kept.step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief) == 3
+    monkeypatch.setattr(f"{MODULE}.DROP_BELOW", 0.0)
+    monkeypatch.setattr(f"{MODULE}.MERGE_BELOW", 0.0)
+    assert len(CovarianceIntersection().step(CTX, three, None).belief) == 3
 
 
-def test_a_component_at_the_share_below_which_they_are_dropped_stays() -> None:
+@pytest.mark.parametrize(("share", "weights"), [(0.25, [0.8, 0.2]), (0.26, [1.0])])
+def test_a_component_at_the_share_below_which_they_are_dropped_stays(
+    monkeypatch: pytest.MonkeyPatch, share: float, weights: list[float]
+) -> None:
+    monkeypatch.setattr(f"{MODULE}.DROP_BELOW", share)
     two = mixture((0.0, 1.0), (9.0, 0.25))
-    assert CovarianceIntersection(drop_below=0.25).step(CTX, two, None).belief.weights == pytest.approx([0.8, 0.2])
-    assert CovarianceIntersection(drop_below=0.26).step(CTX, two, None).belief.weights.tolist() == [1.0]
+    assert CovarianceIntersection().step(CTX, two, None).belief.weights == pytest.approx(weights)
 
 
-def test_as_many_components_as_may_stay_do() -> None:
+@pytest.mark.parametrize(
+    ("most", "places"), [(1, [9.0]), (2, [0.0, 9.0]), (3, [0.0, 9.0, 20.0]), (4, [0.0, 9.0, 20.0])]
+)
+def test_as_many_components_as_may_stay_do(monkeypatch: pytest.MonkeyPatch, most: int, places: list[float]) -> None:
+    monkeypatch.setattr(f"{MODULE}.MAX_COMPONENTS", most)
     three = mixture((0.0, 0.3), (9.0, 0.4), (20.0, 0.3))
-    kept = [len(CovarianceIntersection(max_components=most).step(CTX, three, None).belief) for most in (1, 2, 3, 4)]
-    assert kept == [1, 2, 3, 3]
-    assert CovarianceIntersection(max_components=1).step(CTX, three, None).belief.means[0, 0] == 9.0
+    assert CovarianceIntersection().step(CTX, three, None).belief.means[:, 0].tolist() == places
 
 
 def test_two_equal_gaussians_merge_where_they_have_one_peak() -> None:
@@ -297,13 +306,13 @@ def test_two_equal_gaussians_merge_where_they_have_one_peak() -> None:
         assert len(CovarianceIntersection().step(CTX, mixture((0.0, 0.5), (apart, 0.5)), None).belief) == peaks
 
 
-def test_where_many_places_are_as_likely_the_heaviest_stay() -> None:
+def test_where_many_places_are_as_likely_the_heaviest_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{MODULE}.MAX_COMPONENTS", 20)
     wide = mixture(*((3.0 * k, 1.0 + 0.001 * k) for k in range(50)))
-    out = CovarianceIntersection(max_components=20).step(CTX, wide, None).belief
+    out = CovarianceIntersection().step(CTX, wide, None).belief
     assert len(out) == 20
     assert out.means[:, 0].min() == pytest.approx(90.0)
     assert out.weights.sum() == pytest.approx(1.0)
-    assert len(CovarianceIntersection(max_components=0).step(CTX, wide, None).belief) == 50
 
 
 def test_a_prediction_of_nothing_takes_the_hypothesis_and_no_weight_changes_nothing() -> None:
@@ -325,19 +334,21 @@ def test_what_is_no_covariance_is_refused() -> None:
 def test_the_order_of_components_changes_nothing_but_rounding(
     a: Mixture, b: Mixture, rule: Rule, random: Random
 ) -> None:
-    stage = CovarianceIntersection(alpha=rule, merge_below=0.0, drop_below=0.0)
+    stage = CovarianceIntersection(alpha=rule)
     order = list(range(len(b[2])))
     random.shuffle(order)
-    here = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*b)).belief
-    there = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*(each[order] for each in b))).belief
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(f"{MODULE}.MERGE_BELOW", 0.0)
+        patch.setattr(f"{MODULE}.DROP_BELOW", 0.0)
+        here = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*b)).belief
+        there = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*(each[order] for each in b))).belief
     rows = [np.lexsort(np.round(each.means, 6).T) for each in (here, there)]
     assert there.weights[rows[1]].sum() == pytest.approx(here.weights[rows[0]].sum())
     assert sorted(there.weights) == pytest.approx(sorted(here.weights), rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("stage", "updates"),
-    [(CovarianceIntersection(), 10_000), (CovarianceIntersection(alpha="det_min", merge_below=0.5), 2_000)],
+    ("stage", "updates"), [(CovarianceIntersection(), 10_000), (CovarianceIntersection(alpha="det_min"), 2_000)]
 )
 def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and_weights_in_0_to_1(
     stage: CovarianceIntersection, updates: int
@@ -356,4 +367,4 @@ def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and
         assert abs(belief.weights.sum() - 1.0) < 1e-12
         most = max(most, len(belief))
     assert np.array_equal(belief.covariances, np.swapaxes(belief.covariances, 1, 2))
-    assert 1 < most <= stage.max_components
+    assert 1 < most <= 200

@@ -104,7 +104,7 @@ def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
 
 
 def test_the_number_follows_the_cells_the_belief_fills() -> None:
-    stage = ImportanceResampling(number=5000, min_particles=500, adapt="kld")
+    stage = ImportanceResampling(number=5000, adapt="kld")
     narrow = fuse(stage, belief(5000, spread=0.01), np.ones(5000))
     wide = fuse(stage, belief(5000, spread=5.0), np.ones(5000))
     assert len(narrow.poses) == 500
@@ -115,15 +115,13 @@ def test_the_number_follows_the_cells_the_belief_fills() -> None:
 def test_cells_are_as_high_in_heading_as_asked(monkeypatch: pytest.MonkeyPatch, width: float, number: int) -> None:
     poses = np.array([[0.1, 0.1, np.radians(turn)] for turn in (1.5, 3.5, 91.5, 93.5)])
     monkeypatch.setattr("omninav.stages.fusion.importance_resampling.CELL_DEG", width)
-    stage = ImportanceResampling(number=900, min_particles=1, adapt="kld")
+    monkeypatch.setattr("omninav.stages.fusion.importance_resampling.MIN_PARTICLES", 1)
+    stage = ImportanceResampling(number=900, adapt="kld")
     assert len(fuse(stage, Particles(poses, np.full(4, 0.25)), np.ones(4)).poses) == number
 
 
 def test_without_adaptation_the_number_stays_however_narrow_the_belief_is() -> None:
-    assert (
-        len(fuse(ImportanceResampling(number=800, min_particles=50), belief(800, spread=0.01), np.ones(800)).poses)
-        == 800
-    )
+    assert len(fuse(ImportanceResampling(number=800), belief(800, spread=0.01), np.ones(800)).poses) == 800
 
 
 def with_recovery(weight: float, kidnapping_probability: float, novelty: float = 1.0) -> Particles:

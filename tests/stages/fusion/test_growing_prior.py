@@ -8,6 +8,8 @@ from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
+MODULE = "omninav.stages.fusion.growing_prior"
+
 
 def context(first: bool = True) -> Context:
     ctx = Context("first_belief", np.random.default_rng(0))
@@ -92,12 +94,15 @@ PRIORS = [ParticlesInMap, MixtureInMap]
 
 @pytest.mark.parametrize("prior", PRIORS)
 @pytest.mark.parametrize("known", [True, False], ids=["in a map", "in no map"])
-def test_a_start_in_a_map_is_less_certain_than_one_that_begins_it(prior: type, known: bool) -> None:
+def test_a_start_in_a_map_is_less_certain_than_one_that_begins_it(
+    monkeypatch: pytest.MonkeyPatch, prior: type, known: bool
+) -> None:
+    monkeypatch.setattr(f"{MODULE}.INITIAL_SIGMA_M", 0.3)
+    monkeypatch.setattr(f"{MODULE}.INITIAL_SIGMA_DEG", 4.0)
     map = two_places() if known else ViewMixtures.empty()
     sigmas = (0.1, 0.1, 0.1) if known else (0.3, 0.3, np.radians(4.0))
     for at, place in (("origin", (0.0, 0.0, 0.0)), ("truth", (3.0, 4.0, 1.0))):
-        stage = prior(at=at, initial_sigma_m=0.3, initial_sigma_deg=4.0)
-        mean, spread = moments_of(stage, map, Pose(3.0, 4.0, 1.0))
+        mean, spread = moments_of(prior(at=at), map, Pose(3.0, 4.0, 1.0))
         assert mean == pytest.approx(place, abs=0.05)
         assert spread == pytest.approx(sigmas, rel=0.1)
 
@@ -120,13 +125,16 @@ def test_headings_of_a_start_are_within_half_a_turn(prior: type) -> None:
     assert pose.heading == pytest.approx(4.0 - 2 * np.pi, abs=0.01)
 
 
-def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_and_turns_any_way() -> None:
+def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_and_turns_any_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(f"{MODULE}.INITIAL_SIGMA_M", 0.2)
     map = ViewMixtures.empty()
     row = map.add_view(np.zeros(1, np.float32), "Coefficients")
     bent = np.diag([1e-6, 4e-6, 1e-6])
     bent[0, 2] = bent[2, 0] = bent[1, 2] = bent[2, 1] = 5e-7
     map.add_component(row, np.array([1.0, 2.0, 3.0]), bent, 0.5, 1.0)
-    belief = MixtureInMap(initial_sigma_m=0.2).step(context(), map, None).belief
+    belief = MixtureInMap().step(context(), map, None).belief
     assert belief is not None
     covariance = belief.covariances[0]
     assert covariance[:2, :2] == pytest.approx(np.eye(2) * 0.04)

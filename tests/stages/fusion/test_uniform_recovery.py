@@ -40,7 +40,7 @@ def test_the_others_are_drawn_by_weight_times_likelihood():
     # A Gaussian times a Gaussian likelihood: the posterior mean is worked by hand, (0 + 0.5 / 0.1^2) / (1 + 1 / 0.1^2).
     particles = belief(50_000)
     values = np.exp(-0.5 * ((particles.poses[:, 0] - 0.5) / 0.1) ** 2)
-    out, _ = fuse(UniformRecovery(random_particles=0), particles, values, None)
+    out, _ = fuse(UniformRecovery(), particles, values, None)
     assert len(out.poses) == 5000
     assert out.poses[:, 0].mean() == pytest.approx(50 / 101, abs=0.01)
     assert out.poses[:, 0].std() == pytest.approx((1 / 101) ** 0.5, rel=0.1)
@@ -48,7 +48,7 @@ def test_the_others_are_drawn_by_weight_times_likelihood():
 
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
 def test_a_view_that_nothing_explains_is_passed_over_and_told_of(values: np.ndarray):
-    out, ctx = fuse(UniformRecovery(number=1000, random_particles=0), belief(1000), values, None)
+    out, ctx = fuse(UniformRecovery(number=1000), belief(1000), values, None)
     assert np.allclose(np.sort(out.poses[:, 0]), np.sort(belief(1000).poses[:, 0]))
     assert ctx.counts["belief_without_support"] == 1
 
@@ -67,15 +67,9 @@ def test_proposals_are_drawn_by_their_weights():
 
 
 def test_all_samples_may_be_random():
-    out, _ = fuse(UniformRecovery(number=40, random_particles=50), belief(40), np.ones(40), anywhere())
+    out, _ = fuse(UniformRecovery(number=40), belief(40), np.ones(40), anywhere())
     assert len(out.poses) == 40
     assert (out.poses[:, 0] > 40).all()
-
-
-def test_proposals_that_are_not_asked_for_are_not_drawn():
-    out, _ = fuse(UniformRecovery(random_particles=0), belief(5000), np.ones(5000), anywhere())
-    assert len(out.poses) == 5000
-    assert (out.poses[:, 0] < 40).all()
 
 
 def test_without_proposals_none_is_random():
