@@ -25,6 +25,12 @@ MAX_VISUAL_DISTANCE = 0.5
 """Largest visual distance between a goal's image and its place: the paper's size of places."""
 MIN_PROBABILITY = 0.5
 """Smallest probability of the most probable place to plan from it."""
+SETTLE_S = 1.0
+"""Time for which the robot looks before it plans, even if it is sure, seconds."""
+LOCATE_TIMEOUT_S = 5.0
+"""Time after which it plans even if it is not sure, seconds."""
+MAX_FAILURES = 3
+"""Failures of a link after which it is closed."""
 
 
 class ShortestPathPlannerState(State):
@@ -71,15 +77,9 @@ class ShortestPathPlanner(Stage):
     it."""
     cost: Literal["links", "views"] = "links"
     """Cost of a link: one (the paper's), or as many as views have to be driven to."""
-    settle_s: Annotated[float, Bounds(ge=0)] = 1.0
-    """Time for which the robot looks before it plans, even if it is sure."""
-    locate_timeout_s: Annotated[float, Bounds(gt=0)] = 5.0
-    """Time after which it plans even if it is not sure."""
     search_s: Annotated[float, Bounds(ge=0)] = 15.0
     """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
     around (it stands, then wanders) before it plans; sure of another place, it plans at once."""
-    max_failures: Annotated[int, Bounds(ge=1)] = 3
-    """Failures of a link after which it is closed."""
     max_routes: Annotated[int, Bounds(ge=1)] = 20
     """Routes after which the planner gives up."""
 
@@ -150,24 +150,24 @@ class ShortestPathPlanner(Stage):
         if failing is not None and status is not None and status.state == "lost" and _same(state, failing).any():
             place, _ = _likeliest(belief.probabilities, state)
             elsewhere = place not in failing and belief.probabilities[place] >= MIN_PROBABILITY
-            return bool(elsewhere and waited_s >= self.settle_s) or waited_s >= self.search_s
-        sure = belief.probabilities.max() >= MIN_PROBABILITY and waited_s >= self.settle_s
-        return bool(sure) or waited_s >= self.locate_timeout_s
+            return bool(elsewhere and waited_s >= SETTLE_S) or waited_s >= self.search_s
+        sure = belief.probabilities.max() >= MIN_PROBABILITY and waited_s >= SETTLE_S
+        return bool(sure) or waited_s >= LOCATE_TIMEOUT_S
 
     def _plan(
         self, ctx: Context, state: ShortestPathPlannerState, probabilities: Array, goals: Ints, map: TopologicalMap
     ) -> ImagePath:
         place, missed = _likeliest(probabilities, state)
-        places = shortest_route(map, place, goals, self.cost, state.failed_links, state.failures, self.max_failures)
+        places = shortest_route(map, place, goals, self.cost, state.failed_links, state.failures)
         last = f"the last route ended because it was {state.why}"
         if state.blocked and not state.why.startswith("blocked"):
             last = f"it was blocked: {state.blocked}; {last}"
         if state.planned >= self.max_routes:
             return _given_up(state, f"{self.max_routes} routes were tried; {last}")
         if not len(places):
-            closed = state.failed_links[state.failures >= self.max_failures].tolist()
+            closed = state.failed_links[state.failures >= MAX_FAILURES].tolist()
             shut = ", ".join(f"{one} to {other}" for one, other in closed if one != other)
-            why = f" but what could not be driven {self.max_failures} times, from place {shut}; {last}" if shut else ""
+            why = f" but what could not be driven {MAX_FAILURES} times, from place {shut}; {last}" if shut else ""
             return _given_up(state, f"no route leads from place {place} to {self.goal}{why}")
         views, ends = map.views_along(places)
         if missed % 2 and len(places) > 1:
@@ -216,12 +216,11 @@ def shortest_route(
     cost: Literal["links", "views"],
     failed_links: Ints,
     failures: Ints,
-    max_failures: int,
 ) -> Ints:
     """The places from `place` to the nearest of `goals` (G,), both included: (K,); none where no route is left.
 
     `failed_links` (F, 2): pairs of places between which it has failed to drive, `failures` (F,) times: any route around
-    them is preferred, and those that failed `max_failures` times are closed. Equally short routes: that of lower
+    them is preferred, and those that failed `MAX_FAILURES` times are closed. Equally short routes: that of lower
     numbers.
     """
     graph = networkx.Graph()
@@ -229,7 +228,7 @@ def shortest_route(
     failed = {frozenset(pair): number for pair, number in zip(failed_links.tolist(), failures.tolist(), strict=True)}
     for link, (one, other) in enumerate(map.links.tolist()):
         missed = failed.get(frozenset((one, other)), 0)
-        if one != other and missed < max_failures:
+        if one != other and missed < MAX_FAILURES:
             price = (1 if cost == "links" else 1 + len(map.path_of(link))) + missed * len(map.views)
             known = graph.edges[one, other]["price"] if graph.has_edge(one, other) else price
             graph.add_edge(one, other, price=min(price, known))

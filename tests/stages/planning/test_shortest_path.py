@@ -22,8 +22,14 @@ from omninav.stages.values.visual_distance import VisualDistances
 
 # 0 - 1 - 2 - 3 in a row, 3 and 0 are neighbours by a loop, 4 hangs on 2 (driven from 4 to 2), 5 is on its own
 BETWEEN = {(0, 1): 1, (1, 2): 0, (2, 3): 4, (4, 2): 2}
-OPEN = {"failed_links": np.zeros((0, 2), np.int64), "failures": np.zeros(0, np.int64), "max_failures": 3}
+OPEN = {"failed_links": np.zeros((0, 2), np.int64), "failures": np.zeros(0, np.int64)}
 TICKS = itertools.count()
+MODULE = "omninav.stages.planning.shortest_path"
+
+
+@pytest.fixture(autouse=True)
+def plans_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.0)
 
 
 def a_map() -> TopologicalMap:
@@ -101,7 +107,7 @@ def distances(*values: float) -> VisualDistances:
 
 
 def test_a_picture_is_of_the_place_that_looks_most_like_it():
-    stage = ShortestPathPlanner(goal="there.png", settle_s=0.0)
+    stage = ShortestPathPlanner(goal="there.png")
     told = distances(0.4, np.inf, 0.2, 0.3, 0.5, np.inf)
     out = stage.step(Context("planning"), ShortestPathPlannerState(), Tick(0, 0), believed(0), a_map(), told)
     assert out.route.places.tolist() == [0, 1, 2]
@@ -114,8 +120,10 @@ def test_a_picture_of_no_place_is_refused_with_the_nearest():
         place_in_image("there.png", distances(*[np.inf] * 6), 0.5, a_map())
 
 
-def test_it_plans_once_it_is_sure_and_not_again():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.2, locate_timeout_s=1.0), ShortestPathPlannerState()
+def test_it_plans_once_it_is_sure_and_not_again(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
+    monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 1.0)
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     first = drive(stage, state, 1, share=0.4)
     assert first.path is None
     assert first.route.state == "locating"
@@ -128,19 +136,21 @@ def test_it_plans_once_it_is_sure_and_not_again():
     assert again.route.state == "under way"
 
 
-def test_even_if_it_is_sure_it_looks_for_a_moment():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.6), ShortestPathPlannerState()
+def test_even_if_it_is_sure_it_looks_for_a_moment(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.6)
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     assert [drive(stage, state, 1).path is not None for _ in range(4)] == [False, False, False, True]
 
 
-def test_who_looks_long_enough_goes_by_the_most_probable_place():
-    stage, state = ShortestPathPlanner(goal=3, locate_timeout_s=0.6), ShortestPathPlannerState()
+def test_who_looks_long_enough_goes_by_the_most_probable_place(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 0.6)
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     planned = [drive(stage, state, 2, share=0.3).path is not None for _ in range(4)]
     assert planned == [False, False, False, True]
 
 
 def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     drive(stage, state, 1)
     out = drive(stage, state, 2, "lost", at=1)
     assert out.path is not None
@@ -148,8 +158,9 @@ def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
     assert out.route.places.tolist() == [2, 3]
 
 
-def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.4), ShortestPathPlannerState()
+def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.4)
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     for _ in range(3):
         drive(stage, state, 1)
     waiting = drive(stage, state, 1, "lost", at=1)
@@ -159,7 +170,7 @@ def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is():
 
 
 def test_around_a_link_that_failed_there_may_be_another_way():
-    stage, state = ShortestPathPlanner(goal="hall", settle_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal="hall"), ShortestPathPlannerState()
     assert drive(stage, state, 2).route.places.tolist() == [2, 1, 0]
     out = drive(stage, state, 1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
     assert state.failed_links.tolist() == [[1, 0]]
@@ -167,7 +178,7 @@ def test_around_a_link_that_failed_there_may_be_another_way():
 
 
 def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_stands():
-    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, max_failures=3), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=4), ShortestPathPlannerState()
     tried = [drive(stage, state, 2).route.places.tolist()]
     for _ in range(2):
         tried.append(drive(stage, state, 2, "blocked", at=1).route.places.tolist())
@@ -184,7 +195,7 @@ def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_st
 
 
 def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from_there_begin_behind_it():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0, search_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3, search_s=0.0), ShortestPathPlannerState()
     drive(stage, state, 1)
     out = drive(stage, state, 1, "lost", at=0)
     assert state.failed_links.tolist() == [[1, 1]]
@@ -202,8 +213,9 @@ def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from
     assert found.route.places.tolist() == [2, 3]  # 0.3 against half of 0.5
 
 
-def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_place():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.2, search_s=2.0), ShortestPathPlannerState()
+def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_place(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
+    stage, state = ShortestPathPlanner(goal=3, search_s=2.0), ShortestPathPlannerState()
     planned = [drive(stage, state, 1).path is not None for _ in range(2)]
     planned += [drive(stage, state, 1, "lost", at=0).path is not None for _ in range(2)]
     assert planned == [False, True, False, True]  # the second begins behind the medoid
@@ -214,8 +226,9 @@ def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_pl
     assert state.failures.tolist() == [2]
 
 
-def test_sure_of_another_place_it_looks_around_no_longer():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.2, search_s=2.0), ShortestPathPlannerState()
+def test_sure_of_another_place_it_looks_around_no_longer(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
+    stage, state = ShortestPathPlanner(goal=3, search_s=2.0), ShortestPathPlannerState()
     for _ in range(2):
         drive(stage, state, 1)
     for _ in range(3):
@@ -227,7 +240,7 @@ def test_sure_of_another_place_it_looks_around_no_longer():
 
 
 def test_lost_again_on_the_same_link_it_looks_around_too():
-    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, search_s=1.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=4, search_s=1.0), ShortestPathPlannerState()
     drive(stage, state, 2)
     assert drive(stage, state, 2, "lost", at=1).path is not None
     planned = [drive(stage, state, 2, "lost", at=1).path is not None for _ in range(6)]
@@ -237,15 +250,16 @@ def test_lost_again_on_the_same_link_it_looks_around_too():
 
 
 def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
     drive(stage, state, 1)
     drive(stage, state, 1, "lost", at=0)
     drive(stage, state, 1, "driving", at=1)
     assert not len(state.failed_links)
 
 
-def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost():
-    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, search_s=0.0, max_failures=2), ShortestPathPlannerState()
+def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.MAX_FAILURES", 2)
+    stage, state = ShortestPathPlanner(goal=4, search_s=0.0), ShortestPathPlannerState()
     drive(stage, state, 2)
     drive(stage, state, 2, "blocked", at=1)
     last = drive(stage, state, 2, "lost", at=1)
@@ -253,14 +267,14 @@ def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost():
 
 
 def test_it_arrives_and_stays():
-    stage, state = ShortestPathPlanner(goal=0, settle_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=0), ShortestPathPlannerState()
     drive(stage, state, 1)
     assert drive(stage, state, 0, "arrived", at=2, arrived=True).route.state == "arrived"
     assert drive(stage, state, 4).route.state == "arrived"
 
 
 def test_after_so_many_ways_it_gives_up_and_says_why():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0, search_s=0.0, max_routes=2), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3, search_s=0.0, max_routes=2), ShortestPathPlannerState()
     drive(stage, state, 1)
     drive(stage, state, 1, "lost", at=0)
     out = drive(stage, state, 1, "lost", at=0)
