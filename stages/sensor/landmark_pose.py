@@ -21,6 +21,8 @@ from omninav.stages.values.visual_words import VisualWords
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+WORD_REFERENCES = 10
+"""References that share most words with the image, whose landmarks are looked for."""
 WORD_FEATURES = 250
 """Strongest features by whose words an image is looked up: all 500 find no more images, and take 2 ms longer."""
 BELIEF_SAMPLES = 5
@@ -53,8 +55,6 @@ class LandmarkPose(Stage):
     landmarks. Raises BadInput for features of another kind than the map's.
     """
 
-    word_references: Annotated[int, Bounds(ge=1)] = 10
-    """References that share most words with the image, whose landmarks are looked for."""
     min_inliers: Annotated[int, Bounds(ge=4)] = 8
     """Landmarks that must agree on a pose; few ones count where the belief expects them."""
 
@@ -110,7 +110,7 @@ class LandmarkPose(Stage):
         self, features: LocalFeatures, words: VisualWords, map: ReferenceGraph, near: Particles | None
     ) -> Ints:
         similarities = words.similarities(features.descriptors[:WORD_FEATURES])
-        best = np.argsort(-similarities, kind="stable")[: self.word_references if similarities.any() else 0]
+        best = np.argsort(-similarities, kind="stable")[: WORD_REFERENCES if similarities.any() else 0]
         if near is None:
             return best
         places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -21,23 +21,26 @@ from .calibrated_similarity import likelihood_ratios
 from .compared_rows import ComparedRows
 from .near_references import similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
-from .visibility_similarity import CUTOFF_SIGMAS, Window, mean_seen, sums_by_turn
+from .visibility_similarity import CUTOFF_SIGMAS, mean_seen, sums_by_turn
 
 Array = npt.NDArray[np.float64]
 
 BACKGROUND_WEIGHT = math.exp(-0.5)
 """Weight of what is not known, with a `calibration`: as much as a view taken one sigma away."""
+WINDOW_DEG = 5.0
+"""Largest deviation of the heading from a view's point with a forward-looking camera, degrees; 5 in the paper."""
 
 
 class Visibility(Stage):
     """Weights particles by the mean similarity of the views whose visibility areas they lie in.
 
     Wolf, Burgard & Burkhardt 2005, section V, equations 6 to 8. With a forward-looking camera the particle's heading
-    must also deviate from the direction to the view's point lambda by at most `window_deg`. Where no view is left
+    must also deviate from the direction to the view's point lambda by at most `WINDOW_DEG`. Where no view is left
     (K = 0) the likelihood is the mean similarity to the whole database (erratum 44 in docs/papers.md).
 
-    A panoramic camera sees lambda with any heading: there a view is compared at the turn at which the robot sees
-    lambda, which differs from the turn of its heading by the parallax of its motion.
+    A panoramic camera, with which the match compares several headings, sees lambda with any heading: there a view is
+    compared at the turn at which the robot sees lambda, which differs from the turn of its heading by the parallax of
+    its motion.
 
     Similarities hardly differ between places (erratum 45), and so do their means: they may be raised to a `power`
     before they are averaged. Defaults: docs/experiments/retrieval_mcl_defaults.md. With a `calibration`
@@ -46,12 +49,6 @@ class Visibility(Stage):
     docs/experiments/retrieval_mcl_calibrated.md. Raises BadInput where areas and map do not belong together.
     """
 
-    field_of_view: Literal["auto", "forward", "panoramic"] = "auto"
-    """Field of view of the camera; `auto`: panoramic where the match compares several headings."""
-    window_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
-    """Deviation of the heading from a view's point with a forward-looking camera; 5 degrees in the paper."""
-    window_shape: Window = "step"
-    """Fall of the weight over the window: step, triangle, or gaussian (the window is its sigma)."""
     distance_sigma_m: Annotated[float, Bounds(gt=0)] | None = 1.0
     """Sigma of the Gaussian by which a view's weight falls with the distance from where it was taken; null: all views
     of the area weigh the same, as in the paper. Not in length scales, which differ between cameras in one place."""
@@ -108,11 +105,11 @@ class Visibility(Stage):
         raised, floor = self._raised(similarities, calibration)
         background_level = float(np.average(raised.mean(axis=1), weights=each))
         background_weight = BACKGROUND_WEIGHT if calibration is not None and sigma < math.inf else 0.0
-        panoramic = values.shape[1] > 1 if self.field_of_view == "auto" else self.field_of_view == "panoramic"
+        panoramic = values.shape[1] > 1
         groups = None if similarities.candidates is None else self._looks.groups_with(compared)
         groups, summed = self._summed.of(groups)
         sums, number = sums_by_turn(self._looks, groups, rows, raised if panoramic else raised[:, :1], each)
-        window = None if panoramic else math.radians(self.window_deg), self.window_shape, sigma
+        window = None if panoramic else math.radians(WINDOW_DEG), sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
         unit = metres_of(length_scale)

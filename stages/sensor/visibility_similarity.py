@@ -1,7 +1,7 @@
 """Mean similarity of the views whose visibility areas hold a pose."""
 
 import math
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,7 @@ from .visibility_index import Array, Cells, Ints, Looks, Numbers, Shorts
 
 Floats = npt.NDArray[np.float32]
 Single = np.floating[Any]
-Window = Literal["step", "triangle", "gaussian"]
 
-WINDOW_SHAPES: dict[Window, int] = {"step": 0, "triangle": 1, "gaussian": 2}
 CUTOFF_SIGMAS = 3.0
 """Standard deviations beyond which a Gaussian is 0."""
 ARC_TANGENT = (0.1590383972660733, -0.05115725038296156, 0.023334547989038373, -0.0062283931965400755)
@@ -72,7 +70,6 @@ def mean_seen(
     number: Floats,
     background_level: float,
     window: float | None = None,
-    shape: Window = "step",
     distance_sigma_m: float = math.inf,
     background_weight: float = 0.0,
 ) -> Array:
@@ -80,19 +77,18 @@ def mean_seen(
 
     `sums` and `number` as `sums_by_turn` gives them, `summed` (G,): each group's row in them, -1 where it has none.
     With a `window` robots look ahead: psi is the angle between the heading and the direction to a point, wrapped to
-    [-pi, pi) (erratum 44 in docs/papers.md); d(psi) is 1 up to `window` radians and 0 beyond (`step`, the paper's),
-    falls to 0 there (`triangle`), or has it as standard deviation (`gaussian`). Without one they see all around, and
-    look up their turn relative to each point. p(M_j | l) of equation 6 falls with the distance d to where a group was
-    taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an infinite sigma it is the paper's.
+    [-pi, pi) (erratum 44 in docs/papers.md); d(psi) is 1 up to `window` radians and 0 beyond. Without one they see all
+    around, and look up their turn relative to each point. p(M_j | l) of equation 6 falls with the distance d to where a
+    group was taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an infinite sigma it is the
+    paper's.
     `background_level`: the result where K = 0; where K > 0 it counts as much as `background_weight` of a view.
     """
-    farthest = math.pi if window is None else min(CUTOFF_SIGMAS * window if shape == "gaussian" else window, math.pi)
-    min_cosine = math.cos(farthest) if farthest < math.pi else -2.0
-    ahead = window is not None, window or math.pi, min_cosine, WINDOW_SHAPES[shape]
+    ahead = window is not None
+    min_cosine = math.cos(window) if window is not None and window < math.pi else -2.0
     # fmt: off
     return _seen(
         np.ascontiguousarray(poses), *cells, summed, sums, number, background_level, background_weight,
-        distance_sigma_m, *ahead,
+        distance_sigma_m, ahead, min_cosine,
     )
     # fmt: on
 
@@ -115,9 +111,7 @@ def _seen(
     background_weight: float,
     distance_sigma_m: float,
     ahead: bool,
-    window: float,
     min_cosine: float,
-    shape: int,
 ) -> Array:
     # Single precision, from the grid's corner, and one plain loop for each thing to work out: vector instructions.
     headings = np.float32(sums.shape[1] - 1)
@@ -153,10 +147,6 @@ def _seen(
             weight[k] = _gaussian(weight[k])
         if not ahead:
             _turned_past(right, up, turn, many, headings, whole, part)
-        elif shape:
-            for k in range(many):
-                aside = math.atan2(up[k] * cosine - right[k] * sine, right[k] * cosine + up[k] * sine) / window
-                weight[k] *= 1.0 - abs(aside) if shape == 1 else _gaussian(np.float32(aside * aside))
         total, mass = np.float32(background_weight * background_level), np.float32(background_weight)
         for k in range(many):
             g = kept[k]

@@ -5,13 +5,14 @@ import pytest
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.run.plan import plan
 from omninav.stages.features.haar_integral import Binning
+from omninav.stages.features.hsv_histogram import HUE_BINS
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
-from omninav.stages.fusion.uniform_recovery import UniformRecovery
+from omninav.stages.fusion.uniform_recovery import RANDOM_PARTICLES, UniformRecovery
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation
 from omninav.stages.sensor.free_space_proposals import FreeSpaceProposals
-from omninav.stages.sensor.visibility import Visibility
+from omninav.stages.sensor.visibility import WINDOW_DEG, Visibility
 from omninav.stages.unwarp.window import PerspectiveWindow
 
 
@@ -37,7 +38,7 @@ def test_gross_and_koenig(printed):
     assert type(sensor) is ExpectedObservation
     assert "calibration" not in wired(graph, "sensor")
     assert type(match) is SelectiveMatch
-    assert (match.penalty, stages["features"].hue_bins, stages["features"].value_bins) == ("sqrt", 16, 4)
+    assert (match.penalty, HUE_BINS, stages["features"].value_bins) == ("sqrt", 16, 4)
     # The weight is a fixed power of S: no contrast of the image's own, no fade with distance, no floor.
     assert (sensor.power, sensor.fade_distance, sensor.background_quantile) == (4.0, None, None)
     # Each image is evidence.
@@ -63,11 +64,11 @@ def test_wolf_burgard_and_burkhardt(printed):
     # Equations 7 and 8: the mean of the similarities as they are, over all views of an area alike, within 5 degrees.
     assert type(sensor) is Visibility
     assert (sensor.distance_sigma_m, sensor.power, sensor.independence_distance) == (None, 1.0, 0.0)
-    assert (sensor.window_deg, sensor.window_shape, sensor.retrieval) == (5.0, "step", True)
+    assert (WINDOW_DEG, sensor.retrieval) == (5.0, True)
     assert "calibration" not in wired(graph, "sensor")
     # Section VI-C: 50 of 5000 samples are drawn anew, anywhere in free space.
     assert type(fusion) is UniformRecovery
-    assert (fusion.number, fusion.random_particles, stages["prior"].number) == (5000, 50, 5000)
+    assert (fusion.number, RANDOM_PARTICLES, stages["prior"].number) == (5000, 50, 5000)
     assert type(stages["proposals"]) is FreeSpaceProposals
     assert "area" in wired(graph, "prior")
     # Section IV: several kernels, of sizes up to twice their own; products without a root.

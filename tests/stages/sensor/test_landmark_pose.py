@@ -65,7 +65,8 @@ def test_a_mirrored_image_and_one_of_another_room_have_no_pose() -> None:
     assert fix(replace(features, descriptors=looks)) is None
 
 
-def test_two_places_that_look_the_same_are_rivals() -> None:
+def test_two_places_that_look_the_same_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", 30)
     one = np.random.default_rng(2).uniform([0, 0, 0], [8, 6, 2.2], (500, 3))
     points = Points(np.concatenate([one, one + AWAY]), np.tile(np.arange(500), 2))
     points.looks[500::2] = np.random.default_rng(3).integers(0, 100, (250, 128))  # every other one differs
@@ -75,7 +76,7 @@ def test_two_places_that_look_the_same_are_rivals() -> None:
     other = seen_from(points, FIRST + AWAY)
     half = np.arange(len(features)) % 2 == 0
     mixed = replace(features, descriptors=np.where(half[:, None], features.descriptors, other.descriptors))
-    found = fix(mixed, map, word_references=30)
+    found = fix(mixed, map)
     assert len(found) == 2
     assert sorted(found.poses[:, 0]) == pytest.approx([FIRST[0], FIRST[0] + 40.0], abs=1e-2)
     assert found.inliers[0] >= found.inliers[1] >= 12
