@@ -16,6 +16,9 @@ Array = npt.NDArray[np.float64]
 
 Gain = Annotated[float, Bounds(gt=0, le=10)]
 
+DIRECTION_DEG = 90.0
+"""Direction that light from one side comes from, degrees counter-clockwise from forward."""
+
 
 def changed_light(
     pixels: Pixels, gamma: float, gains: tuple[float, float, float], side: float, direction: float, azimuths: Array
@@ -47,9 +50,7 @@ class ChangedLight(Stage):
     red: Gain = 1.0
     """Factor of red: above 1 with warm lamps."""
     side: Annotated[float, Bounds(ge=0, le=1)] = 0.0
-    """Share by which light from one side exceeds the mean."""
-    direction_deg: Annotated[float, Bounds(ge=-360, le=360)] = 90.0
-    """Direction it comes from, counter-clockwise from forward."""
+    """Share by which light from the left exceeds the mean."""
 
     class Out(Outputs):
         """The input in other light."""
@@ -82,7 +83,7 @@ class ChangedLight(Stage):
 
     def _changed(self, pixels: Pixels, azimuths: Array) -> Pixels:
         gains = (self.gain * self.blue, self.gain, self.gain * self.red)
-        return changed_light(pixels, self.gamma, gains, self.side, math.radians(self.direction_deg), azimuths)
+        return changed_light(pixels, self.gamma, gains, self.side, math.radians(DIRECTION_DEG), azimuths)
 
 
 @lru_cache(1)  # of a drive's one camera

@@ -11,6 +11,8 @@ from omninav.stages.values.image import Panorama
 Mask = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
 
+PATTERN = 0
+"""Number from which, with the frame's, parts and noise follow: all repetitions see the same images."""
 WIDTH_DEG = 40.0
 """Mean width of a segment, degrees."""
 MEAN = 128.0
@@ -75,9 +77,6 @@ class ColourNoise(Stage):
     """Share of the image that is covered."""
     shape: Literal["sectors", "rectangles"] = "sectors"
     """`sectors`: over the full height, like people close to the camera, and as the paper uses the word segment."""
-    pattern: Annotated[int, Bounds(ge=0)] | None = 0
-    """Number from which, with the frame's, parts and noise follow: all repetitions see the same images. null: they
-    follow from the run's seed."""
 
     class Out(Outputs):
         """The panorama, covered in part."""
@@ -89,7 +88,7 @@ class ColourNoise(Stage):
         if self.share == 0.0:
             return self.Out(panorama=panorama)
         tick = ctx.tick
-        rng = ctx.rng if self.pattern is None else np.random.default_rng([self.pattern, tick.log, tick.frame])
+        rng = np.random.default_rng([PATTERN, tick.log, tick.frame])
         rows, columns = panorama.pixels.shape[:2]
         shape = sectors if self.shape == "sectors" else rectangles
         mask = shape(rng, rows, columns, self.share, WIDTH_DEG / 360.0)

@@ -23,7 +23,7 @@ def test_gamma_gain_and_colour():
 
 
 def test_light_from_the_left_is_brightest_there():
-    view = ChangedLight(side=0.5, direction_deg=90).step(CTX, Panorama(GREY)).panorama.pixels[0, :, 0]
+    view = ChangedLight(side=0.5).step(CTX, Panorama(GREY)).panorama.pixels[0, :, 0]
     assert abs(int(view.argmax()) - 90) <= 12  # columns run clockwise from behind, so the left is a quarter in
     assert view.max() == 150
     assert view.min() == 50
@@ -31,7 +31,7 @@ def test_light_from_the_left_is_brightest_there():
 
 def test_an_image_is_lit_as_its_camera_looks():
     forward_left = Equirectangular(360, 4, 0.0, sense="counter_clockwise", elevation_top=0.1, elevation_bottom=-0.1)
-    view = ChangedLight(side=0.5, direction_deg=90).step(CTX, image=Image(GREY), camera=forward_left).image.pixels
+    view = ChangedLight(side=0.5).step(CTX, image=Image(GREY), camera=forward_left).image.pixels
     assert abs(int(view[0, :, 0].argmax()) - 90) <= 12
     with pytest.raises(BadInput, match="an image needs its camera"):
         ChangedLight().step(CTX, image=Image(GREY))

@@ -50,13 +50,6 @@ def test_the_pattern_follows_the_frame_and_not_the_seed():
     stage = ColourNoise(share=0.4)
     assert (covered(stage, 3, seed=1) == covered(stage, 3, seed=2)).all()
     assert (covered(stage, 3) != covered(stage, 4)).any()
-    assert (covered(ColourNoise(share=0.4, pattern=1), 3) != covered(stage, 3)).any()
-
-
-def test_without_a_pattern_it_follows_the_seed():
-    stage = ColourNoise(share=0.4, pattern=None)
-    assert (covered(stage, 3, seed=1) != covered(stage, 3, seed=2)).any()
-    assert (covered(stage, 3, seed=1) == covered(stage, 3, seed=1)).all()
 
 
 def test_noise_has_the_mean_and_spread_asked_for_and_the_rest_is_untouched(monkeypatch: pytest.MonkeyPatch):
