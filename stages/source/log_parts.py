@@ -14,6 +14,8 @@ from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
 
 Array = npt.NDArray[np.float64]
+NEW_LOG_AFTER_S = 3600.0
+"""Longest pause within a log, seconds: a longer one begins another, since several days may lie in one file."""
 OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 
@@ -26,7 +28,6 @@ class Selection:
     stride: int
     cuts: Sequence[Cut]
     rate_hz: float | None
-    new_log_after_s: float
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def parts_of(recording: Recording, truth: Array | None, selection: Selection, gu
     if isinstance(recording, LiveRecording):
         ends = steps <= 0  # its run went on after pauses, and not where its clock was set back
     else:
-        ends = (steps > selection.new_log_after_s * 1e9) & ~crossed(cuts, frames)
+        ends = (steps > NEW_LOG_AFTER_S * 1e9) & ~crossed(cuts, frames)
     kind = _odometry_kind(recording, truth, guess)
     return [LogPart(recording, part, driven, truth, kind) for part in np.split(frames, np.flatnonzero(ends) + 1)]
 

@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 FROM_TOUR = "from_tour"
+CLEARANCE_M = 0.2
+"""Least distance of free space from anything occupied, metres."""
 PATH_HALF_WIDTH = 2.0
 """Distance from the path up to which a stand-in is free, in length scales of the appearance."""
 
@@ -41,8 +43,6 @@ class OccupancyGridLoader(Stage):
     """The log that is driven: its grid is not known, unless `grid` names it."""
     tour: str | tuple[str, ...] | None = None
     """The log that the map was made from; grids beside it are suggested."""
-    clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
-    """Least distance of free space from anything occupied."""
 
     class Out(Outputs):
         """`grid`, and `free`: where the robot may be."""
@@ -84,21 +84,23 @@ class OccupancyGridLoader(Stage):
             grid = known
         else:
             raise BadInput(f"grid: none is named; give grid=FOLDER/map.yaml (of ROS map_server), or grid={FROM_TOUR}")
-        clearance = 0.0 if grid.made_from == "tour" else self.clearance_m
+        clearance = 0.0 if grid.made_from == "tour" else CLEARANCE_M
         space = free_space(grid, clearance, None if map is None else map.poses)
         if space is None:
             ctx.count("references_off_the_free_space", detail="grid: no reference lies in free cells; all are kept")
             space = free_space(grid, clearance, None)
         if space is None:
-            raise BadInput(f"grid: no cell is free and {clearance:g} m from obstacles; use a smaller clearance_m")
+            raise BadInput(
+                f"grid: no cell is free and {clearance:g} m from obstacles; give a grid in which a robot has room"
+            )
         return self.Out(grid=grid, free=space)
 
     def _read(self, file: Path) -> OccupancyGrid:
         """The grid in a file. Raises BadInput also where it leaves a robot no room."""
         grid = coarser(read_occupancy(file), self.resolution_m)
-        if free_space(grid, self.clearance_m, None) is None:
+        if free_space(grid, CLEARANCE_M, None) is None:
             raise BadInput(
-                f"{file}: no cell is free and {self.clearance_m:g} m from obstacles; use a smaller clearance_m"
+                f"{file}: no cell is free and {CLEARANCE_M:g} m from obstacles; give a grid in which a robot has room"
             )
         return grid
 

@@ -71,8 +71,6 @@ class Playback(Source, ABC):
     through, and odometry has not noticed."""
     rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] | None = None
     """Images per second that are used at most; of a folder of images without times, how many were taken. Null: all."""
-    new_log_after_s: Annotated[float, Bounds(gt=0)] = 3600.0
-    """A longer pause begins another log: several days may lie in one file."""
 
     class Out(DriveOutputs):
         """Inputs known at an image."""
@@ -200,7 +198,7 @@ class Playback(Source, ABC):
         if getattr(self, "_opened", None) is not None:
             return
         recordings = self.recordings()
-        selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz, self.new_log_after_s)
+        selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz)
         self._parts: list[LogPart] = []
         self._doubts: list[str] = []
         for recording in recordings:

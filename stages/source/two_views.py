@@ -11,6 +11,8 @@ from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 PAIRS = 100
 """Pairs of bearings per problem."""
+OUTLIER_RATIO = 0.5
+"""Share of the bearings of view 2 that look anywhere on their part of the sphere instead."""
 
 
 class TwoViewsState(State):
@@ -37,8 +39,6 @@ class TwoViews(Source):
     """Largest distance of a point from view 1, in baselines."""
     planar: bool = True
     """View 2 is a robot's that drove on a floor; else it was taken anywhere, turned anyhow."""
-    outlier_ratio: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
-    """Share of the bearings of view 2 that look anywhere on that part of the sphere instead."""
 
     class Out(Outputs):
         """`pairs`: the problem. `truth`: its answer; inliers are the pairs that are not wrong."""
@@ -66,7 +66,7 @@ class TwoViews(Source):
         distance = rng.uniform(self.min_distance, self.max_distance, (PAIRS, 1))
         points = distance * self._directions(rng, PAIRS, self.max_elevation_deg)
         first, second = self._seen(rng, points), self._seen(rng, (points - translation) @ rotation)
-        right = np.arange(PAIRS) >= round(self.outlier_ratio * PAIRS)
+        right = np.arange(PAIRS) >= round(OUTLIER_RATIO * PAIRS)
         second[~right] = self._directions(rng, PAIRS - int(right.sum()), self.max_elevation_deg)
         return self.Out(
             tick=Tick(index=index, stamp=index * 10**9, frame=index, first_of_log=index == 0),

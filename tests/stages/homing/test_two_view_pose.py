@@ -23,8 +23,11 @@ def problems(seed: int = 0, **how) -> list[TwoViews.Out]:
 
 
 @pytest.mark.parametrize("planar", [True, False])
-def test_pairs_that_are_not_wrong_fit_the_true_pose_and_the_others_do_not(planar: bool) -> None:
-    made = problems(problems=3, planar=planar, noise_deg=0.0, outlier_ratio=0.3)
+def test_pairs_that_are_not_wrong_fit_the_true_pose_and_the_others_do_not(
+    monkeypatch: pytest.MonkeyPatch, planar: bool
+) -> None:
+    monkeypatch.setattr("omninav.stages.source.two_views.OUTLIER_RATIO", 0.3)
+    made = problems(problems=3, planar=planar, noise_deg=0.0)
     assert [out.tick.index for out in made] == [0, 1, 2]
     for out in made:
         truth, pairs = out.truth, out.pairs
@@ -50,11 +53,14 @@ def test_every_problem_of_a_robot_on_a_floor_is_solved() -> None:
     assert metrics["rotation_error_deg"]["p95"] < 0.4
 
 
-def test_generate_and_select_solves_what_has_few_wrong_pairs_and_not_what_has_many() -> None:
+def test_generate_and_select_solves_what_has_few_wrong_pairs_and_not_what_has_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     shares = {}
     for wrong in (0.0, 0.05, 0.5):
         right = []
-        for out in problems(problems=10, planar=False, noise_deg=0.05, outlier_ratio=wrong):
+        monkeypatch.setattr("omninav.stages.source.two_views.OUTLIER_RATIO", wrong)
+        for out in problems(problems=10, planar=False, noise_deg=0.05):
             view = TwoViewPose(solver="generate_and_select").step(Context("pose"), out.pairs).view
             assert view is not None
             right.append(float(view.translation @ out.truth.translation) > math.cos(math.radians(3.0)))

@@ -119,16 +119,18 @@ def test_a_grid_that_leaves_no_room_is_refused_before_anything_runs(tmp_path):
         OccupancyGridLoader(grid=str(written(tmp_path, [[0, 0]]))).inputs_digest()
 
 
-def test_another_image_is_another_grid(tmp_path):
+def test_another_image_is_another_grid(tmp_path, monkeypatch):
+    monkeypatch.setattr("omninav.stages.source.occupancy_grid_loader.CLEARANCE_M", 0.0)
     file = written(tmp_path, [[254, 254]])
-    first = OccupancyGridLoader(grid=str(file), clearance_m=0.0).inputs_digest()
+    first = OccupancyGridLoader(grid=str(file)).inputs_digest()
     written(tmp_path, [[254, 0]])
-    assert OccupancyGridLoader(grid=str(file), clearance_m=0.0).inputs_digest() != first
+    assert OccupancyGridLoader(grid=str(file)).inputs_digest() != first
 
 
-def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path):
+def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path, monkeypatch):
+    monkeypatch.setattr("omninav.stages.source.occupancy_grid_loader.CLEARANCE_M", 0.0)
     file = written(tmp_path, [[254] * 8] * 6)
-    stage = OccupancyGridLoader(grid=str(tmp_path), log="drive.mcap", resolution_m=1.0, clearance_m=0.0)
+    stage = OccupancyGridLoader(grid=str(tmp_path), log="drive.mcap", resolution_m=1.0)
     out = stage.step(CTX)
     assert out.grid.cells.shape == (3, 4)
     assert len(out.free.centres) == 12
@@ -218,10 +220,11 @@ def test_a_stand_in_without_a_map_is_refused():
         OccupancyGridLoader(grid="from_tour").step(CTX)
 
 
-def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path):
+def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path, monkeypatch):
+    monkeypatch.setattr("omninav.stages.source.occupancy_grid_loader.CLEARANCE_M", 0.0)
     ctx = Context("grid")
     written(tmp_path, [[254] * 4] * 4)
-    out = OccupancyGridLoader(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, map=a_map((50.0, 50.0)))
+    out = OccupancyGridLoader(grid=str(tmp_path), resolution_m=0.5).step(ctx, map=a_map((50.0, 50.0)))
     assert len(out.free.centres) == 16
     assert ctx.counts["references_off_the_free_space"] == 1
 

@@ -211,12 +211,12 @@ def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path
         np.testing.assert_allclose(pose, row(out.odometry), atol=1e-12)
 
 
-def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path) -> None:
+def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
-    assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),), new_log_after_s=1.0))] == [0] * (
-        FRAMES - 3
-    )
-    assert drive(LogSource(log=log, new_log_after_s=0.1))[-1].tick.log == FRAMES - 1
+    monkeypatch.setattr("omninav.stages.source.log_parts.NEW_LOG_AFTER_S", 1.0)
+    assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),)))] == [0] * (FRAMES - 3)
+    monkeypatch.setattr("omninav.stages.source.log_parts.NEW_LOG_AFTER_S", 0.1)
+    assert drive(LogSource(log=log))[-1].tick.log == FRAMES - 1
 
 
 def test_made_up_odometry_does_not_notice_a_splice_either(tmp_path: Path) -> None:
