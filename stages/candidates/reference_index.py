@@ -1,8 +1,6 @@
 """Builds an index of a map's references by appearance."""
 
-from typing import Annotated
-
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
@@ -13,6 +11,8 @@ MIN_REFERENCES = 1000
 """Smallest map that gets an index, references."""
 REBUILD_GROWTH = 2.0
 """Growth of a map, as a factor, at which its index is built anew."""
+DIMENSIONS = 128
+"""Numbers that are kept of each reference."""
 EXACT_UP_TO = 30_000
 """References of a map up to which the short vectors of all are compared: 10 ms at 36 headings."""
 
@@ -32,9 +32,6 @@ class BuildReferenceIndex(Stage):
     index of a finished map is kept in the cache. That of a map that grows is built anew when the map has grown by
     `REBUILD_GROWTH`; until then references are appended to it.
     """
-
-    dimensions: Annotated[int, Bounds(ge=2)] = 128
-    """Numbers that are kept of each reference."""
 
     class Out(Outputs):
         """The index; absent for a small map."""
@@ -60,10 +57,10 @@ class BuildReferenceIndex(Stage):
     def _built(self, ctx: Context, map: ReferenceGraph, references: int) -> ReferenceIndex:
         faiss = faiss_or_none() if references > EXACT_UP_TO else None
         if faiss is not None:
-            return build(faiss, map, references, self.dimensions, ctx.progress)
+            return build(faiss, map, references, DIMENSIONS, ctx.progress)
         if references > EXACT_UP_TO:
             ctx.warn(
                 f"all {references} references are looked through at every image, because faiss is not installed; for "
                 "less time type pip install 'omninav[index]'"
             )
-        return short_vectors(map, references, self.dimensions)
+        return short_vectors(map, references, DIMENSIONS)

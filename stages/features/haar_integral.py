@@ -29,13 +29,12 @@ class Binning(NamedTuple):
     """Counts values in [0, 1] of three channels.
 
     `bins` per channel; `joint`: one histogram over all channels (bins^3, the first slowest), else one for each, behind
-    one another and with equal shares of the mass. `weighted`: a value counts for the two bins whose middles it lies
-    between, by its distance from them.
+    one another and with equal shares of the mass. A value counts for the two bins whose middles it lies between, by its
+    distance from them.
     """
 
     bins: int = 8
     joint: bool = True
-    weighted: bool = True
 
     @property
     def length(self) -> int:
@@ -49,31 +48,31 @@ class Binning(NamedTuple):
         expected distance of the histogram from that of everything the sample was drawn from.
         """
         counts = np.zeros(self.length)
-        squares = _count(values, usable, self.bins, self.joint, self.weighted, counts)
+        squares = _count(values, usable, self.bins, self.joint, counts)
         shares = counts / len(values)
         variance = max(squares / len(values) - float(shares @ shares), 0.0)
         return shares, float(np.sqrt(variance / len(values)))
 
 
 @compiled(nogil=True)
-def _place(value: float, bins: int, weighted: bool) -> tuple[int, float]:
+def _place(value: float, bins: int) -> tuple[int, float]:
     """The bin of a value, and the share of it that counts for the next one."""
-    place = value * bins - (0.5 if weighted else 0.0)
+    place = value * bins - 0.5
     low = min(max(int(np.floor(place)), 0), bins - 1)
-    return low, min(max(place - low, 0.0), 1.0) if weighted and low + 1 < bins else 0.0
+    return low, min(max(place - low, 0.0), 1.0) if low + 1 < bins else 0.0
 
 
 @compiled(nogil=True)
-def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool, counts: Array) -> float:
+def _count(values: Floats, usable: Bools, bins: int, joint: bool, counts: Array) -> float:
     # Gives the sum over values of their squared shares: 1 each where all of a value goes to one bin.
     squares = 0.0
     for n in range(len(values)):
         if not usable[n]:
             continue
         if joint:
-            i, x = _place(values[n, 0], bins, weighted)
-            j, y = _place(values[n, 1], bins, weighted)
-            k, z = _place(values[n, 2], bins, weighted)
+            i, x = _place(values[n, 0], bins)
+            j, y = _place(values[n, 1], bins)
+            k, z = _place(values[n, 2], bins)
             for corner in range(8):
                 a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
                 share = (x if a else 1.0 - x) * (y if b else 1.0 - y) * (z if c else 1.0 - z)
@@ -82,7 +81,7 @@ def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool
                     squares += share * share
         else:
             for channel in range(3):
-                low, part = _place(values[n, channel], bins, weighted)
+                low, part = _place(values[n, channel], bins)
                 below, above = (1.0 - part) / 3.0, part / 3.0
                 counts[channel * bins + low] += below
                 squares += below * below
@@ -130,8 +129,6 @@ class HaarIntegral(UnderGreyWorld, Stage):
     bins: Annotated[int, Bounds(ge=1, le=64)] | None = None
     """Bins per channel; null: 8 for windows, 5 for a panorama's segments (936 images then fit in the paper's 4 MB, with
     joint histograms too)."""
-    weighted: bool = True
-    """Share a value between the two nearest bins, by its distance from them."""
     segments: Annotated[int, Bounds(ge=1)] = 8
     """Equal parts of a panorama."""
     borders: Borders = "crop"
@@ -175,7 +172,7 @@ class HaarIntegral(UnderGreyWorld, Stage):
         return self.Out(features=features, metrics=Metrics({"haar_integral": figures}))
 
     def _binning(self, bins: int) -> Binning:
-        return Binning(bins if self.bins is None else self.bins, self.histogram == "joint", self.weighted)
+        return Binning(bins if self.bins is None else self.bins, self.histogram == "joint")
 
     def _described(
         self,

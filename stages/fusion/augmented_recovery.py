@@ -10,6 +10,9 @@ from omninav.stages.values.belief import Likelihood, Particles
 
 from .uniform_recovery import resampled, weighed
 
+SLOW, FAST = 0.01, 0.1
+"""Weights of an image in the long average, alpha_slow, and in the short one, alpha_fast."""
+
 
 class AugmentedRecoveryState(State):
     """Long and short average of how well the belief explains the images of a log, and their number."""
@@ -32,10 +35,6 @@ class AugmentedRecovery(Stage):
 
     number: Annotated[int, Bounds(ge=1)] = 5000
     """Particles."""
-    slow: Annotated[float, Bounds(gt=0, le=1)] = 0.01
-    """Weight of an image in the long average, alpha_slow."""
-    fast: Annotated[float, Bounds(gt=0, le=1)] = 0.1
-    """Weight of an image in the short average, alpha_fast."""
 
     class Out(Outputs):
         """The belief after the image."""
@@ -54,8 +53,8 @@ class AugmentedRecovery(Stage):
         explained = probability_explained(particles, likelihood)
         averages.images = 1 if ctx.tick.first_of_log else averages.images + 1
         equal = 1.0 / averages.images  # plain means at first: a belief all over the map explains unusually little
-        averages.slow += max(self.slow, equal) * (explained - averages.slow)
-        averages.fast += max(self.fast, equal) * (explained - averages.fast)
+        averages.slow += max(SLOW, equal) * (explained - averages.slow)
+        averages.fast += max(FAST, equal) * (explained - averages.fast)
         share = max(0.0, 1.0 - averages.fast / averages.slow) if averages.slow > 0.0 else 0.0
         wanted = 0 if proposals is None else int(share * self.number)
         poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, wanted, proposals)

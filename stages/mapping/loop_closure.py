@@ -14,6 +14,8 @@ from omninav.stages.values.topological_map import LoopHypotheses
 
 Ints = npt.NDArray[np.int64]
 
+IGNORANCE = 0.25
+"""Ignorance of a hypothesis before its neighbours have spoken (erratum 30 in docs/papers.md)."""
 NEIGHBOUR_DISTANCE = 20.0
 """Views along the drive within which another hypothesis is a neighbour."""
 
@@ -43,8 +45,6 @@ class LoopClosure(Stage):
     """Support that an accepted hypothesis must exceed."""
     accepted: Literal["merge", "link"] = "merge"
     """Whether the subclusters of an accepted hypothesis become one place, or two that are linked."""
-    ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
-    """Ignorance of a hypothesis before its neighbours have spoken."""
 
     class Out(Outputs):
         """The place of each view, and what became of each hypothesis."""
@@ -70,7 +70,7 @@ class LoopClosure(Stage):
         similarity = dempster_shafer.similarity_of(
             np.where(enough, visual_distances, math.inf), spread, self.similarity
         )
-        initial = dempster_shafer.masses(similarity, 1.0 - self.ignorance)
+        initial = dempster_shafer.masses(similarity, 1.0 - IGNORANCE)
         gaps = place_clusters.between_hypotheses(ends, views.orders)
         masses = dempster_shafer.gather(initial, gaps, NEIGHBOUR_DISTANCE)
         informed = dempster_shafer.unknown(masses) < dempster_shafer.unknown(initial)

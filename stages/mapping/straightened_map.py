@@ -1,11 +1,10 @@
 """Straightens a map whose poses are odometry by the places that the drive came back to."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
@@ -22,6 +21,10 @@ QUANTITIES = {
 
 MIN_EXCESS = 0.7
 """Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
+HEADINGS = 36
+"""Headings at which references are compared."""
+SAMPLES = 1000
+"""References that look for another, evenly spaced over a map of more."""
 MIN_GAP = 5.0
 """Way along the drive, in length scales, after which two references may close a loop."""
 
@@ -37,11 +40,6 @@ class StraightenMap(Stage):
     Not in the paper, whose maps are corrected by a laser scanner. Pose graphs: Grisetti et al. 2010, "A tutorial on
     graph-based SLAM". Defaults: docs/experiments/straightened_maps.md.
     """
-
-    headings: Annotated[int, Bounds(ge=1)] = 36
-    """Headings at which references are compared."""
-    samples: Annotated[int, Bounds(ge=1)] = 1000
-    """References that look for another, evenly spaced over a map of more."""
 
     class Out(Outputs):
         """The map with straightened poses, or as it was."""
@@ -60,8 +58,8 @@ class StraightenMap(Stage):
         steps = between(map.poses[:-1], map.poses[1:])
         driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
         closures = closures_by_appearance(
-            map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], self.headings,
-            MIN_EXCESS, MIN_GAP * unit, self.samples,
+            map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], HEADINGS,
+            MIN_EXCESS, MIN_GAP * unit, SAMPLES,
         )  # fmt: skip
         if not len(closures.pairs):
             ctx.fact(

@@ -32,8 +32,10 @@ MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
 MIN_GAP = 5.0
 """Way along one drive between the two views of a closure, in distances over which views become new."""
-SIGMA_DEG = 3.0
-"""Standard deviation with which the map learns a straightened heading."""
+SAMPLES = 1000
+"""Views that look for others, evenly spaced over drives of more."""
+SIGMA_M, SIGMA_DEG = 0.1, 3.0
+"""Standard deviations with which the map learns a straightened pose."""
 
 
 class StraightenSessions(Stage):
@@ -53,10 +55,6 @@ class StraightenSessions(Stage):
 
     max_distance: Annotated[float, Bounds(ge=0, le=1)] = 0.6
     """Distance up to which two views close a loop, as a share of the novelty threshold; 0: the map is left as it is."""
-    sigma_m: Annotated[float, Bounds(gt=0)] = 0.1
-    """Standard deviation with which the map learns a straightened position."""
-    samples: Annotated[int, Bounds(ge=1)] = 1000
-    """Views that look for others, evenly spaced over drives of more."""
 
     class Out(Outputs):
         """The updates of the map: those that came in, or all that it is to hold."""
@@ -79,7 +77,7 @@ class StraightenSessions(Stage):
         if threshold is None or not threshold.settled or not threshold.metres or not self.max_distance:
             return self.Out(updates=updates)
         unit = threshold.metres
-        closures = closures_between(sessions, self.max_distance * threshold.distance, MIN_GAP * unit, self.samples)
+        closures = closures_between(sessions, self.max_distance * threshold.distance, MIN_GAP * unit, SAMPLES)
         if not len(closures.pairs):
             return self._as_it_is(ctx, sessions, updates, last)
         drives = sessions.drives
@@ -115,7 +113,7 @@ class StraightenSessions(Stage):
         return self.Out(updates=MapUpdates(items, open_from, sessions=sessions) if last else updates)
 
     def _updates(self, sessions: Sessions, poses: Array, learned: Bools) -> tuple[MapUpdate, ...]:
-        covariance = np.diag([self.sigma_m, self.sigma_m, math.radians(SIGMA_DEG)]) ** 2
+        covariance = np.diag([SIGMA_M, SIGMA_M, math.radians(SIGMA_DEG)]) ** 2
         return tuple(
             MapUpdate(
                 sessions.view(row),

@@ -49,6 +49,8 @@ class Seen(NamedTuple):
     depths: Depths | None
 
 
+APART_M = (0.5, 1.0, 2.0)
+"""Distances between the images of a pair, metres."""
 QUANTITIES = {
     "matches.all.right_share": Quantity(title="Matches, share right", unit="%", better="higher"),
     "matches.all.first_right": Quantity(title="Matches right before the first wrong one, median", better="higher"),
@@ -87,8 +89,6 @@ class FirstMatches(MetricStage):
     """Largest ratio of the nearest to the second nearest patch."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance between the colours of two patches."""
-    apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
-    """Distances (m) between the images of a pair."""
 
     def step(
         self,
@@ -117,10 +117,10 @@ class FirstMatches(MetricStage):
         views = seconds = seen(features, vertical_segments, depths)
         if other_features or other_segments:
             seconds = seen(other_features, other_segments, other_depths)
-        chosen = [pairs_apart(poses, far, self.pairs) for far in self.apart_m]
+        chosen = [pairs_apart(poses, far, self.pairs) for far in APART_M]
         judged = [[self._judged(views[one], seconds[other], lens) for one, other in pairs] for pairs in chosen]
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
-        found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, judged, strict=True)]
+        found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(APART_M, judged, strict=True)]
         found["all"] = summary([pair for pairs in judged for pair in pairs])
         return self.Out(metrics=Metrics({"matches": found}, QUANTITIES, ("matches.all.right_share",)))
 

@@ -1,6 +1,6 @@
 """Covers parts of the panorama by colour noise, a synthetic occlusion."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -45,38 +45,16 @@ def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, wid
     return np.broadcast_to(mask, (rows, columns))
 
 
-def rectangles(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:
-    """Rectangles at random places, until they cover `share` of the image: (rows, columns) bool.
-
-    Their mean width is `width` of the circle, their mean height half of the image; the last one is cut to fit, to
-    one column. They may overlap and cross the seam.
-    """
-    mask = np.zeros((rows, columns), dtype=np.bool_)
-    wanted = round(share * rows * columns)
-    missing = wanted
-    while missing > 0:
-        wide = max(1, round(2 * width * columns * rng.random()))
-        high = max(1, round(rows * rng.random()))
-        top, left = int(rng.integers(rows - high + 1)), int(rng.integers(columns))
-        across = np.arange(left, left + min(wide, columns)) % columns
-        new = np.cumsum((~mask[top : top + high, across]).sum(axis=0))
-        across = across[: int(np.searchsorted(new, missing)) + 1]
-        mask[top : top + high, across] = True
-        missing = wanted - int(mask.sum())
-    return mask
-
-
 class ColourNoise(Stage):
     """Covers a share of the panorama by artificial segments of Gaussian colour noise.
 
     Gross & Koenig 2004, section 3, occlusion experiments: views are "randomly occluded by artificial image segments
-    showing Gaussian-distributed color noise", from 0 to 80 % of the image. The shape of the segments is not given.
+    showing Gaussian-distributed color noise", from 0 to 80 % of the image. The shape of the segments is not given: here
+    they are as high as the image, like people close to the camera.
     """
 
     share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
     """Share of the image that is covered."""
-    shape: Literal["sectors", "rectangles"] = "sectors"
-    """`sectors`: over the full height, like people close to the camera, and as the paper uses the word segment."""
 
     class Out(Outputs):
         """The panorama, covered in part."""
@@ -90,8 +68,7 @@ class ColourNoise(Stage):
         tick = ctx.tick
         rng = np.random.default_rng([PATTERN, tick.log, tick.frame])
         rows, columns = panorama.pixels.shape[:2]
-        shape = sectors if self.shape == "sectors" else rectangles
-        mask = shape(rng, rows, columns, self.share, WIDTH_DEG / 360.0)
+        mask = sectors(rng, rows, columns, self.share, WIDTH_DEG / 360.0)
         pixels = panorama.pixels.copy()
         noise = rng.normal(MEAN, SIGMA, (int(mask.sum()), 3))
         pixels[mask] = np.clip(np.rint(noise), 0, 255).astype(np.uint8)

@@ -75,8 +75,6 @@ class ShortestPathPlanner(Stage):
     goal: str | int | None = None
     """A place's number or name (of several of that name the nearest), or an image file: the place that looks most like
     it."""
-    cost: Literal["links", "views"] = "links"
-    """Cost of a link: one (the paper's), or as many as views have to be driven to."""
     search_s: Annotated[float, Bounds(ge=0)] = 15.0
     """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
     around (it stands, then wanders) before it plans; sure of another place, it plans at once."""
@@ -158,7 +156,7 @@ class ShortestPathPlanner(Stage):
         self, ctx: Context, state: ShortestPathPlannerState, probabilities: Array, goals: Ints, map: TopologicalMap
     ) -> ImagePath:
         place, missed = _likeliest(probabilities, state)
-        places = shortest_route(map, place, goals, self.cost, state.failed_links, state.failures)
+        places = shortest_route(map, place, goals, state.failed_links, state.failures)
         last = f"the last route ended because it was {state.why}"
         if state.blocked and not state.why.startswith("blocked"):
             last = f"it was blocked: {state.blocked}; {last}"
@@ -213,7 +211,6 @@ def shortest_route(
     map: TopologicalMap,
     place: int,
     goals: Ints,
-    cost: Literal["links", "views"],
     failed_links: Ints,
     failures: Ints,
 ) -> Ints:
@@ -226,10 +223,10 @@ def shortest_route(
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(map)))
     failed = {frozenset(pair): number for pair, number in zip(failed_links.tolist(), failures.tolist(), strict=True)}
-    for link, (one, other) in enumerate(map.links.tolist()):
+    for one, other in map.links.tolist():
         missed = failed.get(frozenset((one, other)), 0)
         if one != other and missed < MAX_FAILURES:
-            price = (1 if cost == "links" else 1 + len(map.path_of(link))) + missed * len(map.views)
+            price = 1 + missed * len(map.views)
             known = graph.edges[one, other]["price"] if graph.has_edge(one, other) else price
             graph.add_edge(one, other, price=min(price, known))
     lengths, routes = networkx.single_source_dijkstra(graph, place, weight="price")

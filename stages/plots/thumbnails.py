@@ -13,6 +13,8 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 
+TOUR_COLUMNS = 240
+"""Largest width of a thumbnail of a tour, pixels."""
 QUALITY = 75
 """JPEG quality of a thumbnail, per cent."""
 
@@ -73,9 +75,6 @@ class TourSnapshot(Stage):
     Which of them a topological map keeps is known at its end only.
     """
 
-    columns: Annotated[int, Bounds(ge=16)] = 240
-    """Largest width (pixels)."""
-
     class Out(Outputs):
         """One thumbnail."""
 
@@ -83,7 +82,7 @@ class TourSnapshot(Stage):
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """One tick."""
-        jpeg = thumbnail(image.pixels, camera, self.columns).jpeg(QUALITY)
+        jpeg = thumbnail(image.pixels, camera, TOUR_COLUMNS).jpeg(QUALITY)
         return self.Out(snapshots=ReferenceThumbnails((jpeg,)))
 
 

@@ -1,13 +1,14 @@
 """Proposes poses anywhere in the free space, for recovery from kidnapping."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.track import Track
+
+NUMBER = 100
+"""Poses proposed at each image."""
 
 
 class FreeSpaceProposals(Stage):
@@ -15,9 +16,6 @@ class FreeSpaceProposals(Stage):
 
     Wolf, Burgard & Burkhardt 2005, section III: random samples. All poses have equal weights.
     """
-
-    number: Annotated[int, Bounds(ge=1)] = 100
-    """Poses proposed at each image."""
 
     class Out(Outputs):
         """Poses of equal weights; absent while the track is unbroken."""
@@ -28,4 +26,4 @@ class FreeSpaceProposals(Stage):
         """Propose poses for one image: `tick` is read so that others are drawn for the next."""
         if track is not None and track.unbroken:
             return self.Out()
-        return self.Out(proposals=Particles(free.draw(ctx.rng, self.number), np.full(self.number, 1.0 / self.number)))
+        return self.Out(proposals=Particles(free.draw(ctx.rng, NUMBER), np.full(NUMBER, 1.0 / NUMBER)))

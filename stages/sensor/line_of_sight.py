@@ -1,12 +1,12 @@
 """Computes the visibility areas of a map's references over an occupancy grid."""
 
 import math
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
@@ -218,12 +218,10 @@ class LineOfSight(Stage):
     Wolf, Burgard & Burkhardt 2005, section V: lambda is the closest occupied cell along a view's optical axis; its
     visibility area are the free cells from which lambda is visible, found by constrained region growing. Occupied and
     unknown cells block (erratum 46). Only the face of lambda that the view hits counts, so that no view is seen through
-    a thin wall. A panorama has one area per sector, along the sector's middle; a forward-looking camera has one,
-    straight ahead. A reference outside the free cells has none, nor has a ray that ends in unknown cells.
+    a thin wall. A panorama has one area per segment of its features, along the segment's middle; a forward-looking
+    camera has one, straight ahead. A reference outside the free cells has none, nor has a ray that ends in unknown
+    cells.
     """
-
-    sectors: Annotated[int, Bounds(ge=1)] | None = None
-    """Sectors of a panorama, each with an area; null: as many as the map's views have segments."""
 
     class Out(Outputs):
         """`areas`, and what share of the free space they cover."""
@@ -237,7 +235,7 @@ class LineOfSight(Stage):
             raise BadInput(
                 f"grid: {grid.cells.shape} cells are more than {MAX_CELLS_PER_SIDE} a side; use a coarser resolution"
             )
-        axes = axes_of(self.sectors or max(map.features.shape[1], 1))
+        axes = axes_of(max(map.features.shape[1], 1))
         areas = visibility_areas(map.poses, grid, axes)
         none = int((areas.target < 0).sum())
         if none == areas.target.size:

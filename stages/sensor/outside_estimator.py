@@ -10,8 +10,10 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Pose
 
-SIGMA_DEG = 10.0
-"""Standard deviation of the heading, degrees."""
+EVERY_M = 5.0
+"""Distance driven between two statements, metres; a log's first image has one."""
+SIGMA_M, SIGMA_DEG = 0.3, 10.0
+"""Standard deviations of the position, in x and y, and of the heading."""
 WRONG_M = 8.0
 """Distance of a wrong estimate from the truth, metres."""
 WEIGHT = 1.0
@@ -33,10 +35,6 @@ class OutsideEstimator(Stage):
     from it in any direction, and says that it is as exact as the others. Absent between statements and without truth.
     """
 
-    every_m: Annotated[float, Bounds(gt=0)] = 5.0
-    """Distance driven between two statements; a log's first image has one."""
-    sigma_m: Annotated[float, Bounds(gt=0)] = 0.3
-    """Standard deviation of the position, in x and y."""
     wrong: Annotated[float, Bounds(ge=0, le=1)] = 0.0
     """Share of the statements that are wrong."""
 
@@ -55,10 +53,10 @@ class OutsideEstimator(Stage):
         if state.position is not None:
             state.since_m += math.hypot(truth.x - state.position[0], truth.y - state.position[1])
         state.position = (truth.x, truth.y)
-        if state.since_m < self.every_m:
+        if state.since_m < EVERY_M:
             return self.Out()
         state.since_m = 0.0
-        sigmas = np.array([self.sigma_m, self.sigma_m, math.radians(SIGMA_DEG)])
+        sigmas = np.array([SIGMA_M, SIGMA_M, math.radians(SIGMA_DEG)])
         mean = np.array([truth.x, truth.y, truth.heading]) + sigmas * ctx.rng.standard_normal(3)
         is_wrong, direction = ctx.rng.random() < self.wrong, 2.0 * math.pi * ctx.rng.random()
         if is_wrong:

@@ -1,11 +1,9 @@
 """Proposes poses that the current view itself suggests, for recovery from kidnapping."""
 
-from typing import Annotated
-
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -15,6 +13,8 @@ from omninav.stages.values.track import Track
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+NUMBER = 100
+"""Poses proposed at each image."""
 SPREAD = 0.4
 """Standard deviation of the positions around a reference, in appearance length scales."""
 
@@ -24,9 +24,6 @@ class SimilarityProposals(Stage):
 
     All poses have equal weights. Headings are uniform within the step between compared headings.
     """
-
-    number: Annotated[int, Bounds(ge=1)] = 100
-    """Poses proposed at each image."""
 
     class Out(Outputs):
         """Poses worth a try; absent without a field, and while the track is unbroken."""
@@ -46,13 +43,13 @@ class SimilarityProposals(Stage):
             return self.Out()
         unit = metres_of(length_scale)
         headings = field.values.shape[1]
-        rows, turns = np.divmod(draw_cells(field, ctx.rng, self.number), headings)
+        rows, turns = np.divmod(draw_cells(field, ctx.rng, NUMBER), headings)
         references = rows if field.candidates is None else field.candidates[rows]
         poses = map.poses[references].copy()
-        poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(self.number) - 0.5) / headings
-        poses[:, :2] += SPREAD * unit * ctx.rng.standard_normal((self.number, 2))
+        poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(NUMBER) - 0.5) / headings
+        poses[:, :2] += SPREAD * unit * ctx.rng.standard_normal((NUMBER, 2))
         poses[:, 2] = wrap(poses[:, 2])
-        return self.Out(proposals=Particles(poses, np.full(self.number, 1.0 / self.number)))
+        return self.Out(proposals=Particles(poses, np.full(NUMBER, 1.0 / NUMBER)))
 
 
 def draw_cells(field: SimilarityField, rng: np.random.Generator, number: int) -> Ints:

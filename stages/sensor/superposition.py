@@ -40,16 +40,13 @@ class Superposition(Stage):
     """Adds up the mixtures of the map's views that resemble the current one, weighted by similarity.
 
     p(x|y) is the sum over views j and components k of lambda_j w_jk times a Gaussian (Porta & Kroese 2004, equation 5;
-    Gross, Koenig & Mueller 2005, section 2.2). The components' own weights w_jk are not normalised (erratum 13).
-    Headings are turned by the robot's turn against its heading in each view (erratum 12). Components without weight
-    (just inserted) do not count. Absent where no view is similar.
+    Gross, Koenig & Mueller 2005, section 2.2). Neither the components' own weights w_jk (erratum 13) nor lambda_j = S_j
+    are normalised: many similar views weigh more than one. Headings are turned by the robot's turn against its heading
+    in each view (erratum 12). Components without weight (just inserted) do not count. Absent where no view is similar.
     """
 
     views: Literal["all", "nearest"] = "all"
     """All similar views, or the nearest only (the crisp 1-of-N mapping)."""
-    normalise: bool = False
-    """lambda_j = S_j / sum S, so that equation 5 is a density in 1/(m^2 rad) (erratum 14). Else lambda_j = S_j as in
-    Gross, Koenig & Mueller, and many similar views weigh more than one."""
     extent: bool = False
     """Widen each view's components in x and y by the distance over which views of this drive come to differ as much
     (from the novelty threshold's metres), since a view looks similar over some distance. Neither paper has it; without,
@@ -68,9 +65,6 @@ class Superposition(Stage):
             return self.Out()
         number = 1 if self.views == "nearest" else len(neighbours.rows)
         shares = neighbours.similarities[:number]
-        if self.normalise:
-            total = float(shares.sum())
-            shares = shares / total if total > 0.0 else np.full(number, 1.0 / number)
         rows = neighbours.rows[:number]
         extents = np.zeros(number)
         if self.extent and threshold is not None and threshold.distance > 0.0:

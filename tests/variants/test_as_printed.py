@@ -58,7 +58,7 @@ def test_gross_fuses_by_equations_2_to_8_and_superposes_all_similar_views(gross:
     fusion, sensor = gross.nodes["fusion"].stage, gross.nodes["sensor"].stage
     assert type(fusion).__name__ == "CovarianceIntersection"
     assert (fusion.alpha, fusion.weighted) == ("det_ratio", True)
-    assert (sensor.views, sensor.extent, sensor.normalise) == ("all", False, False)
+    assert (sensor.views, sensor.extent) == ("all", False)
 
 
 def test_gross_reconstructs_every_path_between_unimodal_states(gross: Graph):

@@ -23,6 +23,7 @@ faiss = pytest.importorskip("faiss")
 
 SEGMENTS, BINS, SPACING = 12, 16, 0.25
 EXACT, INVERTED = 30_000, 0
+DIMENSIONS = "omninav.stages.candidates.reference_index.DIMENSIONS"
 EXACT_UP_TO = "omninav.stages.candidates.reference_index.EXACT_UP_TO"
 FIELDS = {
     ShortVectors: ("mean", "axes", "vectors"),
@@ -51,9 +52,10 @@ MAP = a_map()
 def index_of(
     map: ReferenceGraph, exact_up_to: int = EXACT, state: BuildReferenceIndexState | None = None
 ) -> ReferenceIndex:
-    stage, ctx = BuildReferenceIndex(dimensions=64), Context("reference_index")
+    stage, ctx = BuildReferenceIndex(), Context("reference_index")
     stage.setup(ctx)
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DIMENSIONS, 64)
         patch.setattr(EXACT_UP_TO, exact_up_to)
         index = stage.step(ctx, map, state or BuildReferenceIndexState()).index
     assert index is not None
@@ -172,9 +174,10 @@ def test_references_that_a_map_has_learned_since_are_found(index: ReferenceIndex
 def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill(
     form: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(DIMENSIONS, 64)
     monkeypatch.setattr(EXACT_UP_TO, form)
     map, state, ctx = a_map(1200), BuildReferenceIndexState(), Context("reference_index")
-    stage = BuildReferenceIndex(dimensions=64)
+    stage = BuildReferenceIndex()
     stage.setup(ctx)
     sizes = []
     for n, view in enumerate(views(1300, seed=5)):

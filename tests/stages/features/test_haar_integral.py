@@ -201,19 +201,8 @@ def test_windows_are_described_one_by_one() -> None:
     assert np.array_equal(features.values, np.concatenate([described(picture) for picture in pictures]))
 
 
-@pytest.mark.parametrize("joint", [True, False])
-def test_hard_bins_count_as_numpy_does(joint: bool) -> None:
-    values = np.random.default_rng(4).random((500, 3)).astype(np.float32)
-    shares, _ = Binning(4, joint, weighted=False).shares(values, np.ones(500, np.bool_))
-    if joint:
-        expected = np.histogramdd(values, bins=4, range=[(0, 1)] * 3)[0].ravel() / 500
-    else:
-        expected = np.concatenate([np.histogram(values[:, c], bins=4, range=(0, 1))[0] for c in range(3)]) / 1500
-    assert np.allclose(shares, expected)
-
-
 @given(st.lists(st.tuples(*[st.floats(0, 1, width=32)] * 3), min_size=1, max_size=20), st.integers(1, 6), st.booleans())
-def test_weighted_bins_keep_mass_and_mean(values: list[tuple[float, float, float]], bins: int, joint: bool) -> None:
+def test_bins_keep_mass_and_mean(values: list[tuple[float, float, float]], bins: int, joint: bool) -> None:
     points = np.array(values, np.float32)
     shares, _ = Binning(bins, joint).shares(points, np.ones(len(points), np.bool_))
     assert shares.sum() == pytest.approx(1.0)

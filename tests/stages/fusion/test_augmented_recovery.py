@@ -21,7 +21,7 @@ def likelihood(value: float, mean: float | None = 0.1, novelty: float = 1.0) -> 
 
 
 def injected(images: list[Likelihood], proposals: Particles | None = THERE) -> list[int]:
-    stage, state, found = AugmentedRecovery(number=NUMBER, slow=0.01, fast=0.1), AugmentedRecoveryState(), []
+    stage, state, found = AugmentedRecovery(number=NUMBER), AugmentedRecoveryState(), []
     for image in images:
         out = stage.step(Context("fusion", np.random.default_rng(0)), HERE, image, proposals, state).belief
         assert len(out.poses) == NUMBER
@@ -84,8 +84,9 @@ def test_a_belief_that_never_explained_an_image_injects_nothing():
     assert injected([Likelihood(np.zeros(NUMBER), 0.1)] * 3) == [0, 0, 0]
 
 
-def test_averages_are_plain_means_over_the_first_images_of_each_log():
-    stage, state = AugmentedRecovery(number=NUMBER, slow=0.01, fast=0.4), AugmentedRecoveryState()
+def test_averages_are_plain_means_over_the_first_images_of_each_log(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.fusion.augmented_recovery.FAST", 0.4)
+    stage, state = AugmentedRecovery(number=NUMBER), AugmentedRecoveryState()
     ctx, averages = Context("fusion", np.random.default_rng(0)), []
     for number, value in enumerate((0.9, 0.1, 0.3, 0.1)):
         ctx.tick = Tick(number, number, first_of_log=number == 3)

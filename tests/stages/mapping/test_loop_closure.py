@@ -12,7 +12,7 @@ from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.topological_map import LoopHypotheses
 
 ROUND = between_looks([0.0, 10.0, 20.0, 0.1, 10.1, 20.1])  # two rounds of three places
-PAPER = {"similarity": "ratio", "ignorance": 0.25}
+PAPER = {"similarity": "ratio"}
 
 
 def closed(views: ComparedViews, **parameters: object) -> LoopHypotheses:

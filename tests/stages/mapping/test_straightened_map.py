@@ -105,8 +105,9 @@ def test_the_way_along_the_drive_is_what_keeps_neighbours_apart(monkeypatch):
     assert straightened(map)[0].metrics.values["straightened"]["closures"] > far
 
 
-def test_fewer_references_that_look_for_others_find_fewer():
-    few = StraightenMap(samples=20).step(Context("straightened"), bent(), []).metrics.values["straightened"]
+def test_fewer_references_that_look_for_others_find_fewer(monkeypatch):
+    monkeypatch.setattr("omninav.stages.mapping.straightened_map.SAMPLES", 20)
+    few = straightened(bent())[0].metrics.values["straightened"]
     assert 0 < few["closures"] <= 20
 
 

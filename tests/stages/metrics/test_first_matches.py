@@ -27,6 +27,13 @@ RNG = np.random.default_rng(5)
 POINTS = RNG.uniform((-8.0, -8.0, -1.0), (8.0, 8.0, 2.0), (40, 3))
 LOOKS = RNG.integers(0, 255, (40, 128)).astype(np.uint8)
 
+APART_M = "omninav.stages.metrics.first_matches.APART_M"
+
+
+@pytest.fixture(autouse=True)
+def one_metre_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(APART_M, (1.0,))
+
 
 def seen(x: float, swapped: bool = False) -> tuple[LocalFeatures, Depths]:
     """All points from x metres along the way; `swapped`: the last two look like each other's place."""
@@ -47,7 +54,7 @@ Best = Literal["clearest", "nearest"]
 def judged(swapped: bool, search: Search = "both_ways", best: Best = "clearest") -> dict[str, float]:
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 0.4, 1.0)]
     views = [seen(0.0), seen(0.4), seen(1.0, swapped)]
-    stage = FirstMatches(apart_m=(1.0,), search=search, best=best)
+    stage = FirstMatches(search=search, best=best)
     out = stage.step(Context("m"), poses, [view for view, _ in views], (), [depths for _, depths in views])
     return dict(out.metrics.values["matches"]["apart"][0])
 
@@ -115,7 +122,7 @@ def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) ->
 def of_sides(axis=2, degrees=0.0, colour=0.0, known=True, lens=(), **parameters) -> dict:
     views = [sides(0.0), sides(1.0, axis, degrees, colour)]
     depths = [depth for _, depth in views] if known else ()
-    stage = FirstMatches(**{"apart_m": (1.0,)} | parameters)
+    stage = FirstMatches(**parameters)
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     out = stage.step(Context("m"), poses, [view for view, _ in views], (), depths, lens)
     return out.metrics.values["matches"]
@@ -160,7 +167,7 @@ def columns(x: float, higher_deg: float = 0.0) -> tuple[VerticalSegments, Depths
 def of_columns(higher_deg: float = 0.0, known: bool = True, **parameters) -> dict:
     views = [columns(0.0), columns(1.0, higher_deg)]
     depths = [depth for _, depth in views] if known else ()
-    stage = FirstMatches(apart_m=(1.0,), by="columns", **parameters)
+    stage = FirstMatches(by="columns", **parameters)
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     out = stage.step(Context("m"), poses, (), [view for view, _ in views], depths)
     return out.metrics.values["matches"]["all"]
@@ -185,7 +192,7 @@ def test_patches_and_columns_are_counted_together_the_best_of_both_first() -> No
     given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], [each for each, _ in patches], [each for each, _ in segments]
     found = {}
     for by in ("patches", "columns", "both"):
-        stage = FirstMatches(apart_m=(1.0,), by=by)
+        stage = FirstMatches(by=by)
         found[by] = stage.step(Context("m"), *given, depths).metrics.values["matches"]["all"]
     assert [found[by]["right"] for by in found] == [20.0, 0.0, 20.0]
     assert [found[by]["right_share"] for by in found] == [1.0, 0.0, 0.5]
@@ -195,7 +202,7 @@ def test_the_second_image_is_of_other_light_where_there_is_one() -> None:
     given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     segments, depths = zip(columns(0.0), columns(1.0), strict=True)
     others, other_depths = zip(columns(0.0), columns(1.0, 9.0), strict=True)
-    stage = FirstMatches(apart_m=(1.0,), by="columns")
+    stage = FirstMatches(by="columns")
     plain = stage.step(Context("m"), given, (), segments, depths).metrics.values["matches"]["all"]
     lit = {"other_segments": others, "other_depths": other_depths}
     other = stage.step(Context("m"), given, (), segments, depths, **lit).metrics.values["matches"]["all"]
@@ -206,9 +213,10 @@ def test_the_second_image_is_of_other_light_where_there_is_one() -> None:
     assert found.metrics.values["matches"]["all"]["found_again"] == 0.25  # of twenty in the first image
 
 
-def test_a_pair_without_features_has_no_match_and_no_chance() -> None:
+def test_a_pair_without_features_has_no_match_and_no_chance(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-    found = FirstMatches(apart_m=(1.0, 5.0)).step(Context("m"), poses).metrics.values["matches"]
+    monkeypatch.setattr(APART_M, (1.0, 5.0))
+    found = FirstMatches().step(Context("m"), poses).metrics.values["matches"]
     none = {"right_share": None, "found_again": None, "by_chance": None}
     assert found["apart"] == [
         {"m": 1.0, "pairs": 1, "matched": 0.0, "first_right": 0.0, "right": 0.0, **none},
@@ -220,7 +228,7 @@ def test_a_pair_without_features_has_no_match_and_no_chance() -> None:
 def test_images_without_a_true_pose_make_no_pair() -> None:
     poses = [None, Pose(0.0, 0.0, 0.0), Pose(0.9, 0.0, 0.0), Pose(1.0, 0.0, 0.0)]
     views = [None, sides(0.0)[0], sides(0.9)[0], sides(1.0)[0]]
-    found = FirstMatches(apart_m=(1.0,)).step(Context("m"), poses, views).metrics.values["matches"]["all"]
+    found = FirstMatches().step(Context("m"), poses, views).metrics.values["matches"]["all"]
     assert (found["pairs"], found["right"]) == (1, 20.0)
 
 
@@ -270,7 +278,7 @@ def looking(first: np.ndarray, second: np.ndarray, **parameters) -> dict[str, fl
         for x, looks in ((0.0, first), (1.0, second))
     ]
     depths = [sides(x)[1] for x in (0.0, 1.0)]
-    stage = FirstMatches(**{"apart_m": (1.0,)} | parameters)
+    stage = FirstMatches(**parameters)
     out = stage.step(Context("m"), [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], views, (), depths)
     return dict(out.metrics.values["matches"]["all"])
 
@@ -321,12 +329,12 @@ def test_a_partner_is_clearer_than_the_second_by_a_fifth(second_nearest: float, 
 def test_depths_of_one_view_alone_do_not_judge_a_match(given: tuple[bool, bool]) -> None:
     views, poses = [sides(0.0), sides(1.0, axis=2, degrees=1.9)], [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     depths = [depth if there else None for (_, depth), there in zip(views, given, strict=True)]
-    found = FirstMatches(apart_m=(1.0,)).step(Context("m"), poses, [view for view, _ in views], (), depths)
+    found = FirstMatches().step(Context("m"), poses, [view for view, _ in views], (), depths)
     assert found.metrics.values["matches"]["depths_known"] == 1
     assert found.metrics.values["matches"]["all"] == of_sides(degrees=1.9, known=False)["all"]
     uprights = [columns(0.0), columns(1.0, 2.0)]
     depths = [depth if there else None for (_, depth), there in zip(uprights, given, strict=True)]
-    stage = FirstMatches(apart_m=(1.0,), by="columns")
+    stage = FirstMatches(by="columns")
     found = stage.step(Context("m"), poses, (), [view for view, _ in uprights], depths)
     assert found.metrics.values["matches"]["all"] == of_columns(2.0, known=False)
 
@@ -338,7 +346,7 @@ def test_a_column_is_wrong_where_its_lower_end_is() -> None:
         elevations[:, end] += np.radians(9.0)
         views = [first, dataclasses.replace(second, elevations=elevations)]
         poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-        out = FirstMatches(apart_m=(1.0,), by="columns").step(Context("m"), poses, (), views, [near, far])
+        out = FirstMatches(by="columns").step(Context("m"), poses, (), views, [near, far])
         assert out.metrics.values["matches"]["all"]["right"] == 0.0
 
 

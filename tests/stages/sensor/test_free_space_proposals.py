@@ -7,10 +7,11 @@ from omninav.stages.sensor.free_space_proposals import FreeSpaceProposals
 from omninav.stages.values.grid import FreeSpace
 
 
-def test_poses_lie_in_the_free_cells_with_equal_weights_and_all_headings():
+def test_poses_lie_in_the_free_cells_with_equal_weights_and_all_headings(monkeypatch):
+    monkeypatch.setattr("omninav.stages.sensor.free_space_proposals.NUMBER", 400)
     free = FreeSpace(np.array([[50.5, 50.5], [51.5, 50.5]]), 1.0)
     ctx = Context("proposals", np.random.default_rng(0))
-    proposed = FreeSpaceProposals(number=400).step(ctx, Tick(0, 0), free).proposals
+    proposed = FreeSpaceProposals().step(ctx, Tick(0, 0), free).proposals
     assert proposed.poses.shape == (400, 3)
     assert (proposed.poses[:, 0] >= 50).all()
     assert (proposed.poses[:, 0] <= 52).all()

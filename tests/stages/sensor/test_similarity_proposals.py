@@ -45,7 +45,8 @@ def test_poses_are_drawn_around_the_best_reference_and_heading(
     ctx = Context("proposals", np.random.default_rng(0))
     field = similarity_field(similarities, 0.5, 0.9, 30.0)
     monkeypatch.setattr("omninav.stages.sensor.similarity_proposals.SPREAD", 0.1)
-    proposals = SimilarityProposals(number=400).step(ctx, field, MAP).proposals
+    monkeypatch.setattr("omninav.stages.sensor.similarity_proposals.NUMBER", 400)
+    proposals = SimilarityProposals().step(ctx, field, MAP).proposals
     assert proposals is not None
     assert proposals.weights.sum() == pytest.approx(1.0)
     gap = np.hypot(*(proposals.poses[:, :2] - REFERENCES[3, :2]).T)
