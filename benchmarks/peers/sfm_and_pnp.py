@@ -139,7 +139,7 @@ references = [
     for keypoints, looks, points in zip(*(np.split(part, ends) for part in parts), strict=True)
 ]
 # pycolmap 4.2.1 has an index of visual words, but its queries return nothing to Python.
-words = vocabulary_and_words([looks.data for _, looks, _ in references], 2048, 16)
+words = vocabulary_and_words([looks.data for _, looks, _ in references], 2048)
 shutil.rmtree(work)
 
 
