@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.mapping.pending_updates import PendingUpdates, begin, due
+from omninav.stages.mapping.pending_updates import PendingUpdates, ready_updates, start_over
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
@@ -17,10 +17,10 @@ UPDATES = tuple(MapUpdate(VIEW, STATE, n) for n in range(3))
 
 def test_without_a_threshold_only_a_map_s_first_update_is_applied() -> None:
     map, before = ViewMixtures.empty(), PendingUpdates()
-    assert due(UPDATES[:2], None, map, before) == [UPDATES[0]]
+    assert ready_updates(UPDATES[:2], None, map, before) == [UPDATES[0]]
     map.add_view(VIEW.values, "Coefficients")
-    assert due(UPDATES[2:], None, map, before) == []
-    assert due((), NoveltyThreshold(1.0), map, before) == list(UPDATES[1:])
+    assert ready_updates(UPDATES[2:], None, map, before) == []
+    assert ready_updates((), NoveltyThreshold(1.0), map, before) == list(UPDATES[1:])
     assert before.waiting == []
 
 
@@ -28,14 +28,14 @@ def test_without_a_threshold_only_a_map_s_first_update_is_applied() -> None:
 def test_a_map_that_is_learned_again_forgets_its_views_and_what_waits(relearn: bool) -> None:
     map, before = ViewMixtures.empty(), PendingUpdates(waiting=list(UPDATES))
     map.add_view(VIEW.values, "Coefficients")
-    begin(MapUpdates((), relearn=relearn), map, before)
+    start_over(MapUpdates((), relearn=relearn), map, before)
     assert (len(map), len(before.waiting)) == ((0, 0) if relearn else (1, 3))
 
 
 def test_drives_that_come_with_updates_are_kept_and_stay() -> None:
     map, before, sessions = ViewMixtures.empty(), PendingUpdates(), Sessions.empty(VIEW)
-    begin(MapUpdates((), sessions=sessions), map, before)
+    start_over(MapUpdates((), sessions=sessions), map, before)
     assert map.sessions is sessions
-    begin(MapUpdates(()), map, before)
-    begin(None, map, before)
+    start_over(MapUpdates(()), map, before)
+    start_over(None, map, before)
     assert map.sessions is sessions
