@@ -50,7 +50,9 @@ class CosineTransform(AveragedStrip, Stage):
         """Headings are whole columns apart, and there are as many coefficients as asked for."""
         super().__post_init__()
         if self.rows * self.columns - (not self.mean) < COEFFICIENTS:
-            raise ValueError(f"rows: a strip of {self.rows} x {self.columns} has fewer than {COEFFICIENTS} coefficients")
+            raise ValueError(
+                f"rows: a strip of {self.rows} x {self.columns} has fewer than {COEFFICIENTS} coefficients"
+            )
 
     def setup(self, ctx: Context) -> None:
         """Compute the basis."""
