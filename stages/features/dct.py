@@ -1,9 +1,11 @@
 """Describes whole views by the low frequencies of their cosine transform."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Stage
+from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
@@ -12,9 +14,6 @@ from .averaged_strip import AveragedStrip
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
-
-COEFFICIENTS = 128
-"""Coefficients of each channel, from the lowest frequency on."""
 
 
 def cosine_basis(size: int) -> Array:
@@ -43,20 +42,22 @@ class CosineTransform(AveragedStrip, Stage):
     matches. With more headings a view matches at any of them and tells the turn.
     """
 
+    coefficients: Annotated[int, Bounds(ge=1)] = 128
+    """Coefficients of each channel, from the lowest frequency on."""
     mean: bool = False
     """Whether the first coefficient (DC), the image's brightness, is among them (erratum 19 in docs/papers.md)."""
 
     def __post_init__(self) -> None:
         """Headings are whole columns apart, and there are as many coefficients as asked for."""
         super().__post_init__()
-        if self.rows * self.columns - (not self.mean) < COEFFICIENTS:
+        if self.coefficients > self.rows * self.columns - (not self.mean):
             raise ValueError(
-                f"rows: a strip of {self.rows} x {self.columns} has fewer than {COEFFICIENTS} coefficients"
+                f"coefficients: a strip of {self.rows} x {self.columns} has fewer than {self.coefficients}"
             )
 
     def setup(self, ctx: Context) -> None:
         """Compute the basis."""
-        self._down, self._across = lowest_frequencies(self.rows, self.columns, COEFFICIENTS, self.mean)
+        self._down, self._across = lowest_frequencies(self.rows, self.columns, self.coefficients, self.mean)
         self._vertical = cosine_basis(self.rows)[: self._down.max() + 1]
         waves = cosine_basis(self.columns)[: self._across.max() + 1]
         # Seen by a robot turned counter-clockwise, all columns move right: the same as waves moved to the left.
