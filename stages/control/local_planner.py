@@ -15,6 +15,7 @@ from omninav.stages.geometry.plane.local_grid import (
     cell_at,
     frontier,
     marked,
+    on_grid,
     prices,
     shifted,
     way_to,
@@ -37,8 +38,6 @@ AHEAD_M = 0.6
 """Distance along a way of the point that the robot drives towards, metres."""
 ROOM_M = 0.3
 """Free distance that a searching robot needs ahead of it, metres."""
-TURN_PRICE_M = 1.0
-"""Metres by which a way counts as longer that begins behind the robot."""
 TURN_IN_PLACE_DEG, TURN_GAIN = 30.0, 1.5
 """Angle beyond which a searching robot turns on the spot, degrees, and angular speed over the angle, 1/s."""
 
@@ -61,7 +60,7 @@ class LocalPlanner(Stage):
     """
 
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Of the robot's body."""
+    """Radius of the robot's body, metres."""
     search_speed: Annotated[float, Bounds(gt=0)] = 0.15
     """Speed of a robot that is lost, m/s."""
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
@@ -104,10 +103,14 @@ class LocalPlanner(Stage):
         target = here + vector.metres * np.array([math.cos(towards), math.sin(towards)])
         cost = prices(state.evidence, self.robot_radius_m)
         straight = np.linspace(0.0, 1.0, 2 + int(vector.metres / CELL_M))[:, None] * (target - here) + here
-        if all(cost.flat[cell_at(point)] < OCCUPIED_COST for point in straight[1:]):
+        if all(cost.flat[cell_at(point)] < OCCUPIED_COST for point in straight[1:][on_grid(straight[1:])]):
+            return vector
+        line = way_to(cell_at(target), ways_from(cell_at(here), cost))
+        if len(line) == 1:
             return vector
         ctx.count("led_around")
-        line = way_to(cell_at(target), ways_from(cell_at(here), cost))
+        if on_grid(target[None])[0]:
+            line[-1] = target
         ahead, beyond = ahead_on(line, here, AHEAD_M)
         x, y = ahead - here
         return replace(

@@ -9,8 +9,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from .se2 import wrap
-
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -19,6 +17,8 @@ CELLS, CELL_M = 120, 0.1
 """Cells along a side of the grid, and their width, metres."""
 HIT, MISS, MOST = 0.8, 0.4, 3.0
 """Log odds of an obstacle that an echo adds and that a free beam takes away, and the largest amount of either."""
+SEEN = 1e-9
+"""Log odds of a cell in which echoes and free beams cancel: 0 is kept for those of which nothing is known."""
 CLOSE_M = 0.15
 """Distance from an obstacle in which a way is dearer, on top of the robot's radius, metres."""
 OCCUPIED_COST, CLOSE_COST, UNKNOWN_COST = 20.0, 3.0, 1.5
@@ -54,27 +54,31 @@ def marked(evidence: Array, pose: Array, ranges: Array, azimuths: Array, farthes
     x, y = _MIDDLES[None, :] - pose[0], _MIDDLES[:, None] - pose[1]
     away = np.hypot(x, y)
     step = float(azimuths[1] - azimuths[0])
-    around = np.full(max(len(ranges), round(2.0 * np.pi / step)), np.nan)
-    around[: len(ranges)] = ranges
-    seen = around[np.round(wrap(np.arctan2(y, x) - pose[2] - azimuths[0]) / step).astype(np.int64) % len(around)]
+    width = abs(step)
+    turn = np.mod(np.sign(step) * (np.arctan2(y, x) - pose[2] - azimuths[0]), 2.0 * np.pi)
+    beam = np.rint(turn / width).astype(np.int64)
+    beam[beam >= round(2.0 * np.pi / width)] = 0
+    seen = np.where(beam < len(ranges), ranges[np.minimum(beam, len(ranges) - 1)], np.nan)
     echo = np.abs(away - seen) <= CELL_M
     free = away < np.minimum(seen, farthest) - CELL_M
-    told = HIT * np.minimum(1.0, 2.0 * CELL_M / np.maximum(away * step, CELL_M)) * echo - MISS * free
+    told = HIT * np.minimum(1.0, 2.0 * CELL_M / np.maximum(away * width, CELL_M)) * echo - MISS * free
     added: Array = np.clip(evidence + told, -MOST, MOST)
+    cancelled = (added == 0.0) & (told != 0.0)
+    added[cancelled] = np.copysign(SEEN, told[cancelled])
     return added
 
 
 def shifted(evidence: Array, rows: int, columns: int) -> Array:
     """The grid with what was `rows`, `columns` farther on in each cell, and nothing where that lay outside."""
     moved = np.zeros_like(evidence)
-    to = tuple(slice(max(0, -n), CELLS - max(0, n)) for n in (rows, columns))
-    of = tuple(slice(max(0, n), CELLS - max(0, -n)) for n in (rows, columns))
+    to = tuple(slice(max(0, -n), max(0, CELLS - max(0, n))) for n in (rows, columns))
+    of = tuple(slice(max(0, n), max(0, CELLS - max(0, -n))) for n in (rows, columns))
     moved[to] = evidence[of]
     return moved
 
 
 def prices(evidence: Array, radius: float) -> Array:
-    """What a metre through each cell costs a disc of `radius` m: (CELLS, CELLS), 1 in free space."""
+    """Gives the price of a metre through each cell for a disc of `radius` m: (CELLS, CELLS), 1 in free space."""
     gap = CELL_M * cv2.distanceTransform((evidence <= 0.0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     if not (evidence > 0.0).any():
         gap = np.full_like(evidence, np.inf)
@@ -88,6 +92,12 @@ def cell_at(point: Array) -> int:
     """The flat cell in which a point (2,) lies, or the nearest one to it."""
     column, row = np.clip(np.floor(point / CELL_M + CELLS / 2), 0, CELLS - 1).astype(np.int64)
     return int(row * CELLS + column)
+
+
+def on_grid(points: Array) -> Bools:
+    """Tells which of some points (N, 2) lie on the grid: (N,)."""
+    inside: Bools = np.all(np.abs(points) < CELL_M * CELLS / 2, axis=1)
+    return inside
 
 
 def points_of(cells: Ints) -> Array:

@@ -8,6 +8,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.control.local_planner import LocalPlanner, LocalPlannerState
+from omninav.stages.geometry.plane.local_grid import cell_at
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.pose import Motion
@@ -58,6 +59,21 @@ class Robot:
 def test_a_free_way_is_left_as_it_is() -> None:
     robot = Robot(((-1.0, 1.0), (3.0, 1.0)))
     said = robot.vector_to(2.0, 0.0)
+    assert robot.look(said).vector is said
+
+
+@pytest.mark.parametrize("metres", [0.03, 0.05])
+def test_it_goes_straight_to_a_target_that_is_close_beside_a_wall(metres: float) -> None:
+    robot = Robot(((-1.0, 0.22), (1.0, 0.22)))
+    vector = robot.look(robot.vector_to(metres, 0.0)).vector
+    assert vector is not None
+    assert vector.direction == pytest.approx(0.0, abs=math.radians(5.0))
+
+
+def test_what_stands_at_the_edge_of_the_grid_is_not_in_the_way_of_what_lies_beyond() -> None:
+    robot = Robot()
+    robot.state.evidence.flat[cell_at(np.array([5.95, 5.55]))] = 1.0  # the straight way leaves the grid at 6, 3
+    said = robot.vector_to(20.0, 10.0)
     assert robot.look(said).vector is said
 
 

@@ -7,6 +7,7 @@ from omninav.stages.geometry.plane.local_grid import (
     cell_at,
     frontier,
     marked,
+    on_grid,
     points_of,
     prices,
     shifted,
@@ -35,12 +36,46 @@ def test_a_scan_that_does_not_look_back_says_nothing_of_what_is_there() -> None:
     assert not grid[:, : CELLS // 2 - 1].any()
 
 
+def test_a_scan_that_ends_where_it_began_is_taken_as_one_turn() -> None:
+    ranges, degree = np.full(361, np.inf), np.radians(1.0)
+    ranges[260:281] = 2.0  # to the left: the azimuths begin behind the robot
+    grid = marked(NOTHING, np.zeros(3), ranges, -np.pi + degree * np.arange(361), 4.0)
+    assert grid.flat[cell_at(np.array([0.05, 1.95]))] > 0.0
+    turned = marked(NOTHING, np.zeros(3), ranges[:-1], -np.pi + degree * np.arange(360), 4.0)
+    np.testing.assert_array_equal(grid, turned)
+
+
+def test_a_scan_that_turns_clockwise_tells_the_same() -> None:
+    ranges = np.linspace(1.0, 3.0, 91)
+    one = marked(NOTHING, np.zeros(3), ranges, AZIMUTHS[45:136], 4.0)
+    other = marked(NOTHING, np.zeros(3), ranges[::-1], AZIMUTHS[45:136][::-1], 4.0)
+    middles = points_of(np.arange(CELLS * CELLS))
+    tied = np.abs(np.degrees(np.arctan2(*middles.T[::-1])) % 2.0 - 1.0) < 1e-6  # between two beams
+    np.testing.assert_allclose(one.ravel()[~tied], other.ravel()[~tied])
+
+
+def test_what_echoes_and_free_beams_leave_undecided_is_known_all_the_same() -> None:
+    at = cell_at(np.array([0.95, 0.05]))
+    near, far = np.full(180, 1.0), np.full(180, 2.0)
+    grid = NOTHING
+    for ranges in (near, far, far):
+        grid = marked(grid, np.zeros(3), ranges, AZIMUTHS, 4.0)
+    assert grid.flat[at] == pytest.approx(0.0, abs=1e-6)
+    assert grid.flat[at] != 0.0
+
+
+def test_points_lie_on_the_grid_up_to_its_edges() -> None:
+    edge = CELL_M * CELLS / 2
+    assert on_grid(np.array([[0.0, edge - 0.01], [edge + 0.01, 0.0], [0.0, -edge - 0.01]])).tolist() == [1, 0, 0]
+
+
 def test_a_moved_grid_keeps_what_it_holds_where_it_was() -> None:
     grid = NOTHING.copy()
     grid.flat[cell_at(np.array([1.05, 2.05]))] = 1.0
     moved = shifted(grid, 5, -3)
     assert np.argwhere(moved).tolist() == (np.argwhere(grid) - (5, -3)).tolist()
-    assert not shifted(grid, -CELLS, 0).any()
+    for far in (CELLS, CELLS + 1, 2 * CELLS - 1, 3 * CELLS):
+        assert not shifted(grid, -far, far).any()
 
 
 def test_the_way_leads_around_a_wall_through_its_gap() -> None:
