@@ -22,6 +22,8 @@ SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 MAX_COORDINATE_M = 1e8
 """Twice the way around the Earth: no map projection puts anything further away."""
+MIN_SCAN_STEP = 1e-4
+"""Smallest angle between two ranges of a scan, radians: below that of any scanner."""
 LEVELS_OF_A_BLANK = 2
 """A constant image may differ by this much after JPEG compression (rounding of one level to either side)."""
 
@@ -69,13 +71,21 @@ def pose_of(message: Any) -> tuple[float, float, float]:
 
 
 def scan_of(message: Any) -> Scan:
-    """A LaserScan message as a `Scan`: what is no number, or out of its bounds, is no echo."""
+    """A LaserScan message as a `Scan`: what is no number, or out of its bounds, is no echo.
+
+    Raises ValueError for fewer than two ranges, and for angles and bounds that no scanner has.
+    """
     ranges = np.asarray(message.ranges, dtype=np.float64)
+    first, step = float(message.angle_min), float(message.angle_increment)
+    if len(ranges) < 2 or not math.isfinite(first) or not MIN_SCAN_STEP <= abs(step) <= 2.0 * math.pi:
+        raise ValueError(f"{len(ranges)} ranges from {first:g} in steps of {step:g} rad are no scan")
+    if not 0.0 <= message.range_min <= message.range_max <= MAX_COORDINATE_M:
+        raise ValueError(f"its ranges go from {message.range_min:g} to {message.range_max:g} m")
     heard = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges <= message.range_max)
     return Scan(
         ranges=np.where(heard, ranges, np.inf),
-        first=float(message.angle_min),
-        step=float(message.angle_increment),
+        first=first,
+        step=step,
         nearest=float(message.range_min),
         farthest=float(message.range_max),
     )

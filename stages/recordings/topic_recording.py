@@ -105,7 +105,9 @@ class TopicRecording:
             return scan_of(self._feed.decode(record.topic, self._feed.fetch(record.location)))
         except BadMessage as error:
             self._feed.drop("bad_message", str(error))
-            return None
+        except ValueError as error:
+            self._feed.drop("bad_message", f"{self.name}: a message on {record.topic}: {error}")
+        return None
 
     def digest(self) -> str:
         """sha256 over the bytes of all files that were read."""

@@ -221,6 +221,21 @@ def test_a_damaged_image_is_counted_and_the_next_one_is_used(
     same(drive.outs, replayed(tmp_path / "live.mcap"))
 
 
+def test_a_scan_that_none_can_be_is_counted_and_the_drive_goes_on(robot: Loopback, tmp_path: Path):
+    messages, kind = said(), "sensor_msgs/msg/LaserScan"
+    number = [number for number, each in enumerate(messages) if each.msgtype == kind][4]
+    still = {"angle_increment": 0.0, "range_max": 4.0, "ranges": np.ones(60, np.float32)}
+    stamp = messages[number].received
+    messages[number] = messages[number]._replace(data=encode_message(kind, still, stamp))
+    drive = Drive(tmp_path)
+    drive.join()
+    drive.feed(robot, messages)
+    drive.end()
+    assert any(name.startswith("bad_message") for name in drive.ctx.counts), drive.ctx.counts
+    assert len(drive.outs) > 5
+    same(drive.outs, replayed(tmp_path / "live.mcap"))
+
+
 def test_images_of_another_size_are_refused_at_the_start_and_counted_later(robot: Loopback, tmp_path: Path):
     kind = "sensor_msgs/msg/Image"
     small = {"height": 2, "width": 2, "encoding": "mono8", "step": 2, "data": np.array([0, 90, 120, 250], np.uint8)}
