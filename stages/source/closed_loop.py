@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
@@ -68,7 +68,7 @@ class ClosedLoop(Source):
     wheels say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.
     Images are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody knows the next command.
     An image that is lost or late on its way (`world.delivery`) is absent, and counted. Raises `UnreadableRecording`
-    for a place to start where the robot has no room.
+    for a place to start, or to go to, where the robot has no room, BadInput for goals where nothing reads them.
     """
 
     world: WorldConfig = WorldConfig()
@@ -78,8 +78,8 @@ class ClosedLoop(Source):
     route: str = "drive"
     """The robot starts where this route of the world does, and faces along it."""
     start: tuple[float, float, float] | Literal["drawn"] | None = None
-    """Where it starts instead: x, y (m), heading (rad); `drawn`: anywhere on the free floor, another place for every
-    seed."""
+    """Pose from which it starts instead: x, y (m), heading (rad); `drawn`: anywhere on the free floor, another
+    place for every seed."""
     carried_m: Annotated[float, Bounds(ge=0)] = 0.0
     """With a drawn start: how far away (m) somebody puts it down after half a second, where the straight way back is
     free."""
@@ -87,13 +87,13 @@ class ClosedLoop(Source):
     """Metres that it drives until somebody puts it down elsewhere, anywhere on the free floor, again and again; 0:
     never."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
-    """How long it drives at most."""
+    """Longest drive, s."""
     rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
     """Ticks a second."""
     rest_s: Annotated[float, Bounds(ge=0)] = 1.0
-    """How long it goes on once the planned route, or a path without one, has ended: it has arrived, or given up."""
+    """Time that it goes on once the planned route, or a path without one, has ended: it has arrived, or given up."""
     goals: tuple[tuple[float, float], ...] = ()
-    """Where it is asked to go on to, x, y (m), each once its route has ended: it has arrived, or given up."""
+    """Points that it is asked to go on to, x, y (m), each once its route has ended: it has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
@@ -110,6 +110,8 @@ class ClosedLoop(Source):
 
     def setup(self, ctx: Context) -> None:
         """Build the world; the bodies in it are looked up by place."""
+        if self.goals and not ctx.is_read("goal"):
+            raise BadInput("nodes.source.goals: this variant drives to no points; leave them out")
         world = World(self.world, self.day)
         self._world, self._scene = world, world.scene
         self._room = gather(world.obstacles, world.config.size, reach(self.world.robot))
@@ -122,6 +124,8 @@ class ClosedLoop(Source):
         for kidnapping in self._kidnappings:
             if kidnapping.to is not None:
                 refuse_no_room(self.world, self._room, kidnapping.to, "kidnappings")
+        for goal in self.goals:
+            refuse_no_room(self.world, self._room, goal, "goals")
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it."""

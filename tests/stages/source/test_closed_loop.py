@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from world_files import DEMO
 
-from omninav.pipeline import Context
+from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.control.clearance import free_ahead, roomier_side
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
@@ -77,6 +77,15 @@ def test_it_is_sent_on_from_goal_to_goal_and_ends_after_the_last():
     goals = [None if out is None or out.goal is None else (out.goal.x, out.goal.y) for out in outs]
     assert goals == [None, (1.0, 2.0), None, (3.0, 4.0), None, None, None, None]
     assert [out is not None for out in outs] == [True] * 7 + [False]
+
+
+def test_a_goal_without_room_is_refused_and_one_that_nobody_drives_to():
+    with pytest.raises(UnreadableRecording, match=r"goals: 3\.7, 2\.4 .* radius"):
+        Loop(goals=((1.5, 1.3), (3.7, 2.4)))
+    source, ctx = ClosedLoop(world=WORLD, goals=((1.5, 1.3),)), Context("source")
+    ctx.read = frozenset({"image", "scan"})
+    with pytest.raises(BadInput, match=r"nodes\.source\.goals"):
+        source.setup(ctx)
 
 
 def test_a_path_that_has_been_gone_ends_the_drive_a_moment_later():
