@@ -1,7 +1,9 @@
 """A video of a run: its images, and the robot on its map."""
 
 import math
+import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,10 +21,14 @@ from omninav.stages.values.thumbnails import decoded
 
 Array = npt.NDArray[np.float64]
 
-WIDTH, BAND = 960, 40
-"""Width of the video, and height of the line of text below the image, pixels."""
+WIDTH, BAND, MAX_HEIGHT = 960, 40, 960
+"""Width of the video, height of the line of text below the image, and largest height of the floor, pixels."""
+MIN_RATE, MAX_RATE = 1.0, 120.0
+"""Fewest and most images that the video shows in a second: players stumble over others."""
 MARGIN_M = 1.0
 """Floor that is shown around the grid, the map and the way, metres."""
+CARRIED_M = 0.5
+"""Distance between two poses beyond which the robot was carried, not driven, metres."""
 CODECS = {".mp4": "mp4v", ".webm": "VP80"}
 """Codecs by the file's ending: OpenCV has no encoder of H.264. Browsers play a .webm, which takes longer to write."""
 BLACK, GREY, LIGHT, GREEN, BLUE, ORANGE, PINK = (
@@ -67,12 +73,11 @@ class MakeVideo(Tool):
             raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and the end; see its frames.csv")
         lasted = scenes[-1]["seconds"] - scenes[0]["seconds"]
         rate = self.speed * (len(scenes) - 1) / lasted if lasted > 0.0 else self.speed
+        rate = min(max(rate, MIN_RATE), MAX_RATE)
         floor = Floor(scenes)
-        first = floor.frame(scenes[0], scenes[:1])
-        writer = _writer(out, rate, (first.shape[1], first.shape[0]))
-        for n, scene in enumerate(scenes):
-            writer.write(floor.frame(scene, scenes[: n + 1]))
-        writer.release()
+        with _writer(out, rate, (WIDTH, floor.seen_height + BAND + floor.height)) as writer:
+            for number in range(len(scenes)):
+                writer.write(floor.frame(number))
         print(f"{out}: {len(scenes)} images, {len(scenes) / rate:.0f} s, {out.stat().st_size / 1e6:.1f} MB")
 
 
@@ -93,6 +98,8 @@ class Floor:
 
     def __init__(self, scenes: list[dict[str, Any]]) -> None:
         last = scenes[-1]
+        self.scenes, self.poses = scenes, np.array([_pose(scene) for scene in scenes])
+        self.carried = np.flatnonzero(np.hypot(*np.diff(self.poses[:, :2], axis=0).T) > CARRIED_M) + 1
         self.seen_height = 0
         if "/panorama/compressed" in last:
             rows, columns = decoded(last["/panorama/compressed"].data.tobytes()).shape[:2]
@@ -105,22 +112,25 @@ class Floor:
                 for p in marker.points
             ]
         ).reshape(-1, 2)
-        shown = [self.references, *(_pose(scene)[None, :2] for scene in scenes)]
+        shown = [self.references, self.poses[:, :2]]
         grid = last.get("/grid")
         if grid is not None:
             corner = np.array([grid.info.origin.position.x, grid.info.origin.position.y])
             shown.append(corner + grid.info.resolution * np.array([[0, 0], [grid.info.width, grid.info.height]]))
         points = np.concatenate(shown)
-        self.low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
-        self.scale = WIDTH / (high[0] - self.low[0])
-        self.height = 2 * round(self.scale * (high[1] - self.low[1]) / 2)
+        low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+        width, depth = high - low
+        self.scale = min(WIDTH / width, MAX_HEIGHT / depth)
+        self.height = 2 * max(1, round(self.scale * depth / 2))
+        self.low = (low + high) / 2 - np.array([WIDTH, self.height]) / (2 * self.scale)
         self.plan = np.full((self.height, WIDTH, 3), 255, np.uint8)
         if grid is not None:
             cells = np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
-            rows, columns = np.nonzero(cells > 50)
-            corners = corner + grid.info.resolution * np.column_stack([columns, rows])
-            for one, other in zip(self.pixels(corners), self.pixels(corners + grid.info.resolution), strict=True):
-                cv2.rectangle(self.plan, one.tolist(), other.tolist(), LIGHT, -1)
+            ends = self.pixels(corner + grid.info.resolution * np.array([[0, 0], cells.shape[::-1]]))
+            (left, bottom), (right, top) = np.clip(ends, 0, (WIDTH, self.height)).tolist()
+            occupied = np.where(cells[::-1] > 50, np.uint8(255), np.uint8(0))
+            there = self.plan[top:bottom, left:right]
+            there[cv2.resize(occupied, there.shape[1::-1], interpolation=cv2.INTER_AREA) > 0] = LIGHT
         for point in self.pixels(self.references):
             cv2.circle(self.plan, point.tolist(), 1, GREY, -1, cv2.LINE_AA)
 
@@ -129,22 +139,21 @@ class Floor:
         x, y = (self.scale * (points[:, :2] - self.low)).T
         return np.round(np.column_stack([x, self.height - y])).astype(np.int32)
 
-    def frame(self, scene: dict[str, Any], so_far: list[dict[str, Any]]) -> Pixels:
-        """One image of the video: what the robot sees, a line of text, the floor."""
-        floor = self.plan.copy()
+    def frame(self, number: int) -> Pixels:
+        """One image of the video, of the scene with a number: what the robot sees, a line of text, the floor."""
+        scene, floor = self.scenes[number], self.plan.copy()
         if "/plan" in scene:
             route = np.array([(each.pose.position.x, each.pose.position.y) for each in scene["/plan"].poses])
             cv2.polylines(floor, [self.pixels(route.reshape(-1, 2))], False, GREEN, 2, cv2.LINE_AA)
         belief = np.array([(each.position.x, each.position.y) for each in _field(scene, "/belief", "poses")])
         for point in self.pixels(belief.reshape(-1, 2)):
             cv2.circle(floor, point.tolist(), 2, PINK, -1, cv2.LINE_AA)
-        way = np.array([_pose(each)[:2] for each in so_far])
-        jumps = np.flatnonzero(np.hypot(*np.diff(way, axis=0).T) > 0.5) + 1  # it was carried
-        for piece in np.split(way, jumps):
-            cv2.polylines(floor, [self.pixels(piece)], False, BLACK, 1, cv2.LINE_AA)
+        way = self.pixels(self.poses[: number + 1])
+        for piece in np.split(way, self.carried[self.carried <= number]):
+            cv2.polylines(floor, [piece], False, BLACK, 1, cv2.LINE_AA)
         state = scene["/estimate/state"].data if "/estimate/state" in scene else ""
         colour = BLUE if state in ("tracking", "blind", "") else ORANGE
-        self._dart(floor, _pose(scene), BLACK)
+        self._dart(floor, self.poses[number], BLACK)
         if "/estimate/pose" in scene:
             self._dart(floor, np.array(pose_of(scene["/estimate/pose"])), colour)
         said = f"{scene['seconds']:6.1f} s   {state}"
@@ -179,8 +188,19 @@ def _field(scene: dict[str, Any], topic: str, name: str) -> Any:
     return getattr(scene[topic], name) if topic in scene else []
 
 
-def _writer(out: Path, rate: float, size: tuple[int, int]) -> cv2.VideoWriter:
-    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*CODECS[out.suffix]), rate, size)
-    if not writer.isOpened():
+@contextmanager
+def _writer(out: Path, rate: float, size: tuple[int, int]) -> Iterator[cv2.VideoWriter]:
+    """A writer of a hidden file beside `out`, which takes its place when the block ends well."""
+    if not out.parent.is_dir():
         raise BadInput(f"out: {out} cannot be written; is its folder there?")
-    return writer
+    part = out.with_name(f".{out.stem}.part{out.suffix}")  # the codec's container goes by the ending
+    writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*CODECS[out.suffix]), rate, size)
+    try:
+        if not writer.isOpened():
+            raise BadInput(f"out: {out} cannot be written; may you write to its folder, or type out=video.mp4")
+        yield writer
+        writer.release()
+        os.replace(part, out)
+    finally:
+        writer.release()
+        part.unlink(missing_ok=True)

@@ -5,9 +5,17 @@ import pytest
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.plots.pose_messages import pose_messages
-from omninav.stages.tools.video import BLUE, ORANGE, MakeVideo, scenes_in
+from omninav.stages.tools.video import BAND, BLUE, LIGHT, MAX_HEIGHT, ORANGE, WIDTH, Floor, MakeVideo, scenes_in
 
 SECOND = 10**9
+
+
+def write_scene(log, seconds, x, y):
+    header = {"stamp": {"sec": 100, "nanosec": 0}, "frame_id": "map"}
+    pose = pose_messages(np.array([[x, y, 0.0]]))[0]
+    log.write(
+        "/ground_truth/pose", "geometry_msgs/msg/PoseStamped", round(SECOND * seconds), {"header": header, "pose": pose}
+    )
 
 
 @pytest.fixture
@@ -46,6 +54,55 @@ def test_a_video_shows_when_the_robot_is_lost(folder, capsys):
     bands = [frame[436, -20] for frame in frames]
     colours = [min((BLUE, ORANGE), key=lambda colour: np.abs(band - np.array(colour, float)).sum()) for band in bands]
     assert colours == [BLUE] * 4 + [ORANGE] * 5
+
+
+def test_a_long_way_along_y_fits_into_the_height_and_lies_in_the_middle(tmp_path):
+    with LogWriter(tmp_path / "result.mcap") as log:
+        for k in range(51):
+            write_scene(log, 100 + k, 7.0, 0.4 * k)
+    floor = Floor(list(scenes_in(tmp_path / "result.mcap")))
+    assert floor.frame(50).shape == (BAND + MAX_HEIGHT, WIDTH, 3)
+    assert floor.pixels(np.array([[7.0, 10.0]])).tolist() == [[WIDTH // 2, MAX_HEIGHT // 2]]
+    assert (floor.frame(50)[BAND:, WIDTH // 2 - 2 : WIDTH // 2 + 3] < 100).any(
+        axis=(1, 2)
+    ).sum() > 800  # the way so far
+    assert (floor.frame(5)[BAND:, WIDTH // 2 - 2 : WIDTH // 2 + 3] < 100).any(axis=(1, 2)).sum() < 200
+
+
+def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
+    with LogWriter(tmp_path / "result.mcap") as log:
+        write_scene(log, 100, 1.0, 1.0)
+        data = np.zeros((30, 50), np.int8)
+        data[2, 40] = 100
+        place = {"position": {"x": -1.0, "y": 0.0}}
+        info = {"resolution": 0.1, "width": 50, "height": 30, "origin": place}
+        log.write("/grid", "nav_msgs/msg/OccupancyGrid", SECOND * 100, {"info": info, "data": data.ravel()})
+    floor = Floor(list(scenes_in(tmp_path / "result.mcap")))
+    rows, columns = np.nonzero((floor.plan == LIGHT).all(axis=2))
+    expected = floor.pixels(np.array([[3.0, 0.3], [3.1, 0.2]]))
+    drawn = np.array([[columns.min(), rows.min()], [columns.max(), rows.max()]])
+    assert np.abs(drawn - expected).max() <= 1
+
+
+@pytest.mark.parametrize(("seconds", "rate"), [(0.001, 120.0), (100.0, 1.0)])
+def test_a_video_has_a_rate_that_players_can_show(tmp_path, seconds, rate):
+    with LogWriter(tmp_path / "result.mcap") as log:
+        for k in range(3):
+            write_scene(log, 100 + seconds * k, 0.1 * k, 0.0)
+    MakeVideo(run_folder=str(tmp_path), out=str(tmp_path / "video.mp4"), speed=1.0).run(Context("video"))
+    assert cv2.VideoCapture(str(tmp_path / "video.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(rate)
+
+
+def test_a_video_that_fails_leaves_the_one_that_was_there(folder, monkeypatch):
+    def fails(floor, number):
+        raise RuntimeError("half way")
+
+    (folder / "video.mp4").write_bytes(b"before")
+    monkeypatch.setattr(Floor, "frame", fails)
+    with pytest.raises(RuntimeError):
+        MakeVideo(run_folder=str(folder), out=str(folder / "video.mp4")).run(Context("video"))
+    assert {path.name: path.read_bytes() for path in folder.glob("*video*")} == {"video.mp4": b"before"}
+    assert [path.name for path in folder.glob(".video*")] == []
 
 
 def test_a_scene_holds_the_last_of_each_topic(folder):
