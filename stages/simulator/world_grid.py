@@ -36,9 +36,10 @@ class WorldGrid(Stage):
         """Rasterise the world."""
         if self.grid is not None or self.log is not None:
             return self.Out()
-        if math.prod(self.world.size) > MAX_CELLS * self.resolution_m**2:
+        world = World(self.world, 0)
+        if math.prod(world.config.size) > MAX_CELLS * self.resolution_m**2:
             raise BadInput(f"grid: {self.world.name} has more than {MAX_CELLS:,} cells; use a larger resolution_m")
-        cells, origin = occupancy(World(self.world, 0), self.resolution_m)
+        cells, origin = occupancy(world, self.resolution_m)
         ctx.fact("grid", f"of the built-in world {self.world.name}")
         states = np.where(cells, OCCUPIED, FREE).astype(np.uint8)
         return self.Out(grid=OccupancyGrid(states, self.resolution_m, origin, "world"))
