@@ -90,7 +90,7 @@ def drawn_office(world: WorldConfig) -> WorldConfig:
 
 
 def _contains_the_others(room: Room, rooms: tuple[Room, ...]) -> bool:
-    """Whether a room is a corridor: without walls, or around all others."""
+    """Tells whether a room is a corridor: without walls, or around all others."""
     return not room.walls or (len(rooms) > 1 and all(_holds(room, _middle(other)) for other in rooms))
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .config import AisleBlock, Block, Door, Point, Room, Route, WallPanel, WorldConfig
+from .config import AisleBlock, Block, Door, Kidnapping, Point, Room, Route, WallPanel, WorldConfig
 from .layout import expand
 from .mirrored import Mirrored
 from .streams import stream
@@ -20,8 +20,10 @@ LARGE_STORE = 4
 """Departments from which on a store has a sales area with an office amid it."""
 MAX_PANEL_SHIFT_M = 1.2
 """Metres that a window or picture moves along its wall at most."""
+ROBOT_ROOM_M = 0.5
+"""Metres from the departments within which a robot is not put down but in an aisle."""
 PALLET_SPACING_M = 3.4
-"""Between the middles of pallets, in x and in y."""
+"""Metres between the middles of pallets, in x and in y."""
 
 
 class Part(NamedTuple):
@@ -38,7 +40,7 @@ class Part(NamedTuple):
         return self.x1 - self.x0, self.y1 - self.y0
 
     def holds(self, point: Point, inset: float = 0.0) -> bool:
-        """Whether a point lies in it, at least `inset` m from its edge."""
+        """Tells whether a point lies in it, at least `inset` m from its edge."""
         return self.x0 + inset < point[0] < self.x1 - inset and self.y0 + inset < point[1] < self.y1 - inset
 
     def grown(self, by: float) -> "Part":
@@ -213,12 +215,10 @@ def _sales_area(part: Part, rng: np.random.Generator) -> tuple[Room, list[Block]
 def _led(drawn: WorldConfig, route: Route, listed: WorldConfig, over: Mirrored, aisles: list[MainAisle]) -> Route:
     """A listed route on the drawn floor, which is mirrored to it.
 
-    Points in the listed main aisles go to the nearest place in a drawn one. Laps that go in and out of aisles do so on
-    both sides of the last main aisle.
+    Points in the listed main aisles go to the nearest place in a drawn one, as do those at which a kidnapped robot is
+    put down among shelves. Laps that go in and out of aisles do so on both sides of the last main aisle.
     """
     departments = [_part(block) for block in listed.aisle_blocks]
-    if aisles and _is_comb(route, departments):
-        return _comb(drawn, route, aisles[-1])
     outline = np.array(departments)
     bounds = Part(*outline[:, :2].min(axis=0).tolist(), *outline[:, 2:].max(axis=0).tolist())
 
@@ -231,11 +231,24 @@ def _led(drawn: WorldConfig, route: Route, listed: WorldConfig, over: Mirrored, 
             there += [new] if not there or math.dist(new, there[-1]) > 1.0 else []
         return tuple(there)
 
+    def put(kidnapping: Kidnapping) -> Kidnapping:
+        if kidnapping.to is None:
+            return kidnapping
+        x, y, heading = kidnapping.to
+        new = over.point((x, y))
+        if bounds.grown(ROBOT_ROOM_M).holds((x, y)):
+            near = [aisle.nearest(new) for aisle in aisles] or [aisle.ends[0] for aisle in expand(drawn).aisles]
+            new = min(near, key=lambda point: math.dist(point, new))
+        return replace(kidnapping, to=(*new, over.heading(heading)))
+
+    route = replace(route, kidnappings=tuple(map(put, route.kidnappings)))
+    if aisles and _is_comb(route, departments):
+        return _comb(drawn, route, aisles[-1])
     return replace(route, waypoints=moved(route.waypoints), lead_in=moved(route.lead_in))
 
 
 def _is_comb(route: Route, departments: list[Part]) -> bool:
-    """Whether laps lead into aisles."""
+    """Tells whether laps lead into aisles."""
     return route.kind == "laps" and any(part.holds(at, 0.5) for part in departments for at in route.waypoints)
 
 

@@ -13,7 +13,7 @@ EXCHANGED: dict[Side, Side] = {"east": "north", "north": "east", "west": "south"
 
 @dataclass(frozen=True)
 class Mirrored:
-    """How a plan is turned over: x and y exchanged first, then mirrored within the floor's `size` (m) of after."""
+    """A way to turn a plan over: x and y exchanged first, then mirrored within the floor's `size` (m) of after."""
 
     size: Point
     exchanged: bool = False
@@ -21,7 +21,7 @@ class Mirrored:
     """In x, in y."""
 
     def point(self, point: Point) -> Point:
-        """Where a point comes to lie."""
+        """Gives the place to which a point comes."""
         x, y = point[::-1] if self.exchanged else point
         return self.size[0] - x if self.flips[0] else x, self.size[1] - y if self.flips[1] else y
 

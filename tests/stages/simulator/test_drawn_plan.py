@@ -10,7 +10,7 @@ from world_files import world_of
 
 from omninav.pipeline import BadInput
 from omninav.stages.simulator import route_planning
-from omninav.stages.simulator.config import Door, Room, WorldConfig
+from omninav.stages.simulator.config import Door, Kidnapping, Room, WorldConfig
 from omninav.stages.simulator.drawn_plan import laid_out
 from omninav.stages.simulator.mirrored import Mirrored
 from omninav.stages.simulator.standing_room import standing_room, within
@@ -109,6 +109,21 @@ def test_a_route_that_is_described_by_rooms_goes_through_the_same_rooms(draw: in
         return {room.name for room in world.rooms if len(within(points, room))}
 
     assert visited(plan) == visited(listed)
+
+
+@pytest.mark.parametrize("name", ["home_store", "home_store_mid", "home_store_small"])
+@each_draw
+def test_a_kidnapped_robot_is_put_down_where_it_has_room(name: str, draw: int) -> None:
+    store = drawn(name, draw)
+    corners = np.array([(block.corner, np.add(block.corner, block.size)) for block in store.aisle_blocks])
+    among_shelves = np.random.default_rng(1).uniform(corners[:, 0].min(axis=0), corners[:, 1].max(axis=0), (300, 2))
+    puts = tuple(Kidnapping(at=9.0, to=(x, y, 0.0)) for x, y in among_shelves.tolist())
+    turn = Kidnapping(at=5.0, turn=1.0)
+    route = dataclasses.replace(store.routes["drive"], kidnappings=(turn, *puts))
+    world = World(dataclasses.replace(store, routes={**store.routes, "drive": route}))
+    first, *moved = world.config.routes["drive"].kidnappings
+    assert first == turn
+    assert world.clearance([put.to[:2] for put in moved if put.to]).min() > world.config.robot.radius
 
 
 @each_draw
