@@ -43,9 +43,11 @@ class LocalisedShare(MetricStage):
         """The whole run at once."""
         last = drive.last_log
         placed = int(known(last.truth).sum())  # an image without an estimate is in no share
+        if not placed:
+            return self.Out()
         last = last.at(known(last.truth) & known(last.estimate))
         if not len(last):
-            return self.Out()
+            return self.Out(metrics=Metrics({"localised": dict.fromkeys(THRESHOLDS, 0.0)}, QUANTITIES))
         metres, degrees = position_errors(last.estimate, last.truth), heading_errors_deg(last.estimate, last.truth)
         within = {name: int(((metres <= m) & (degrees <= d)).sum()) for name, (m, d) in THRESHOLDS.items()}
         shares = {name: number / placed for name, number in within.items()}

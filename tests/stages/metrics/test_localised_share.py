@@ -85,4 +85,7 @@ def test_frames_without_truth_do_not_count_and_those_without_an_estimate_are_in_
     found = LocalisedShare().step(Context("l"), drive).metrics.values
     assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (0.75, 0)
     drive.estimate[:] = np.nan
+    found = LocalisedShare().step(Context("l"), drive).metrics.values
+    assert found == {"localised": {"fine": 0.0, "medium": 0.0, "coarse": 0.0}}
+    drive.truth[:] = np.nan
     assert LocalisedShare().step(Context("l"), drive).metrics is None
