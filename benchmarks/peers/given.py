@@ -35,7 +35,8 @@ def localise(pose_of: Callable[[Path, Any], Any]) -> None:
         began = time.process_time()
         pose = pose_of(file, np.zeros(3) if last is None else between(last, here))
         took, last = 1000.0 * (time.process_time() - began), here
-        lines.append(",".join([stamp, *map(str, ("", "", "") if pose is None else pose), str(took)]))
+        numbers = ("", "", "") if pose is None else (*pose[:2], (pose[2] + np.pi) % (2 * np.pi) - np.pi)
+        lines.append(",".join([stamp, *map(str, numbers), str(took)]))
     (FOLDER / "poses.csv").write_text("\n".join(lines) + "\n")
 
 

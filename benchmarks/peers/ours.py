@@ -3,6 +3,7 @@
 omninav variant=peer command="python benchmarks/peers/ours.py variant=omninav" tour=tour.mcap log=drive.mcap
 """
 
+import shutil
 import sys
 import tempfile
 import warnings
@@ -28,11 +29,12 @@ with omninav.open(*sys.argv[1:-1], folder=run / "run", **settings) as session:
     odometry = np.zeros(3)
 
     def pose_of(file, motion):
-        x, y, turn = motion
+        x, y, turn = np.nan_to_num(motion)
         cos, sin = np.cos(odometry[2]), np.sin(odometry[2])
         odometry[:] += (cos * x - sin * y, sin * x + cos * y, turn)
         pose = session.step(image=cv2.imread(str(file)), odometry=odometry.copy()).estimate.pose
         return pose.x, pose.y, pose.heading
 
     localise(pose_of)
-    (run / "run" / "map.omap").replace(FOLDER / "map.omap")
+shutil.move(run / "run" / "map.omap", FOLDER / "map.omap")
+shutil.rmtree(run)

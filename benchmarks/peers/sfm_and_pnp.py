@@ -8,6 +8,7 @@ folder as a second word keeps maps: `python benchmarks/peers/sfm_and_pnp.py maps
 
 import hashlib
 import math
+import os
 import shutil
 import sys
 import tempfile
@@ -37,7 +38,8 @@ APART_M, APART_RAD = 0.2, 0.35
 
 KIND = pycolmap.FeatureExtractorType.SIFT
 
-work = Path(tempfile.mkdtemp())
+place = tempfile.TemporaryDirectory()
+work = Path(place.name)
 camera = pycolmap.Camera.create_from_model_id(1, pycolmap.CameraModelId.EQUIRECTANGULAR, 0.0, COLUMNS, COLUMNS // 2)
 v, u = np.mgrid[0.5 : COLUMNS // 2, 0.5:COLUMNS]
 rays = camera.cam_ray_from_img(np.column_stack([u.ravel(), v.ravel()])) @ UPRIGHT
@@ -125,14 +127,18 @@ def mapped():
 
 FILE = FOLDER / "map.npz"
 if len(sys.argv) > 2:  # a folder, in which later calls find the maps of earlier ones
-    known = Path(sys.argv[1]) / f"{hashlib.sha256((FOLDER / 'map' / 'images.csv').read_bytes()).hexdigest()[:16]}.npz"
+    digest = hashlib.sha256()
+    for file in [FOLDER / "camera.yaml", *sorted((FOLDER / "map").iterdir())]:
+        digest.update(file.read_bytes())
+    known = Path(sys.argv[1]) / f"{digest.hexdigest()[:16]}.npz"
     known.parent.mkdir(exist_ok=True)
     if known.exists():
         shutil.copy(known, FILE)
 if not FILE.exists():
     np.savez(FILE, *mapped())
     if len(sys.argv) > 2:
-        shutil.copy(FILE, known)
+        shutil.copy(FILE, part := known.with_suffix(f".{os.getpid()}.part"))
+        part.replace(known)
 *parts, ends = np.load(FILE).values()
 references = [
     (pycolmap.keypoints_from_matrix(keypoints), pycolmap.FeatureDescriptors(KIND, looks), points)
@@ -140,7 +146,7 @@ references = [
 ]
 # pycolmap 4.2.1 has an index of visual words, but its queries return nothing to Python.
 words = vocabulary_and_words([looks.data for _, looks, _ in references], 2048)
-shutil.rmtree(work)
+place.cleanup()
 
 
 def pose_of(file, motion):
