@@ -14,7 +14,7 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Pose
 
 COMPRESSION = 1
-"""Of PNG, 0 to 9: the fastest that makes an image smaller."""
+"""Level of PNG, 0 to 9: the fastest that makes an image smaller."""
 
 
 class EncodedImage(Value):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -25,7 +26,21 @@ from omninav.stages.values.pose import Motion, Pose
 from .collect_drive import CollectDrive
 
 LOG = "localiser.log"
-"""What it printed, in the run's folder."""
+"""File of the run's folder that holds its output."""
+SUPERVISOR = """
+import os, signal, subprocess, sys, threading
+try:
+    process = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+except OSError as error:
+    sys.exit(f"it cannot be run: {error.strerror}")
+def watch():
+    os.read(0, 1)
+    os.killpg(0, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
+threading.Thread(target=watch, daemon=True).start()
+code = process.wait()
+os._exit(code if code >= 0 else 128 - code)
+"""
+"""Program that runs another, and ends it with all that it has started when its own standard input is closed."""
 QUANTITIES = {
     "peer.image_cpu_ms": Quantity(title="Processor time of an image", unit="ms", better="lower"),
     "peer.map_cpu_s": Quantity(title="Processor time of all the rest, the map", unit="s", better="lower"),
@@ -42,8 +57,8 @@ class OutsideLocaliser(Stage):
     It is called as `COMMAND FOLDER` after the last image, and reads and writes what `recordings/localiser_folder.py`
     says. Under `peer`: its processor time with that of its children, in all (`cpu_s`), and where its `poses.csv` says
     what each image took, of an image and of all the rest; the files that it leaves in the folder beside its poses;
-    lines of the files that the command names, without empty ones. Raises `BadInput` with its last words where it fails,
-    and where its poses cannot be read. Whoever stops the run stops it.
+    lines of the text files that the command names, without empty ones and what they import. Raises `BadInput` with its
+    last words where it fails, and where its poses cannot be read. It ends with the run, however that ends.
     """
 
     command: str | None = None
@@ -56,8 +71,12 @@ class OutsideLocaliser(Stage):
         metrics: Metrics
 
     def inputs_digest(self) -> str | None:
-        """Hash of the files that the command names."""
-        return digest_text(*map(digest_file, self._files())) if self._files() else None
+        """Hash of the files that the command names, and of all Python files beside one of Python."""
+        files = self._files()
+        beside = {
+            module for file in files if file.suffix == ".py" for module in file.parent.glob("*.py") if module.is_file()
+        }
+        return digest_text(*map(digest_file, [*files, *sorted(beside)])) if files else None
 
     def step(
         self,
@@ -77,7 +96,7 @@ class OutsideLocaliser(Stage):
             ctx.doing(f"{cut(self.command or '')}: a map of {len(map)} images, a drive of {len(images)}")
             used = self._run(folder, (ctx.folder or folder) / LOG)
             try:
-                poses, image_ms = read_poses(folder, images)
+                poses, images_ms = read_poses(folder, images)
             except BadInput as wrong:
                 raise BadInput(f"{cut(self.command or '')}: {wrong}".replace(f"{folder}{os.sep}", "")) from None
             kept = [path for path in folder.rglob("*") if path.is_file() and path not in given]
@@ -88,12 +107,11 @@ class OutsideLocaliser(Stage):
             for pose in [Pose(*row.tolist())]
         ]
         drive = CollectDrive().step(ctx, ticks, truth, motion, estimates).drive
-        lines = [
-            line for file in self._files() for line in file.read_text(encoding="utf-8", errors="replace").splitlines()
-        ]
+        contents = [file.read_bytes() for file in self._files()]
+        lines = [line for content in contents if b"\0" not in content for line in content.splitlines()]
         values = {
-            "image_cpu_ms": image_ms,
-            "map_cpu_s": None if used is None or image_ms is None else used - image_ms * len(images) / 1e3,
+            "image_cpu_ms": float(np.median(images_ms)) if len(images_ms) else None,
+            "map_cpu_s": None if used is None or not len(images_ms) else used - float(images_ms.sum()) / 1e3,
             "cpu_s": used,
             "kept_mb": size / 1e6,
             "lines": sum(bool(line.strip()) for line in lines) or None,
@@ -112,16 +130,13 @@ class OutsideLocaliser(Stage):
         return words
 
     def _files(self) -> list[Path]:
-        return [Path(word) for word in self._words() if Path(word).is_file()]
+        return [Path(word) for word in self._words() if os.path.isfile(word)]
 
     def _run(self, folder: Path, log: Path) -> float | None:
         """Run it to its end, and give the seconds of processor time that it took; None where nothing counts them."""
         before = _children_s()
         with log.open("w+b") as output:
-            try:
-                ended = _wait(self._words(), folder, output)
-            except OSError as error:
-                raise BadInput(f"command: {cut(self.command or '')} cannot be run: {error.strerror}") from None
+            ended = wait(self._words(), folder, output)
             if ended:
                 output.seek(max(0, output.tell() - 2000))
                 words = output.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
@@ -130,21 +145,27 @@ class OutsideLocaliser(Stage):
         return None if before is None or after is None else after - before
 
 
-def _wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
-    """Run a program until it ends, or until somebody stops this one: then nothing of it goes on."""
+def wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
+    """Run a program until it ends, or this process does, even killed: then nothing of it goes on."""
     own = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])}
     own.pop("PYTHONSAFEPATH", None)  # which a command of ours sets for processes of ours
     process = subprocess.Popen(
-        [*words, str(folder)], stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=own, start_new_session=True
+        [sys.executable, "-I", "-S", "-c", SUPERVISOR, *words, str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=output,
+        stderr=output,
+        env=own,
+        start_new_session=True,
     )
     try:
         return process.wait()
-    except BaseException:
+    finally:
         if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.kill()
+            with suppress(OSError):  # nothing of it is left
+                os.killpg(process.pid, signal.SIGKILL)
+        assert process.stdin is not None
+        process.stdin.close()
         process.wait()
-        raise
 
 
 def _children_s() -> float | None:

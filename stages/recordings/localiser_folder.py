@@ -9,7 +9,7 @@ from omninav.pipeline.graph.problems import BadInput, counted
 
 from .camera_yaml import parse_camera
 from .recorded_images import RecordedImages
-from .tables import Time, read_table
+from .tables import NO_TIME, Time, read_table
 from .truth_file import trajectory_rows
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +22,9 @@ SAME_TIME_S = 0.001
 
 
 def write_folder(folder: Path, map: RecordedImages, drive: RecordedImages) -> list[Path]:
-    """Write what the localiser is given. Returns the files. Raises `BadInput` where the map has no image with a pose.
+    """Write what the localiser is given. Returns the files.
+
+    Raises `BadInput` where the map has no image with a pose, and where it is of another camera than the drive.
 
     `camera.yaml`, and `rays.npy` (height, width, 3): the direction in which each pixel looks, a unit vector of float32
     (x forward, y left, z up), NaN where it sees nothing; `map/images.csv` (file, time, x, y, heading) and
@@ -32,6 +34,8 @@ def write_folder(folder: Path, map: RecordedImages, drive: RecordedImages) -> li
     placed = np.flatnonzero(np.isfinite(map.truth).all(axis=1))
     if not len(placed):
         raise BadInput("the tour has no true poses, which a localiser of your own is given: truth=FILE names some")
+    if map.camera != drive.camera:
+        raise BadInput("the tour and the log are of two cameras, or sizes of image; a localiser is given one")
     (folder / "camera.yaml").write_text(drive.camera, encoding="utf-8")
     camera = parse_camera(drive.camera, "camera.yaml")
     rays, _ = camera.unproject(camera.grid())
@@ -66,30 +70,39 @@ def _write_images(
     return files
 
 
-def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, float | None]:
-    """Poses (N, 3) that the localiser left, NaN where it gave none; and the median processor time of an image (ms).
+def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, Array]:
+    """Poses (N, 3) that the localiser left, NaN where it gave none; and the processor time of each image (ms).
 
     `poses.csv` (time, x, y and heading, or qx, qy, qz, qw; perhaps `cpu_ms`) or `poses.tum` (time x y z qx qy qz qw).
-    The time is None where the file does not state it. Raises `BadInput` where there is no such file, where it cannot be
-    read, and where one of its times is that of no image, or of an image that has a pose.
+    There are as many of these as the file states. Raises `BadInput` where there is no such file, where it cannot be
+    read or is doubted, and where one of its times is that of no image, or of an image that has a pose.
     """
     file = next((folder / name for name in POSES if (folder / name).is_file()), None)
     if file is None:
         raise BadInput(f"it left no {' and no '.join(POSES)} in the folder that it was given; docs/peers.md says how")
     poses = np.full((len(drive), 3), np.nan)
     if not file.stat().st_size:
-        return poses, None
-    times, rows, impossible, _ = trajectory_rows(file)
+        return poses, np.empty(0)
+    times, rows, impossible, doubts = trajectory_rows(file)
     if impossible:
         raise BadInput(f"{file.name}: {counted(impossible, 'quaternion')} of no rotation")
+    if doubts:
+        raise BadInput(f"{file.name}: {doubts[0]}")
     given = np.isfinite(rows[:, :2]).all(axis=1)
+    times = times[given]
+    if (times == NO_TIME).any():
+        raise BadInput(f"{file.name}: a pose without a time; it is that of the image in drive/images.csv")
+    if len(times) > len(drive):
+        raise BadInput(f"{file.name}: {counted(len(times), 'pose')} of {counted(len(drive), 'image')}")
     if np.isnan(rows[given, 2]).any():
         raise BadInput(f"{file.name}: a pose without a heading; leave out the row of an image that has none")
-    gaps = np.abs(times[given, None] - drive.stamps[None])
-    image, gap = gaps.argmin(axis=1), gaps.min(axis=1)
+    after = np.searchsorted(drive.stamps, times).clip(0, len(drive) - 1)
+    before = (after - 1).clip(0)
+    image = np.where(times - drive.stamps[before] <= drive.stamps[after] - times, before, after)
+    gap = np.abs(times - drive.stamps[image])
     if (gap > SAME_TIME_S * 1e9).any():
         first, last = drive.stamps[[0, -1]] / 1e9
-        wrong = times[given][gap > SAME_TIME_S * 1e9][0] / 1e9
+        wrong = times[gap > SAME_TIME_S * 1e9][0] / 1e9
         raise BadInput(
             f"{file.name}: {wrong:.6f} s is the time of no image of drive/images.csv ({first:.6f} to {last:.6f} s)"
         )
@@ -99,9 +112,9 @@ def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, float | None
     return poses, _cost(file)
 
 
-def _cost(file: Path) -> float | None:
+def _cost(file: Path) -> Array:
     table = read_table(file) if file.suffix == ".csv" else None
     if table is None or COST not in table.names:
-        return None
+        return np.empty(0)
     took = table.nanoseconds(Time(COST, "ms"))
-    return float(np.median(took[took >= 0])) / 1e6 if (took >= 0).any() else None
+    return took[took >= 0] / 1e6

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -52,7 +54,7 @@ def test_its_poses_are_the_estimates_and_an_image_without_one_has_none(tmp_path:
     found = out.metrics.values["peer"]
     assert (found["without_pose"], found["kept_mb"], found["image_cpu_ms"]) == (0.25, 0.003, 12.0)
     assert found["lines"] == len([line for line in ECHO.splitlines() if line])
-    assert found["cpu_s"] == pytest.approx(found["map_cpu_s"] + 4 * 0.012)
+    assert found["cpu_s"] == pytest.approx(found["map_cpu_s"] + 0.074)  # 10, 11, 40 and 13 ms
 
 
 def test_a_tum_file_will_do_and_an_empty_one_says_that_no_image_has_a_pose(tmp_path: Path):
@@ -75,6 +77,10 @@ def test_a_tum_file_will_do_and_an_empty_one_says_that_no_image_has_a_pose(tmp_p
         ("write('time,x,y,heading\\n17.5,1,2,0')", "17.500000 s is the time of no image of drive/images.csv"),
         ("write('time,x,y,heading\\n1000000000,1,2,0\\n1000000000,1,2,0')", "two poses of one image"),
         ("write('time,x,y,heading\\n1000000000,1e40,2,0')", "out of all proportion"),
+        ("write('time,x,y,heading\\n1000000000,1,2,90')", "headings of up to 90 are read as radians"),
+        ("write('time,x,y,qx,qy,qz,qw\\n1000000000,1,2,1,0,0,0')", "is w the first of their quaternions"),
+        ("write('time,x,y,heading\\n,1,2,0.5')", "a pose without a time"),
+        ("write('time,x,y,heading' + 5 * '\\n1000000000,1,2,0')", "5 poses of 4 images"),
     ],
 )
 def test_what_is_wrong_is_said_in_its_words_or_with_the_file(tmp_path: Path, program: str, said: str):
@@ -100,20 +106,35 @@ def test_a_command_that_cannot_be_read_is_refused_before_anything_is_run(command
 
 def test_its_program_is_part_of_what_a_result_follows_from(tmp_path: Path):
     program, stage = tmp_path / "mine.py", OutsideLocaliser(command=f"python {tmp_path / 'mine.py'}")
-    digests = []
-    for text in ("1", "2", "1"):
-        program.write_text(text)
-        digests.append(stage.inputs_digest())
-    assert digests[0] == digests[2] != digests[1]
+    for file in (program, tmp_path / "imported.py"):
+        digests = []
+        for text in ("1", "2", "1"):
+            file.write_text(text)
+            digests.append(stage.inputs_digest())
+        assert digests[0] == digests[2] != digests[1]
+
+
+def test_a_word_longer_than_the_name_of_a_file_is_none_and_lines_are_of_text_alone(tmp_path: Path):
+    assert OutsideLocaliser(command=f"python -c '{'1;' * 200}'").inputs_digest() is None
+    (tmp_path / "binary").write_bytes(b"a\n\0\n")
+    (tmp_path / "mine.py").write_text(ECHO)
+    stage = OutsideLocaliser(command=f"python {tmp_path / 'mine.py'} {tmp_path / 'binary'}")
+    out = stage.step(Context("drive", folder=tmp_path), images(TRUTH), images(TRUTH), TICKS, TRUTH, MOTION)
+    assert out.metrics.values["peer"]["lines"] == len([line for line in ECHO.splitlines() if line])
+
+
+LONG = """
+import os, subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+with open(os.path.dirname(__file__) + "/part", "w") as file:
+    file.write(f"{os.getpid()} {child.pid}")
+os.replace(os.path.dirname(__file__) + "/part", os.path.dirname(__file__) + "/pids")
+"""
 
 
 def test_whoever_stops_the_run_stops_a_program_that_never_ends_and_what_it_has_started(tmp_path: Path):
-    program = "import os, subprocess, sys, time\n"
-    program += "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
-    program += f"open({str(tmp_path / 'pids')!r}, 'w').write(f'{{os.getpid()}} {{child.pid}}\\n')\ntime.sleep(600)\n"
-
     def stop(*_: object) -> None:
-        if (tmp_path / "pids").exists() and (tmp_path / "pids").read_text().endswith("\n"):
+        if (tmp_path / "pids").exists():
             raise KeyboardInterrupt
         signal.setitimer(signal.ITIMER_REAL, 0.05)
 
@@ -121,13 +142,40 @@ def test_whoever_stops_the_run_stops_a_program_that_never_ends_and_what_it_has_s
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.05)
         with pytest.raises(KeyboardInterrupt):
-            located(tmp_path, program)
+            located(tmp_path, LONG + "time.sleep(600)")
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    for pid in map(int, (tmp_path / "pids").read_text().split()):
-        while _runs(pid):  # until the system has cleared it away
-            time.sleep(0.05)
+    assert_ended(tmp_path)
+
+
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
+def test_it_ends_with_a_process_that_is_killed(tmp_path: Path, by: signal.Signals):
+    (tmp_path / "mine.py").write_text(LONG + "time.sleep(600)")
+    start = "import sys; from omninav.stages.metrics.outside_localiser import wait; from pathlib import Path\n"
+    start += f"wait(['python', {str(tmp_path / 'mine.py')!r}], Path(), open({str(tmp_path / 'log')!r}, 'wb'))"
+    process = subprocess.Popen([sys.executable, "-c", start])
+    while not (tmp_path / "pids").exists() and process.poll() is None:
+        time.sleep(0.05)
+    process.send_signal(by)
+    process.wait()
+    assert_ended(tmp_path)
+
+
+def test_what_it_leaves_running_ends_with_it(tmp_path: Path):
+    located(tmp_path, LONG + ECHO)
+    assert_ended(tmp_path)
+
+
+def assert_ended(tmp_path: Path) -> None:
+    """The system takes a moment to clear a process away."""
+    pids, until = [*map(int, (tmp_path / "pids").read_text().split())], time.monotonic() + 20
+    while any(map(_runs, pids)) and time.monotonic() < until:
+        time.sleep(0.05)
+    left = [pid for pid in pids if _runs(pid)]
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    assert not left
 
 
 def _runs(pid: int) -> bool:

@@ -1,14 +1,16 @@
 """The folder that a localiser of one's own is given."""
 
 import csv
+import dataclasses
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from omninav.pipeline import BadInput
 from omninav.stages.recordings.camera_yaml import read_camera, write_camera
-from omninav.stages.recordings.localiser_folder import write_folder
+from omninav.stages.recordings.localiser_folder import read_poses, write_folder
 from omninav.stages.recordings.recorded_images import RecordedImages
 
 CAMERA = read_camera(Path(__file__).resolve().parents[2] / "data" / "camera.yaml")
@@ -47,3 +49,22 @@ def test_a_pixels_ray_is_where_the_camera_looks(tmp_path: Path):
     assert seen
     assert rays[round(float(v)), round(float(u))] == pytest.approx(ahead, abs=0.03)
     assert np.isnan(rays[0, 0]).all()
+
+
+def test_a_map_of_another_camera_is_refused(tmp_path: Path):
+    picture = np.zeros((CAMERA.height_px, CAMERA.width, 3), np.uint8)
+    images = recorded(picture, odometry=np.zeros((1, 3)), truth=np.zeros((1, 3)))
+    other = dataclasses.replace(images, camera=images.camera.replace(str(CAMERA.width), str(CAMERA.width + 2), 1))
+    with pytest.raises(BadInput, match="are of two cameras"):
+        write_folder(tmp_path, other, images)
+
+
+def test_a_pose_is_that_of_the_nearest_image(tmp_path: Path):
+    picture = np.zeros((CAMERA.height_px, CAMERA.width, 3), np.uint8)
+    images = recorded(*[picture] * 4, odometry=np.zeros((4, 3)), truth=np.zeros((4, 3)))
+    early, late = (images.stamps[[0, 2, 3]] + shift for shift in (-900_000, 900_000))
+    for times in (early, late):
+        rows = [f"{stamp // 10**9}.{stamp % 10**9:09d},{stamp % 7},0,0" for stamp in times.tolist()]
+        (tmp_path / "poses.csv").write_text("\n".join(["time,x,y,heading", *rows]))
+        poses, _ = read_poses(tmp_path, images)
+        assert poses[:, 0] == pytest.approx([times[0] % 7, np.nan, times[1] % 7, times[2] % 7], nan_ok=True)
