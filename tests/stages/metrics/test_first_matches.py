@@ -262,7 +262,8 @@ def test_half_a_patch_is_the_less_of_across_and_down_and_nothing_where_the_lens_
     assert np.degrees(half_widths(patches, lens)) == pytest.approx([4.0, 4.0], abs=0.01)
 
 
-def test_thirty_pairs_are_taken_of_each_distance_evenly() -> None:
+def test_thirty_pairs_are_taken_of_each_distance_evenly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(APART_M, (0.5, 1.0, 2.0))
     poses = np.column_stack([np.arange(100) * 0.5, np.zeros(100), np.zeros(100)])
     truth = [Pose(*map(float, pose)) for pose in poses]
     found = FirstMatches().step(Context("m"), truth).metrics.values["matches"]

@@ -161,11 +161,12 @@ def test_the_target_is_the_view_that_the_way_has_come_to():
     assert target_view(PathProgress(2, 0, 1, 0, True, False, False), None, None) == 0
 
 
-def test_thumbnails_are_of_the_maps_views_and_not_of_a_known_maps():
+def test_thumbnails_are_of_the_maps_views_and_not_of_a_known_maps(monkeypatch):
+    monkeypatch.setattr("omninav.stages.plots.thumbnails.TOUR_COLUMNS", 32)
     images = []
     for shade in range(40):  # the map's views are every tenth picture of the tour
         pixels = np.full((48, 64, 3), 6 * shade, np.uint8)
-        images.append(TourSnapshot(columns=32).step(CTX, Image(pixels)).snapshots)
+        images.append(TourSnapshot().step(CTX, Image(pixels)).snapshots)
     ticks = [Tick(k, k) for k in range(40)]
     thumbnails = ViewThumbnails().step(CTX, ticks, images, MAP).thumbnails
     assert [round(image_of(view, thumbnails).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
