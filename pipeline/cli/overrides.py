@@ -106,7 +106,10 @@ def _how_to_write(word: str) -> str:
     if "=" not in word and Path(word).exists():
         return f"a file or folder stands behind the setting that reads it: log={word}"
     if re.search(r"\s[\w.+~/]+=", word):
-        return "quotes hold several words together: type each by itself, name=value name=value"
+        return (
+            "quotes hold several words together: type each by itself, name=value name=value; one value with = in it "
+            f"stands in quotes within quotes: '{word.partition('=')[0]}=\"…\"'"
+        )
     return "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
 
 
