@@ -1,4 +1,4 @@
-"""What a localiser is given, and what it leaves: docs/peers.md. Shared by the adapters of this folder."""
+"""Reads what a localiser is given, and writes the poses it leaves, for the adapters of this folder (docs/peers.md)."""
 
 import csv
 import sys

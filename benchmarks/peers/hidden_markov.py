@@ -7,9 +7,9 @@ import numpy as np
 from given import FOLDER, localise, similarities, small_panoramas, the_map
 
 SHARPNESS = 40.0
-"""Of the likelihood: exp(sharpness * correlation)."""
+"""Exponent of the likelihood exp(sharpness * correlation)."""
 SLACK_M, LOST = 0.15, 1e-4
-"""By how much a step between images differs from the odometry's, and the probability of one to anywhere."""
+"""Standard deviation of a step about the odometry's, and the probability of a step to anywhere."""
 
 files, poses = the_map()
 small = small_panoramas(columns=72, rows=12)

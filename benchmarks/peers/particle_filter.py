@@ -9,7 +9,7 @@ from given import FOLDER, localise, similarities, small_panoramas, the_map
 NUMBER, NEW = 4000, 0.05
 """Particles, and the share of them that begins anew at the most similar images."""
 SHARPNESS, REACH_M, MODE_M = 40.0, 0.5, 0.5
-"""Of the likelihood, exp(sharpness * correlation), which falls with the distance from the image; and of a mode."""
+"""Exponent of the likelihood exp(sharpness * correlation), its range about an image, and the radius of a mode."""
 
 rng = np.random.default_rng(0)
 files, poses = the_map()

@@ -9,7 +9,7 @@ from given import FOLDER, localise, the_map
 
 WORDS, CANDIDATES, FEATURES = 1000, 10, 500
 DRAWS, INLIER, ENOUGH = 300, 0.01, 12
-"""Of RANSAC: draws, largest residual (radians, about), and the matches that make a pose."""
+"""RANSAC's draws, largest residual (some radians), and least number of matches that make a pose."""
 
 rng = np.random.default_rng(0)
 cv2.setRNGSeed(0)

@@ -41,7 +41,7 @@ class ConditionRun:
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
     """Results by seed."""
     development: bool = False
-    """Whether its scenario is one of those on which choices were made."""
+    """Tells whether its scenario is a development one, on which choices were made."""
     error: str = ""
 
     @property
@@ -194,7 +194,7 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
 
 
 def results_by_condition(runs: Sequence[ConditionRun], development: bool = False) -> Results:
-    """What has run, by condition, and by scenario and seed: in the scenarios that count, or in those of development."""
+    """Returns the runs by condition, scenario and seed: of the scenarios that count, or of those of development."""
     found: dict[tuple[tuple[str, str], ...], dict[tuple[str, int], dict[str, Any]]] = {}
     for run in runs:
         if run.development is development:

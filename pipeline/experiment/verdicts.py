@@ -205,7 +205,7 @@ def _against_samples(
 def decided(
     side: Side, interval: tuple[float, float], margin: float, scenarios: int, survivors: bool = False
 ) -> bool | None:
-    """Whether a comparison comes out true, by the whole interval of the difference; None where that leaves it open.
+    """Judges a comparison by the whole interval of the difference: true, false, or None where that leaves it open.
 
     One scenario says nothing of the next one, and nor do equal figures of fewer than six. With `survivors`, runs
     without a figure, it may fail and does not hold.
@@ -219,13 +219,13 @@ def decided(
 
 
 def decided_by_share(kept: int, ran: int) -> bool | None:
-    """Whether enough of the runs keep to a limit, by the interval of their share."""
+    """Judges by the interval of their share whether enough of the runs keep to a limit."""
     low, high = share_interval(kept, ran)
     return True if low >= RUNS_SHARE else False if high < RUNS_SHARE else None
 
 
 def _keeps(side: Side, difference: float, margin: float) -> bool:
-    """Whether a difference lies on the side that is claimed; equal is not better."""
+    """Tells whether a difference lies on the side that is claimed; equal is not better."""
     match side:
         case "below":
             return difference < 0.0

@@ -95,7 +95,7 @@ class Context:
         self._rng = rng
 
     def is_read(self, port: str) -> bool:
-        """Whether an output is connected. An unconnected one may be skipped unless it consumes random numbers."""
+        """Tells whether an output is connected. An unconnected one may be skipped unless it consumes random numbers."""
         return self.read is None or port in self.read
 
     @property

@@ -96,10 +96,11 @@ def drawn_store(world: WorldConfig) -> WorldConfig:
         blocks, rooms = (*blocks, *pallets), (*rooms, office)
     shelved = {number: _department(world, number, part, rng) for number, part in parts.items()}
     if twins:
-        across = {"along": "x" if aisles[-1].upright else "y", "dead_ends": 0.0}
-        pattern = shelved[twins[0]]
-        alike = {"aisle": pattern.aisle, "depth": pattern.depth}
-        shelved |= {number: replace(shelved[number], **across, **alike) for number in twins}  # type: ignore[arg-type]
+        aisle, depth, upright = shelved[twins[0]].aisle, shelved[twins[0]].depth, aisles[-1].upright
+        for number in twins:
+            shelved[number] = replace(
+                shelved[number], along="x" if upright else "y", dead_ends=0.0, aisle=aisle, depth=depth
+            )
     grid = world.lamp_grid
     drawn = replace(
         world,
