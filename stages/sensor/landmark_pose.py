@@ -1,6 +1,7 @@
 """Finds the pose of an image by the landmarks that it shows."""
 
 import math
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
@@ -13,16 +14,18 @@ from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched,
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.landmarks import LandmarkFix, restored_descriptors
+from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
 
 Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
-WORD_REFERENCES = 10
-"""References that share most words with the image, whose landmarks are looked for."""
+WORD_REFERENCES = (10, 80)
+"""References that share most words with the image, whose landmarks are looked for: at first, and where none of their
+poses is likelier than not. Beside the mapped way, and in stores, the right ones are often behind the first ten."""
 WORD_FEATURES = 250
 """Strongest features by whose words an image is looked up: all 500 find no more images, and take 2 ms longer."""
 BELIEF_SAMPLES = 5
@@ -48,7 +51,8 @@ class LandmarkPose(Stage):
     """Gives the poses from which an image may have been taken, with covariances, from bearings of known landmarks.
 
     Candidates are the references that share most visual words with the image, over the whole map, and those near the
-    belief, both always: a belief may be wrong, and words may be ambiguous. Features are matched with the landmarks that
+    belief, both always: a belief may be wrong, and words may be ambiguous. Where they show no likely pose, more
+    references are looked at. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
@@ -81,42 +85,52 @@ class LandmarkPose(Stage):
                 f"landmarks: the map's have descriptors of {landmarks.descriptors.shape[1]} numbers, the image's have "
                 f"{features.descriptors.shape[1]}; use the features the map was learned with, or learn it again"
             )
-        rows = landmarks.seen_by(self._candidates(features, landmarks.words, map, near))
+        descriptors = root_descriptors(features.descriptors)
+        best: LandmarkFix | None = None
+        for candidates in self._candidates(features, landmarks.words, map, near):
+            fix = self._fix(descriptors, features.bearings, landmarks, landmarks.seen_by(candidates))
+            if fix is not None and (best is None or fix.probabilities[0] > best.probabilities[0]):
+                best = fix
+            if best is not None and best.probabilities[0] > 0.5:
+                break
+        return self.Out(fix=best)
+
+    def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:
         theirs = restored_descriptors(landmarks.descriptors[rows])
         points = landmarks.points[rows].astype(np.float64)
-        pairs = matched(root_descriptors(features.descriptors), theirs, points)
-        bearings = np.ascontiguousarray(features.bearings[pairs.first])
+        pairs = matched(descriptors, theirs, points)
+        bearings = np.ascontiguousarray(bearings[pairs.first])
         points = points[pairs.second]
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
         if not found:
-            return self.Out()
+            return None
         sectors = np.array([sectors_of(bearings[each.inliers]) for each in found])
         order = np.argsort(-sectors, kind="stable")
         found, sectors = [found[row] for row in order], sectors[order]
         inliers = np.array([int(each.inliers.sum()) for each in found], np.int64)
-        return self.Out(
-            fix=LandmarkFix(
-                np.array([each.pose for each in found]),
-                np.array([covariance_of(each, landmarks.sigma_rad, landmarks.variance_factor) for each in found]),
-                inliers,
-                probabilities_of(sectors),
-                len(points),
-                bearings.astype(np.float32),
-                agreeing(found),
-            )
+        return LandmarkFix(
+            np.array([each.pose for each in found]),
+            np.array([covariance_of(each, landmarks.sigma_rad, landmarks.variance_factor) for each in found]),
+            inliers,
+            probabilities_of(sectors),
+            len(points),
+            bearings.astype(np.float32),
+            agreeing(found),
         )
 
     def _candidates(
         self, features: LocalFeatures, words: VisualWords, map: ReferenceGraph, near: Particles | None
-    ) -> Ints:
+    ) -> Iterator[Ints]:
+        """References to look for landmarks in, and more of them if those were not enough."""
         similarities = words.similarities(features.descriptors[:WORD_FEATURES])
-        best = np.argsort(-similarities, kind="stable")[: WORD_REFERENCES if similarities.any() else 0]
-        if near is None:
-            return best
-        places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]
-        gaps = ((map.poses[: len(words), None, :2] - places[:, :2]) ** 2).sum(axis=2)
-        closest = np.argpartition(gaps, min(NEAR_EACH, len(gaps)) - 1, axis=0)[:NEAR_EACH]
-        return distinct(np.concatenate([best, closest.ravel()]))
+        best = np.argsort(-similarities, kind="stable") if similarities.any() else np.empty(0, np.int64)
+        closest = np.empty(0, np.int64)
+        if near is not None:
+            places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]
+            gaps = ((map.poses[: len(words), None, :2] - places[:, :2]) ** 2).sum(axis=2)
+            closest = np.argpartition(gaps, min(NEAR_EACH, len(gaps)) - 1, axis=0)[:NEAR_EACH].ravel()
+        for number in WORD_REFERENCES:
+            yield distinct(np.concatenate([best[:number], closest]))
 
 
 def agreeing(poses: list[BearingPose]) -> npt.NDArray[np.int8]:
