@@ -11,6 +11,8 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.room_view import room_view
+from omninav.stages.simulator.simulated_recording import simulation_digest
 from omninav.stages.simulator.world_rooms import known_rooms
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
@@ -38,24 +40,28 @@ class GoalImage(Stage):
     tour: str | tuple[str, ...] | None = None
     """The log that the map is learned from; null: a drive through the world."""
     places: bool = True
-    """Tells that the map has places; without, only an image can be a goal."""
+    """Tells that the map has places; without, a name is a room of the simulated world, and its image is taken there."""
 
     class Out(Outputs):
-        """Absent where the goal is no image."""
+        """Absent where the goal is a place of the map."""
 
         image: Image | None = None
         camera: Camera | None = None
 
     def inputs_digest(self) -> str | None:
-        """Of the image, if there is one."""
+        """Of the image, or of the world in which it is taken; of a place none."""
         file = self._file()
-        return None if file is None else digest_file(file)
+        if file is not None:
+            return digest_file(file)
+        return None if self.places or self.world is None else simulation_digest(self.world)
 
     def step(self, ctx: Context) -> Out:
-        """Read the image."""
+        """Read the image, or take it."""
         file = self._file()
         if file is None:
-            return self.Out()
+            if self.places or self.world is None:
+                return self.Out()
+            return self.Out(image=Image(room_view(self.world, str(self.goal).strip())), camera=camera_of(self.world))
         pixels = read_image(file)
         if self.camera is None and self.world is None:
             raise BadInput(f"goal: nothing says what camera took {file}; give camera=PATH/camera.yaml")
@@ -80,7 +86,7 @@ class GoalImage(Stage):
             what = "goal=PLACE, its name or number, or goal=IMAGE.png" if self.places else "goal=IMAGE.png"
             raise BadInput(f"goal: no goal is named; type {what}")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
-            if not self.places:
+            if not self.places and (self.world is None or not known_rooms(None, self.world)):
                 raise BadInput(
                     f"goal: {self.goal} is no image, and the map has no places; type goal=IMAGE.png, what the robot's "
                     "camera saw there"
@@ -94,14 +100,16 @@ class GoalImage(Stage):
 
     def _refuse_unknown(self, name: str) -> None:
         """Raise BadInput for a name that no place of the map can have which is still to be learned."""
-        if self.map is not None or name.isdecimal() or (self.tour is None and self.world is None):
+        numbered = self.places and name.isdecimal()
+        if self.map is not None or numbered or (self.tour is None and self.world is None):
             return
         rooms = known_rooms(self.tour, self.world or WorldConfig())
         names = sorted({*rooms.names} - {""}) if rooms is not None else []
         if name not in names:
             known = f"its names are {', '.join(names)}" if names else "its places have no names"
             example = shlex.quote(f"goal={nearest(name, names) or names[0]}") if names else "goal=0"
-            raise BadInput(f"goal: the map will have no place '{name}'; type {example}, or a place's number ({known})")
+            other = "a place's number" if self.places else "goal=IMAGE.png"
+            raise BadInput(f"goal: the map will have no place '{name}'; type {example}, or {other} ({known})")
 
 
 def read_image(file: Path) -> Pixels:

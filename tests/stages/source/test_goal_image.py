@@ -11,7 +11,7 @@ from world_files import DEMO
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.plots.image_file import ImageFile
-from omninav.stages.simulator.config import Room, mirror
+from omninav.stages.simulator.config import Door, Room, WorldConfig, mirror
 from omninav.stages.simulator.world_rooms import rooms_of
 from omninav.stages.source.goal_image import GoalImage
 from omninav.stages.values.image import Image
@@ -90,6 +90,19 @@ def test_a_name_that_a_place_may_have_is_left_to_the_map():
     assert GoalImage(goal="kitchen", world=ROOMS).inputs_digest() is None
     assert GoalImage(goal="kichen", world=ROOMS, map="saved.omap").inputs_digest() is None
     assert GoalImage(goal="kichen").inputs_digest() is None
+
+
+def test_without_places_a_room_is_the_image_that_the_simulated_robot_takes_there():
+    kitchen = Room("kitchen", (0.0, 0.0), (4.0, 6.0), doors=(Door("east", 1.5, 1.2),))
+    stage = GoalImage(goal="kitchen", world=WorldConfig(camera=mirror(columns=16), rooms=(kitchen,)), places=False)
+    found = stage.step(Context("goal"))
+    assert found.image is not None
+    assert found.image.pixels.shape == (12, 16, 3)
+    assert stage.inputs_digest() is not None
+    with pytest.raises(BadInput, match="no place '3'; type goal=kitchen, or goal=IMAGE.png"):
+        GoalImage(goal="3", world=ROOMS, places=False).inputs_digest()
+    with pytest.raises(BadInput, match="goal: kitchen is no image, and the map has no places"):
+        GoalImage(goal="kitchen", world=None, places=False).inputs_digest()
 
 
 def test_the_rooms_of_the_log_that_the_map_is_learned_from_are_its_names(monkeypatch):
