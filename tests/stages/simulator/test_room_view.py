@@ -28,7 +28,8 @@ def seen_from(world, x, y):
 
 def test_an_image_is_taken_in_the_middle_of_its_room():
     taken = room_view(WORLD, "kitchen")
-    near = [np.abs(taken.astype(int) - seen_from(WORLD, x, y)).mean() for x, y in ((1.95, 2.95), (1.0, 1.5), (7.0, 3.0))]
+    spots = ((1.95, 2.95), (1.0, 1.5), (7.0, 3.0))
+    near = [np.abs(taken.astype(int) - seen_from(WORLD, *spot)).mean() for spot in spots]
     assert near[0] < min(near[1:]) / 2
 
 
