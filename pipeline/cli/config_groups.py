@@ -1,11 +1,11 @@
 """The groups of configuration that omninav brings: which option puts which stage into a graph.
 
 A group's options are its files, those of `options.yaml`, and, where a role of stages has its name, every stage of that
-role: `match=l2` takes `match.l2` with its defaults. A file is there for what a node alone does not say, such as wires.
+role: `match=l2` takes `match.l2` with its defaults. A file is there for what is longer than a few lines.
 """
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -28,9 +28,11 @@ def group_files(group: str) -> list[Traversable]:
 
 
 def option_content(group: str, option: str) -> dict[str, Any]:
-    """The content of an option's file; {} where it has none."""
-    named = group.isidentifier() and option.isidentifier() and files(CONF).joinpath(group, f"{option}.yaml").is_file()
-    return _read(f"{group}/{option}.yaml") if named else {}
+    """The content of an option that has a file, or in `options.yaml` more than a node; {} of any other."""
+    if group.isidentifier() and option.isidentifier() and files(CONF).joinpath(group, f"{option}.yaml").is_file():
+        return _read(f"{group}/{option}.yaml")
+    content = _listed().get(group, {}).get(option, {})
+    return {} if _is_node(content) else content
 
 
 def suggest_option(group: str, option: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
@@ -56,7 +58,7 @@ def stand_ins() -> tuple[tuple[str, str, dict[str, str]], ...]:
 
 def learnable() -> list[str]:
     """The artifacts that can be made by themselves (`learn=NAME`, `omninav NAME`)."""
-    return [file.name.removesuffix(".yaml") for file in group_files(LEARN)]
+    return [*_listed()[LEARN]]
 
 
 def is_group(name: str) -> bool:
@@ -71,31 +73,41 @@ def listed_groups() -> tuple[str, ...]:
     return tuple(name for name in listed if not name.startswith("override "))
 
 
-def node_option(group: str, name: str) -> dict[str, Any] | None:
-    """The node that an option is, of `options.yaml` or of the built-in stage that it is named after; None: neither."""
+def listed_option(group: str, name: str) -> dict[str, Any] | None:
+    """An option without a file: of `options.yaml`, or the node of the built-in stage of its name; None: neither."""
     if group not in listed_groups():
         return None
-    named = _named_nodes().get(group, {}).get(name)
-    entry = built_in_stage(group, name) if named is None else None
-    return {"_target_": entry.target} if entry is not None else named
+    listed = _listed().get(group, {}).get(name)
+    entry = built_in_stage(group, name) if listed is None else None
+    return {"_target_": entry.target} if entry is not None else listed
 
 
-def node_options(group: str) -> list[str]:
-    """The options of a group that are one node, by name. Imports the stages of its role."""
+def node_option(group: str, name: str) -> dict[str, Any] | None:
+    """The node that an option is; None where it is none."""
+    listed = listed_option(group, name)
+    return listed if listed is not None and _is_node(listed) else None
+
+
+def listed_options(group: str) -> list[str]:
+    """The options of a group that have no file, by name. Imports the stages of its role."""
     offered = group in listed_groups() and is_role(group)
     stages = [entry.name.partition(".")[2] for entry in of_role(group)] if offered else []
-    return [*_named_nodes().get(group, ()), *stages]
+    return [*_listed().get(group, ()), *stages]
 
 
 @functools.cache
-def _named_nodes() -> dict[str, dict[str, dict[str, Any]]]:
-    """The content of `options.yaml`: group -> option -> node."""
+def _listed() -> dict[str, dict[str, dict[str, Any]]]:
+    """The content of `options.yaml`: group -> option -> a node, or what else it changes in a configuration."""
     return _read("options.yaml")
+
+
+def _is_node(content: Mapping[str, Any]) -> bool:
+    return "_target_" in content
 
 
 def group_options(group: str) -> list[str]:
     """All options of a group that omninav brings, by name. Imports its stages."""
-    return sorted({file.name.removesuffix(".yaml") for file in group_files(group)} | {*node_options(group)})
+    return sorted({file.name.removesuffix(".yaml") for file in group_files(group)} | {*listed_options(group)})
 
 
 def refuse_null_groups(words: Sequence[str]) -> None:
@@ -103,8 +115,7 @@ def refuse_null_groups(words: Sequence[str]) -> None:
     for word in words:
         name, _, value = word.partition("=")
         if value == "null" and name.isidentifier() and is_group(name):
-            heads = [file.read_text(encoding="utf-8").partition("\n")[0] for file in group_files(name)]
-            one_node = is_role(name) or name in _named_nodes() or f"# @package nodes.{name}" in heads
+            one_node = is_role(name) or any(map(_is_node, _listed().get(name, {}).values()))
             what = f"'~nodes.{name}' '~wires.{name}'" if one_node else f"'~{name}'"
             raise ProblemsFound([Problem(name, "it cannot be swapped for nothing", f"to take it out, type {what}")])
 
@@ -127,7 +138,7 @@ def _read(name: str) -> dict[str, Any]:
 
 
 def options_with(entry: Entry) -> list[str]:
-    """Lists the options that put this stage into a graph: `match=l2`, and those whose file names it."""
+    """Lists the options that are this stage: `match=l2`, and those of `options.yaml` that name it."""
     role, _, name = entry.name.partition(".")
     if entry.origin != "built in":  # offered to Hydra under its own name
         return [f"{'' if is_group(role) else '+'}{role}={name}"]
@@ -137,15 +148,9 @@ def options_with(entry: Entry) -> list[str]:
 
 @functools.cache
 def _options() -> dict[str, list[str]]:
-    import yaml
-
     found: dict[str, list[str]] = {}
-    for group, options in _named_nodes().items():
+    for group, options in _listed().items():
         for name, node in options.items():
-            found.setdefault(node["_target_"], []).append(f"{group}={name}")
-    for folder in sorted(files(CONF).iterdir(), key=lambda folder: folder.name):
-        for file in group_files(folder.name) if folder.is_dir() else ():
-            target = (yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader) or {}).get("_target_")
-            if target:
-                found.setdefault(target, []).append(f"{folder.name}={file.name.removesuffix('.yaml')}")
+            if _is_node(node):
+                found.setdefault(node["_target_"], []).append(f"{group}={name}")
     return found

@@ -18,7 +18,7 @@ from omegaconf._utils import get_yaml_loader  # the rules by which OmegaConf tel
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_yaml
 
-from .config_groups import CONF, listed_groups, node_option, node_options
+from .config_groups import CONF, listed_groups, listed_option, listed_options
 
 
 class _Files(ConfigSource):
@@ -66,7 +66,7 @@ class _Files(ConfigSource):
 
 
 class OwnFiles(_Files):
-    """omninav's own configurations, and the options that are one node."""
+    """omninav's own configurations, and the options that have no file."""
 
     @staticmethod
     def scheme() -> str:
@@ -78,18 +78,19 @@ class OwnFiles(_Files):
         return files(CONF)
 
     def load_config(self, config_path: str) -> ConfigResult:
-        """A file's content, or the node that an option is."""
-        node = None if super().is_config(config_path) else _node_of(config_path)
-        if node is None:
+        """A file's content, or that of an option without a file."""
+        listed = None if super().is_config(config_path) else _listed(config_path)
+        if listed is None:
             return super().load_config(config_path)
-        return self._result(OmegaConf.create(node), {"package": f"nodes.{PurePosixPath(config_path).parent}"})
+        package = f"nodes.{PurePosixPath(config_path).parent}" if "_target_" in listed else "_global_"
+        return self._result(OmegaConf.create(listed), {"package": package})
 
     def is_config(self, config_path: str) -> bool:
-        """Tells whether an option is a file, or one node."""
-        return super().is_config(config_path) or _node_of(config_path) is not None
+        """Tells whether an option has a file, or is listed without one."""
+        return super().is_config(config_path) or _listed(config_path) is not None
 
     def is_group(self, config_path: str) -> bool:
-        """Tells whether a path is a folder, or the name of a group whose options are nodes alone."""
+        """Tells whether a path is a folder, or the name of a group whose options have no files."""
         return super().is_group(config_path) or config_path in listed_groups()
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
@@ -98,7 +99,7 @@ class OwnFiles(_Files):
         if config_path == "":
             named = [*listed_groups()] if results_filter in (None, ObjectType.GROUP) else []
         else:
-            named = node_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
+            named = listed_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
         return sorted({*found, *named})
 
 
@@ -129,9 +130,9 @@ class CheckedFolder(_Files):
         return [name for name in names if not ((folder / name).is_symlink() and (folder / name).is_dir())]
 
 
-def _node_of(config_path: str) -> dict[str, Any] | None:
+def _listed(config_path: str) -> dict[str, Any] | None:
     group, _, name = config_path.removesuffix(".yaml").partition("/")
-    return node_option(group, name)
+    return listed_option(group, name)
 
 
 class _YamlLoader(yaml.CSafeLoader):

@@ -64,10 +64,7 @@ def opens_as_it_should(path: Path) -> None:
     role = group(path)
     content = yaml.safe_load(path.read_text()) or {}
     graph = any(key in content for key in ("nodes", "wires", "inputs"))
-    wanted = "_global_" if role in ("variant", "results", "ablation") or graph else None
-    of_a_stage = "_target_" in content
-    of_the_world = f"world.{role.removeprefix('world_')}"
-    packages = [wanted] if wanted else [f"nodes.{role}"] if of_a_stage else [role, of_the_world]
+    packages = ["_global_"] if role == "variant" or graph else [role, f"world.{role.removeprefix('world_')}"]
     assert package in [f"# @package {name}" for name in packages]
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 
@@ -75,12 +72,12 @@ def opens_as_it_should(path: Path) -> None:
 def stages_in(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of a file that name their stage, each with its place in the file."""
     content = yaml.safe_load(path.read_text()) or {}
-    nodes = content.get("nodes") or {}
-    if path == OPTIONS:
-        nodes = {f"{group}.{name}": node for group, options in content.items() for name, node in options.items()}
-    for where, node in [("", content), *((f"nodes.{name}", node) for name, node in nodes.items())]:
-        if isinstance(node, dict) and "_target_" in node:
-            yield where, dict(node)
+    content = content if path == OPTIONS else {group(path): {path.stem: content}}
+    whole = {f"{role}.{name} ": each for role, options in content.items() for name, each in options.items()}
+    for where, each in whole.items():
+        for name, node in {"": each, **(each.get("nodes") or {})}.items():
+            if isinstance(node, dict) and "_target_" in node:
+                yield f"{where}{name}", dict(node)
 
 
 @each_folder
@@ -141,14 +138,14 @@ def no_default_is_repeated(path: Path) -> None:
             )
 
 
-def test_an_option_that_is_one_node_says_what_it_is_and_states_what_differs():
+def test_an_option_without_a_file_says_what_it_is_and_states_what_differs():
     no_default_is_repeated(OPTIONS)
     found = re.findall(r"^  # (.{10,}\.)  omninav (.*)\n  (\w+):", OPTIONS.read_text(), re.MULTILINE)
-    nodes = {name: group for group, options in yaml.safe_load(OPTIONS.read_text()).items() for name in options}
-    assert [name for _, _, name in found] == list(nodes)
-    for _, typed, name in found:
+    options = [(role, name) for role, listed in yaml.safe_load(OPTIONS.read_text()).items() for name in listed]
+    for (role, name), (_, typed, described) in zip(options, found, strict=True):
         words = shlex.split(typed)
-        assert f"{nodes[name]}={name}" in words
+        assert described == name
+        assert f"{role}={name}" in words
         compose(with_unlisted_parameters(words, []))
 
 

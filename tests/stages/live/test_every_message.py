@@ -16,12 +16,13 @@ import numpy as np
 import pytest
 
 from omninav.pipeline.cli.composition import complete, composed
+from omninav.pipeline.cli.config_groups import group_options
 from omninav.stages.live.publish import register_nav2
 from omninav.stages.live.transport import connect
 from omninav.stages.plots.result_messages import ResultMessages
 
 from . import idl_types
-from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd, ours_for_rclpy
+from .conftest import ROS2_PYTHON, WAIT_S, OtherEnd, ours_for_rclpy
 
 HERE = Path(__file__).parent
 STAMP = {"sec": 1_700_000_000, "nanosec": 250_000_000}
@@ -32,8 +33,8 @@ INSTALLED = ("geometry_msgs", "nav_msgs", "std_msgs", "diagnostic_msgs")
 def options() -> list[dict[str, dict[str, Any]]]:
     """The nodes of all options of `publish`, with their parameters; the command also without a header."""
     found = []
-    for file in sorted((ROOT / "conf/publish").glob("*.yaml")):
-        words = ["variant=topological_nav", "goal=kitchen", "world=office", f"publish={file.stem}"]
+    for option in group_options("publish"):
+        words = ["variant=topological_nav", "goal=kitchen", "world=office", f"publish={option}"]
         with composed(words) as config:
             nodes = complete(config)["nodes"]
         found.append({name: dict(node) for name, node in nodes.items() if name.startswith("publish")})
