@@ -35,6 +35,7 @@ DECIDING = ("files.py", "graph", "engine", "run", "mcap")
 FRAMEWORK = Path(__file__).resolve().parents[1]
 
 
+@functools.cache
 def version(distribution: str) -> str:
     """The installed version of a distribution, or that there is none."""
     try:

@@ -57,5 +57,5 @@ def plot(width: float, height: float, dpi: int = 110, media_type: str = "image/p
         if media_type == "image/jpeg":
             drawn.canvas.savefig(buffer, format="jpeg", pil_kwargs={"quality": 85})
         else:
-            drawn.canvas.savefig(buffer, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
+            drawn.canvas.savefig(buffer, format="png", metadata={"Software": None})
         drawn.content = buffer.getvalue()

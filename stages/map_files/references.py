@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from omninav.pipeline import BadInput
 from omninav.pipeline.graph.stored_rows import GatheredRows, StoredRows
@@ -64,6 +63,8 @@ def thinned_references(map: ReferenceGraph, spacing_m: float) -> ReferenceGraph:
 
 def keepers(poses: Array, spacing_m: float, turn: float) -> Ints:
     """For each pose (R, 3) the first kept one within `spacing_m` and `turn` (rad) that stands for it: (R,) rows."""
+    from scipy.spatial import KDTree  # slow to import, and seldom needed
+
     keeper = np.full(len(poses), -1)
     tree: Any = KDTree(poses[:, :2])
     for row in range(len(poses)):

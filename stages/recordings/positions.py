@@ -5,7 +5,6 @@ from math import pi
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from omninav.stages.geometry.plane.se2 import wrap
 
@@ -101,6 +100,8 @@ def _forward(heading: Heading, table: CsvTable, rows: npt.NDArray[np.int64]) -> 
     """
     cells = np.column_stack([table.numbers(Length(column, "m"))[rows] for column in heading.rotation])
     if len(heading.rotation) == 4:
+        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
         wrong = abs(np.linalg.norm(cells, axis=1) - 1.0) > MAX_SKEW
         turns = Rotation.from_quat(np.where((wrong | ~np.isfinite(cells).all(axis=1))[:, None], 1.0, cells)).as_matrix()
         expected = "a unit quaternion (x, y, z, w)"

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import user_path
@@ -148,6 +147,8 @@ def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolut
     behind it is unknown. So a view sees the end of the free path ahead of it, and its visibility area is the stretch of
     path from which that end is in sight: right along the path and beside it, and never through what nobody drove along.
     """
+    from scipy.spatial import KDTree  # slow to import: not before a run
+
     places: Array = np.asarray(poses[:, :2], np.float64)
     if len(edges):
         ends = places[edges]

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import betainc
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
@@ -86,6 +85,8 @@ def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, 
     look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,
     two solutions and two senses each (Moisan & Stival's a-contrario test, 2004). Infinite below three pairs.
     """
+    from scipy.special import betainc  # slow to import: not before a run
+
     first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
     pairs, agreeing = len(first), int(np.count_nonzero(pose.inliers))
     if pairs < 3 or agreeing < 3:
