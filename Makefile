@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ros2 demo test lint format docs bench soak scale kills fuzz mutants clean
+.PHONY: help ros2 demo test nightly lint format docs bench soak scale kills fuzz mutants clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z0-9]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,6 +16,10 @@ test: export OPENBLAS_NUM_THREADS = 1
 test: lint  ## lint, then run every test
 	-test -e .venv-ros2 || $(MAKE) --no-print-directory ros2
 	$(BIN)/pytest -n 2 --dist loadfile
+
+nightly: export OPENBLAS_NUM_THREADS = 1
+nightly: $(VENV)/.installed  ## run the tests that `make test` leaves to the night
+	$(BIN)/pytest -n 2 -m nightly
 
 lint: $(VENV)/.installed  ## check style, types and the layers of the code
 	$(BIN)/ruff check .

@@ -10,16 +10,26 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
+EACH_DAY = ("my_log", "my_stage")
+"""What a newcomer begins with; the others take minutes, and run at night."""
 SHORTER = {
     "nodes.source.seconds=25": "nodes.source.seconds=8",
     "range(3)": "range(2)",
     "n_trials=5": "n_trials=2",
-    r"match=\"l2\", ": r"match=\"l2\", rate=1, ",
+    "progress=False)": "rate=1, progress=False)",
+    "(configuration, rate=1, ": "(configuration, ",
+    r"robot.camera.yaml\", rate=1, ": r"robot.camera.yaml\", ",  # its estimates are compared with those at full rate
 }
 """Seconds, numbers of runs, and drives at full rate that a reader is shown, and the smaller ones of a test."""
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)
+@pytest.mark.parametrize(
+    "notebook",
+    [
+        pytest.param(file, id=file.stem, marks=() if file.stem in EACH_DAY else pytest.mark.nightly)
+        for file in NOTEBOOKS
+    ],
+)
 def test_a_notebook_runs_to_its_end(
     notebook: Path, tmp_path: Path, shared_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
