@@ -19,7 +19,9 @@ TOUR, DRIVE, GRID = RECORDINGS / "tour.mcap", RECORDINGS / "drive.mcap", RECORDI
 DATA = ROOT.parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recordings are not here: {DATA}")
 
-settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
+settings.register_profile(
+    "omninav", deadline=None, max_examples=40
+)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # what one process compiles, those that tests start later read
 gc.set_threshold(50_000)  # as in `omninav`: what pytest has imported is looked through less often

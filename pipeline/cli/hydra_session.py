@@ -1,5 +1,6 @@
 """Hydra as omninav starts it: it composes configurations and launches jobs, and calls nothing else that they name."""
 
+import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
@@ -119,6 +120,7 @@ class CheckedLoader(ConfigLoader):
     def __init__(self, hydras: ConfigLoader) -> None:
         self._hydras = hydras
         self._own: Any = None
+        self._last: tuple[list[str], bytes] = ([], b"")
 
     def load_configuration(self, config_name: str | None, overrides: list[str], *args: Any, **kwargs: Any) -> Any:
         """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
@@ -127,8 +129,11 @@ class CheckedLoader(ConfigLoader):
             words, variant = self._of_artifact(overrides)
             config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
             _name(config, variant, overrides)
-        if overrides and config_name is not None:
-            self._refuse_foreign(config)
+        if config_name is not None:
+            if overrides:
+                self._refuse_foreign(config)
+            if not variant:
+                self._last = ([*overrides], pickle.dumps(config))
         return config
 
     def load_sweep_config(self, master_config: Any, sweep_overrides: list[str]) -> Any:
@@ -147,7 +152,9 @@ class CheckedLoader(ConfigLoader):
         if name is None:
             return words, ""
         of_variant = words_of_variant(words, self.list_groups(""))
-        variant = self._hydras.load_configuration("config", of_variant, RunMode.RUN)
+        last, kept = self._last  # most often that variant has just been composed
+        same = bool(kept) and last == of_variant
+        variant = pickle.loads(kept) if same else self._hydras.load_configuration("config", of_variant, RunMode.RUN)
         return words_of_artifact(name, variant, words), f"{variant.variant}_{name}"
 
     def _refuse_foreign(self, config: Any) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
-from conftest import DATA, needs_data
+from conftest import DATA, DRIVE, TOUR, needs_data
 
 FILES = ("trajectory.tum", "metrics.json", "map.omap")
 
@@ -16,14 +16,15 @@ FILES = ("trajectory.tum", "metrics.json", "map.omap")
 def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shared_cache: Path, cached: bool):
     """Kills at moments spread over the whole run, again and again, until a resume comes through."""
     moments = random.Random(5 if cached else 6)
-    cache = f"cache={shared_cache}" if cached else "cache=null"
-    process = start(tmp_path, cache, "checkpoint_s=0.05")
+    words = () if cached else (f"tour={TOUR}", f"log={DRIVE}")
+    whole = demo if cached else finished(tmp_path / "whole", *words, f"cache={shared_cache}")
+    process = start(tmp_path, *words, f"cache={shared_cache if cached else 'null'}", "checkpoint_s=0.05")
     runs = tmp_path / "runs"
     wait_for_checkpoint(process, tmp_path)
     kills = 0
     while process.poll() is None and kills < 2:
         if kills:  # the first one is killed at once: a fast machine is soon done
-            time.sleep(moments.uniform(0.0, 0.5 if cached else 4.0))
+            time.sleep(moments.uniform(0.0, 0.5 if cached else 2.0))
         if process.poll() is None:
             kill(process)
             kills += 1
@@ -31,7 +32,7 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
             process = start(tmp_path, "resume", "runs/latest")
     assert kills > 0
     assert process.wait() == 0
-    assert_same_bytes(runs / "latest", demo, *FILES)
+    assert_same_bytes(runs / "latest", whole, *FILES)
     assert not (runs / "latest" / "checkpoints").exists()
     assert not list((runs / "latest").glob("*.part"))
 

@@ -32,7 +32,7 @@ def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: 
 def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_cache: Path, tmp_path: Path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", "seed=0,1,2", *SHORT)
-    ended = omninav("-m", *words)
+    ended = omninav("-m", *words, f"cache={shared_cache}")
     assert ended.returncode == 1
     assert "job 1: stage 'features'" in ended.stderr
     assert "raises at seed 1" in ended.stderr

@@ -115,6 +115,6 @@ def test_an_installed_wheel_makes_a_map_and_localises_in_it_in_an_empty_folder(w
     where = call(python, "-c", "import omninav; print(omninav.__file__)", cwd=empty, PYTHONPATH="").strip()
     assert Path(where).is_relative_to(installed)
     tour, drive = (ROOT / "tests" / "data" / f"{name}.mcap" for name in ("tour", "drive"))
-    call(python, "-m", "omninav", "landmarks=none", f"tour={tour}", f"log={drive}", cwd=empty, PYTHONPATH="")
+    call(python, "-m", "omninav", "variant=plain_matching", f"tour={tour}", f"log={drive}", cwd=empty, PYTHONPATH="")
     assert (empty / "runs" / "latest" / "report.html").exists()
     assert [path.name for path in empty.iterdir()] == ["runs"]
