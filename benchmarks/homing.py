@@ -12,7 +12,7 @@ import poselib
 from omninav.pipeline import Context
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
-from omninav.stages.geometry.two_views.epipolar import planar_two_points
+from omninav.stages.geometry.two_views.epipolar import planar_candidates
 from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
 from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
@@ -69,7 +69,7 @@ def _relative() -> list[Row]:
     eight = medians({"eight": lambda: relative_pose(first, second, np.random.default_rng(0), "eight_point")}, rounds=3)
     inner = medians(
         {
-            "ours": lambda: planar_two_points(first[50:52], second[50:52]),
+            "ours": lambda: planar_candidates(first, second, np.array([[50, 51]])),
             "theirs": lambda: poselib.relpose_upright_planar_2pt(there, here),
         },
         inner=50,

@@ -8,7 +8,6 @@ import numpy as np
 from omninav.pipeline import Context
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.features.hsv_histogram import HsvHistogram
-from omninav.stages.geometry.appearance.segments import selective_similarity
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.belief import Particles
@@ -26,7 +25,7 @@ def rows() -> list[Row]:
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        return [*_unwarp(), _features(), *_match(), _selective()]
+        return [*_unwarp(), _features(), *_match()]
     finally:
         cv2.setNumThreads(threads)
 
@@ -115,26 +114,3 @@ def _match() -> list[Row]:
         Row(f"{what}, cold, 10 segments", taken["cold ten"] * 1e3, "ms", limit=50.0),
         Row(f"{what}, tracking", taken["tracking"] * 1e3, "ms", limit=10.0),
     ]
-
-
-def _selective() -> Row:
-    rng = np.random.default_rng(3)
-    expected, observed = histograms(rng, 5000, 10, 20), histograms(rng, 10, 20)
-
-    def plain() -> np.ndarray:
-        alike = np.minimum(expected, observed).sum(axis=2)
-        best = np.sort(alike, axis=1)[:, ::-1].cumsum(axis=1)
-        return (best * np.sqrt(1.0 / (np.arange(1, 11) * 10.0))).max(axis=1)
-
-    ours = selective_similarity(expected, observed)
-    assert np.allclose(ours, plain(), atol=1e-5)
-    taken = medians({"ours": lambda: selective_similarity(expected, observed), "plain": plain}, rounds=50)
-    return Row(
-        "selective comparison, 5000 expected views x 10 x 20",
-        taken["ours"] * 1e3,
-        "ms",
-        "plain numpy",
-        taken["plain"] * 1e3,
-        limit=1.0,
-        of_peer=True,
-    )

@@ -220,42 +220,6 @@ def _best_of(segments: int, selective: bool, exponent: float) -> tuple[Ints, Flo
     return np.empty((0, 2), np.int64), factors, (np.float32(0),)
 
 
-def selective_similarity(expected: Floats, observed: Floats, exponent: float = 0.5) -> Floats:
-    """Selective similarity of many expected views with one observed: (N, segments, bins), (segments, bins) -> (N,).
-
-    Both are histograms that sum to 1 per segment. S as in `similarities`.
-    """
-    out = np.empty(len(expected), np.float32)
-    network, factors = sorting_network(len(observed)), penalties(len(observed), exponent)
-    _compare_many(expected, np.ascontiguousarray(observed, np.float32), network, factors, out)
-    return out
-
-
-@compiled(nogil=True)
-def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Floats, out: Floats) -> None:
-    segments, bins = observed.shape
-    alike = np.empty(segments, np.float32)
-    for n in range(len(expected)):
-        for j in range(segments):
-            common = np.float32(0)
-            for b in range(bins):
-                e, o = expected[n, j, b], observed[j, b]
-                common += e if e < o else o
-            alike[j] = common
-        for p in range(len(network)):
-            i, j = network[p, 0], network[p, 1]
-            a, b_ = alike[i], alike[j]
-            alike[i] = a if a > b_ else b_
-            alike[j] = b_ if a > b_ else a
-        total = np.float32(0)
-        best = np.float32(0)
-        for k in range(segments):
-            total += alike[k]
-            score = total * factors[k]
-            best = score if score > best else best
-        out[n] = best
-
-
 def max_distance_of(segments: int, kind: FeatureKind) -> float:
     """The largest distance of two views: sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, 2 sqrt(n) for n unit
     vectors."""

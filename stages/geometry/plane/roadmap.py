@@ -8,9 +8,6 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-NO_PATH = -9999
-"""The next point of one from which no path leads to the goal."""
-
 
 class Paths(NamedTuple):
     """The shortest path from each of N points: `metres` (N,) to the goal, and the `next` point (N,), N for the goal."""

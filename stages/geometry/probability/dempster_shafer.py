@@ -54,12 +54,6 @@ def support(mass: Array) -> Array:
     return mass[..., 0]
 
 
-def plausibility(mass: Array) -> Array:
-    """Plausibility of the hypothesis: Pls(H) = m(H) + m(H or not H) (equation 7)."""
-    whole: Array = mass[..., 0] + mass[..., 2]
-    return whole
-
-
 def unknown(mass: Array) -> Array:
     """Ignorance: m(H or not H)."""
     return mass[..., 2]

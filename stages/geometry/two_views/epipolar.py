@@ -102,26 +102,17 @@ def five_points(first: npt.ArrayLike, second: npt.ArrayLike) -> Poses:
     return rotations, np.array([pose.t for pose in found]).reshape(-1, 3)
 
 
-def planar_two_points(first: npt.ArrayLike, second: npt.ArrayLike) -> Poses:
-    """All relative poses of a robot on a floor on which two pairs of unit bearings (2, 3) agree: two, or none.
-
-    With R a turn by phi about the vertical, t = (cos theta, sin theta, 0) and psi = theta - phi, E has four entries
-    (erratum 37) and a pair says z2 (x1 sin theta - y1 cos theta) = z1 (x2 sin psi - y2 cos psi). Two of them are
-    A u = B w for the unit vectors u and w of theta and psi; w is taken out, |B^-1 A u| = |u| is a quadratic form in u,
-    and vanishes along up to two lines. Both senses of t fit: which is right, the depths say. None where both points lie
-    on the horizon, of which a robot on a floor learns nothing, and where noise leaves no real solution.
-    """
-    rotations, translations, _ = planar_candidates(
-        np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64), np.array([[0, 1]])
-    )
-    return rotations, translations
-
-
 @compiled(nogil=True)
 def planar_candidates(first: Array, second: Array, samples: Ints) -> tuple[Array, Array, Ints]:
-    """`planar_two_points` of many samples (S, 2), rows of `first` and `second` (N, 3).
+    """All relative poses of a robot on a floor on which two pairs of unit bearings agree: of each sample two, or none.
 
-    Gives rotations (K, 3, 3), translations (K, 3), and from which sample each is: (K,).
+    `samples` (S, 2): rows of `first` and `second` (N, 3). Gives rotations (K, 3, 3), translations (K, 3), and from
+    which sample each is: (K,). With R a turn by phi about the vertical, t = (cos theta, sin theta, 0) and psi = theta -
+    phi, E has four entries (erratum 37) and a pair says z2 (x1 sin theta - y1 cos theta) = z1 (x2 sin psi - y2 cos
+    psi). Two of them are A u = B w for the unit vectors u and w of theta and psi; w is taken out, |B^-1 A u| = |u| is a
+    quadratic form in u, and vanishes along up to two lines. Both senses of t fit: which is right, the depths say. None
+    where both points lie on the horizon, of which a robot on a floor learns nothing, and where noise leaves no real
+    solution.
     """
     rotations, translations = np.zeros((2 * len(samples), 3, 3)), np.zeros((2 * len(samples), 3))
     owners, angles, number = np.empty(2 * len(samples), np.int64), np.empty((2, 2)), 0
@@ -184,15 +175,3 @@ def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> npt.N
     """
     pairs = (depths(first, second, rotation, translation) for rotation, translation in zip(*poses, strict=True))
     return np.array([np.count_nonzero((here > 0.0) & (there > 0.0)) for here, there in pairs], dtype=np.int64)
-
-
-def relative_pose_of(matrix: Array, first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[Array, Array]:
-    """The rotation (3, 3) and unit translation (3,) of an essential matrix with most points in front of both cameras.
-
-    Raises ValueError where there is no point.
-    """
-    if not len(np.asarray(first)):
-        raise ValueError("which of four poses an essential matrix stands for, points decide, and there are none")
-    poses = decompose(matrix)
-    best = int(np.argmax(in_front(poses, first, second)))
-    return poses[0][best], poses[1][best]
