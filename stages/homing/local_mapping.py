@@ -33,8 +33,9 @@ REBUILD_RATIO = 1.5
 """Ratio of matches to the first inliers from which the map is rebuilt, if as many agree."""
 ARRIVAL_DISTANCE = 0.05
 """Distance to the target, over the features' typical distance, below which the two views must look the same."""
-MAX_OUTLIER_DEG = 10.0
-"""Largest angle between most matched bearings at the target, after the turn, degrees."""
+MAX_OUTLIER_DEG = 3.0
+"""Largest angle between most matched bearings at the target, after the turn, degrees; twice the nearness is added, as
+half of the features are closer than a typical one."""
 MIN_INLIERS = 6
 """Features that must agree with a pose."""
 MIN_REBUILD_DISTANCE = 0.1
@@ -67,7 +68,7 @@ NO_MATCHES = Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.ze
 class LocalMappingState(State):
     """The local map of the tick before, and how many were made.
 
-    Of the target with the number `target`: `doubtful`, the last such map, moved on by odometry; `witness`, its heading
+    Of the target with the number `target`: `doubtful`, the best such map, moved on by odometry; `witness`, its heading
     (rad) in the robot's frame by a relative pose that enough features agreed with. None: there was none. `since` (3,):
     odometry since the witness (m, m, rad); `unseen_m`: way since the witness on which the target was not found.
     """
@@ -93,10 +94,10 @@ class LocalMapping(Stage):
     target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
     says the target is reached, where the two views still differ, is discarded.
 
-    A relative pose with few inliers may be one of another place that looks the same. The map is `doubtful`, and made
-    again, until `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or
-    more, and both give the target the same heading. A target that was borne out needs one such image to be found again
-    a short way on.
+    A relative pose with few inliers may be one of another place that looks the same. The map is `doubtful` until
+    `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or more, and
+    both give the target the same heading. Of doubtful maps the one with the most inliers is kept for a short way. A
+    target that was borne out needs one such image to be found again a short way on.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
     metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
@@ -189,18 +190,19 @@ class LocalMapping(Stage):
             state.doubtful = None
             return new, new
         lost = replace(lost, inliers=0, why=lost.why + reason, kinds=np.full(len(lost), LOST))
+        known = None if state.doubtful is None or motion is None else state.doubtful.moved(motion)
+        if known is not None and math.hypot(*known.odometry[:2]) > MAX_DOUBTFUL_M:
+            known = None
         if new is not None:
             ctx.count("doubtful_map")
             why = f"{new.inliers} of {len(matches.rows)} matches with the target view agree, as another place might"
-            state.doubtful = replace(new, state="doubtful", why=why)
-        elif state.doubtful is not None and motion is not None:
-            state.doubtful = state.doubtful.moved(motion)
-        else:
-            state.doubtful = None
-        if state.doubtful is None or math.hypot(*state.doubtful.odometry[:2]) > MAX_DOUBTFUL_M:
+            if known is None or new.inliers >= known.inliers:  # wrong poses of fewer features point anywhere
+                known = replace(new, state="doubtful", why=why)
+        state.doubtful = known
+        if known is None:
             ctx.count("lost_target")
             return lost, lost
-        return lost, state.doubtful
+        return lost, known
 
     def _resection(
         self, ctx: Context, local_map: LocalMap, tracks: TrackedFeatures | None, matches: Matches
@@ -253,12 +255,12 @@ class LocalMapping(Stage):
         return far and matches > REBUILD_RATIO * local_map.first_inliers
 
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
-        # At the target a matched feature has the target view's bearing, but for the turn.
-        near = local_map.distance() <= ARRIVAL_DISTANCE * local_map.depth()
-        if not near or (not self.verify and local_map.inliers > len(matches.rows) / 3):
+        # At the target a matched feature has the target view's bearing, but for the turn and what is left of the way.
+        nearness = local_map.distance() / max(local_map.depth(), 1e-9)
+        if nearness > ARRIVAL_DISTANCE or (not self.verify and local_map.inliers > len(matches.rows) / 3):
             return False
         turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
-        chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0)
+        chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0 + nearness)
         same = np.linalg.norm(turned - matches.first, axis=1) < chord
         enough = MIN_VERIFIED_INLIERS if self.verify else 0
         return bool(np.count_nonzero(same) < max(len(matches.rows) / 2, enough))

@@ -242,6 +242,14 @@ def test_a_doubtful_target_is_remembered_for_a_short_way() -> None:
     assert homing.at(pose, Motion(0.2, 0.0, 0.0), matches=False).state == "lost"
 
 
+def test_a_doubtful_target_is_that_of_the_most_features_until_it_is_forgotten() -> None:
+    homing, pose = Homing(verify=True), (4.2, 4.6, 0.4)
+    most = homing.at(pose, STILL)
+    assert homing.at(pose, STILL, share=0.25).direction == most.direction  # of fewer features, and elsewhere
+    homing.at(pose, Motion(0.7, 0.0, 0.0), matches=False)
+    assert homing.at(pose, STILL, share=0.25).inliers < most.inliers
+
+
 @pytest.mark.parametrize("verify", [True, False])
 def test_an_arrival_where_the_target_looks_different_is_not_believed(verify: bool) -> None:
     homing, pose = Homing(verify=verify), (4.0, 4.2, -0.5)
@@ -249,6 +257,16 @@ def test_an_arrival_where_the_target_looks_different_is_not_believed(verify: boo
         pass
     homing.map = homing.mapped.map = replace(homing.map, goal_translation=np.full(3, 0.01 * homing.map.depth()))
     assert (homing.at(pose).state, homing.ctx.counts["false_map"]) == (("doubtful", 1) if verify else ("tracking", 0))
+
+
+@pytest.mark.parametrize(("pose", "believed"), [((4.97, 4.98, -0.5), True), ((4.7, 4.72, -0.5), False)])
+def test_an_arrival_four_decimetres_away_is_not_believed(pose: tuple[float, float, float], believed: bool) -> None:
+    homing = Homing(verify=True)
+    while homing.at(pose).state != "tracking":
+        pass
+    homing.map = homing.mapped.map = replace(homing.map, goal_translation=homing.map.translation + 0.001)
+    homing.at(pose)
+    assert (homing.ctx.counts["false_map"] == 0) == believed
 
 
 def covered(pose) -> Image:
