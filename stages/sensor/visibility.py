@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
+from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -42,20 +42,16 @@ class Visibility(Stage):
     compared at the turn at which the robot sees lambda, which differs from the turn of its heading by the parallax of
     its motion.
 
-    Similarities hardly differ between places (erratum 45), and so do their means: they may be raised to a `power`
-    before they are averaged. Defaults: docs/experiments/retrieval_mcl_defaults.md. With a `calibration`
+    Similarities hardly differ between places (erratum 45), and so do their means. With a `calibration`
     (likelihood=calibrated) likelihood ratios of the right against a wrong place, which the map's own views have shown,
-    are averaged in place of powers, and where no view was taken near the mean fades to that of the whole database:
-    docs/experiments/retrieval_mcl_calibrated.md. Raises BadInput where areas and map do not belong together.
+    are averaged in their place, and where no view was taken near the mean fades to that of the whole database:
+    docs/experiments/retrieval_mcl_calibrated.md. Defaults: docs/experiments/retrieval_mcl_defaults.md. Raises BadInput
+    where areas and map do not belong together.
     """
 
     distance_sigma_m: Annotated[float, Bounds(gt=0)] | None = 1.0
     """Sigma of the Gaussian by which a view's weight falls with the distance from where it was taken; null: all views
     of the area weigh the same, as in the paper. Not in length scales, which differ between cameras in one place."""
-    power: Annotated[float, Bounds(gt=0)] | None = 1.0
-    """Exponent of the similarities, 1 in the paper; null: from `contrast`."""
-    contrast: Annotated[float, Bounds(gt=0)] = 2.0
-    """Nats of log likelihood per standard deviation of log S over the references, where `power` is null."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.0
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always, as in the paper. With a
     `calibration`, in the distances over which its evidence was measured to lose its correlation."""
@@ -128,8 +124,7 @@ class Visibility(Stage):
             ratios = likelihood_ratios(similarities, calibration).astype(np.float64)
             top = max(float(ratios.max()), 1.0)
             return ratios / top, 1.0 / top
-        values, each = similarities.values, similarities.sampling_weight
         best = similarities.best
-        power = contrast_power(best, self.contrast, each) if self.power is None else self.power
         top = max(float(best.max()), 1e-12)
-        return (values.astype(np.float64) / top) ** power, (weighted_median(best, each) / top) ** power
+        middle = weighted_median(best, similarities.sampling_weight)
+        return similarities.values.astype(np.float64) / top, middle / top

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.fusion.augmented_recovery import AugmentedRecovery, AugmentedRecoveryState
 from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.fusion.covariance_intersection import CovarianceIntersection
 from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
@@ -36,23 +35,6 @@ def test_map_and_belief_agree_above_a_ten_thousandth_else_four_fifths_stay(densi
     out = ConditionalResampling().step(ctx, particles(*[(0.0, 0.0, 0.0)] * 10), hypothesis).belief
     assert dict(ctx.counts) == ({"agreed": 1} if agreed else {"disagreed": 1})
     assert (out.poses == 0.0).all(axis=1).sum() == (10 if agreed else 8)
-
-
-def test_averages_of_recovery_go_by_a_hundredth_and_a_tenth_and_5000_particles_are_drawn() -> None:
-    # Thrun, Burgard & Fox 2005, table 8.3, after so many images that plain means are behind: 0.9, then 0.5.
-    ctx, state = context(), AugmentedRecoveryState(slow=0.9, fast=0.9, images=1000)
-    ctx.tick = Tick(1, 1)
-    one = particles((0.0, 0.0, 0.0))
-    out = AugmentedRecovery().step(ctx, one, Likelihood(np.array([0.1]), 0.1), one, state).belief
-    assert (state.slow, state.fast) == pytest.approx((0.896, 0.86))
-    assert len(out.poses) == 5000
-
-
-def test_images_of_a_log_are_counted_from_its_first() -> None:
-    ctx, state, one = context(), AugmentedRecoveryState(), particles((0.0, 0.0, 0.0))
-    ctx.tick = Tick(1, 1)  # joined in the middle of a log
-    AugmentedRecovery(number=1).step(ctx, one, Likelihood(np.array([0.3]), 0.1), one, state)
-    assert (state.slow, state.fast, state.images) == pytest.approx((0.75, 0.75, 1))
 
 
 def test_beliefs_are_resampled_below_half_of_their_effective_size() -> None:

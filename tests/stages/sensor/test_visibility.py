@@ -8,7 +8,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
+from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.sensor.calibrated_similarity import likelihood_ratios
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.sensor.visibility import BACKGROUND_WEIGHT, Visibility
@@ -113,7 +113,7 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
     areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
     # a wave between columns 10 degrees apart is at most (pi / 18)^2 / 8 / 2 = 0.002 off a line, which is drawn twice
     values = 0.5 + 0.5 * np.cos(np.arange(36) * np.pi / 18 + RNG.uniform(0, 6, (25, 1)))
-    stage = Visibility(power=1.0, distance_sigma_m=None)
+    stage = Visibility(distance_sigma_m=None)
     stage.setup(Context("sensor"))
     poses = some_poses(300)
     out = stage.step(
@@ -133,7 +133,7 @@ def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_f
     monkeypatch.setattr(WINDOW_DEG, 20.0)
     areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
     ahead = sectors == 1
-    values, stage = RNG.random((25, 1 if ahead else 36)), Visibility(power=1.0, distance_sigma_m=0.4)
+    values, stage = RNG.random((25, 1 if ahead else 36)), Visibility(distance_sigma_m=0.4)
     poses = some_poses(300)
     found = weighed(stage, values, poses, areas).likelihood.values * np.float32(values.max())
     values = values.astype(np.float32).astype(float)
@@ -181,7 +181,7 @@ def weighed(stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: Vis
 def test_a_robot_at_a_references_own_pose_takes_it_as_it_is():
     areas = visibility_areas(REFERENCES[:1], ROOM, axes_of(7))
     values = (0.5 + 0.5 * np.cos(np.arange(36) * np.pi / 18 + 1.0)).astype(np.float32)[None]
-    stage = Visibility(power=1.0)
+    stage = Visibility()
     stage.setup(Context("sensor"))
     for column in (0, 9, 20):
         pose = REFERENCES[:1] + np.array([0, 0, 2 * np.pi * column / 36])
@@ -195,38 +195,16 @@ def test_where_no_area_holds_a_pose_its_likelihood_is_the_mean_similarity_to_the
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values = RNG.random((25, 1))
     far = np.array([[50.0, 50.0, 0.0], [-0.95, 2.05, 0.0]])  # outside of the grid; in a wall
-    out = weighed(Visibility(power=1.0), values, far, areas).likelihood
+    out = weighed(Visibility(), values, far, areas).likelihood
     assert np.allclose(out.values * values.max(), values.mean())
     assert out.mean_likelihood * values.max() == pytest.approx(values.mean(), rel=1e-6)
-
-
-def test_without_a_power_it_is_taken_from_the_view():
-    best = RNG.uniform(0.3, 0.9, 200).astype(np.float32)
-    power = contrast_power(best, 3.0)
-    assert np.log(best.astype(float) ** power).std() == pytest.approx(3.0, rel=1e-5)
-    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
-    values, poses = RNG.uniform(0.5, 0.8, (25, 1)), some_poses(200)
-    own = weighed(Visibility(power=None, contrast=3.0), values, poses, areas).likelihood.values
-    given = weighed(Visibility(power=contrast_power(values[:, 0].astype(np.float32), 3.0)), values, poses, areas)
-    assert np.allclose(own, given.likelihood.values)
-
-
-def test_similarities_are_raised_before_they_are_averaged():
-    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
-    values, poses = RNG.uniform(0.5, 1.0, (25, 1)), some_poses(200)
-    cubed = weighed(Visibility(power=3.0), values, poses, areas).likelihood.values
-    assert np.allclose(
-        cubed, weighed(Visibility(power=1.0), (values / values.max()) ** 3, poses, areas).likelihood.values
-    )
 
 
 def test_references_that_were_not_compared_count_nowhere_and_sampled_ones_count_by_their_weight():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(3))
     values, poses = RNG.random((25, 36)), some_poses(300)
     some = np.array([1, 4, 7, 20])
-    found = weighed(
-        Visibility(power=1.0, distance_sigma_m=None), values[some], poses, areas, candidates=some
-    ).likelihood
+    found = weighed(Visibility(distance_sigma_m=None), values[some], poses, areas, candidates=some).likelihood
     only = VisibilityAreas(
         areas.axes,
         np.where(np.isin(np.arange(25), some)[:, None], areas.target, -1).astype(np.int32),
@@ -239,11 +217,11 @@ def test_references_that_were_not_compared_count_nowhere_and_sampled_ones_count_
     )
     held = np.zeros_like(values)
     held[some] = values[some]
-    words = weighed(Visibility(power=1.0, distance_sigma_m=None), held, poses, only).likelihood
+    words = weighed(Visibility(distance_sigma_m=None), held, poses, only).likelihood
     known = np.abs(words.values - words.mean_likelihood) > 1e-9
     assert np.allclose(found.values[known], words.values[known], atol=1e-6)
     twice = weighed(
-        Visibility(power=1.0, distance_sigma_m=None),
+        Visibility(distance_sigma_m=None),
         values[some],
         poses,
         areas,
@@ -256,7 +234,7 @@ def test_references_that_were_not_compared_count_nowhere_and_sampled_ones_count_
 def test_the_mean_of_the_database_counts_a_sampled_reference_as_all_that_it_stands_for():
     areas, far = visibility_areas(REFERENCES, ROOM, axes_of(1)), np.array([[50.0, 50.0, 0.0]])
     found = weighed(
-        Visibility(power=1.0),
+        Visibility(),
         np.array([[1.0], [0.4], [0.2]]),
         far,
         areas,
@@ -274,7 +252,7 @@ def test_images_of_a_standing_robot_are_little_evidence_with_an_independence_dis
     assert evidence_novelty(0.1, 0.5) == pytest.approx(0.2)
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(50)
-    stage, particles = Visibility(power=1.0, independence_distance=0.75), Particles(poses, np.full(50, 0.02))
+    stage, particles = Visibility(independence_distance=0.75), Particles(poses, np.full(50, 0.02))
     stage.setup(Context("sensor"))
 
     def at(motion: Motion):
@@ -313,8 +291,8 @@ def test_the_field_of_view_follows_from_the_match():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     poses, one = some_poses(100), RNG.random((25, 1))
     all_alike = np.repeat(one, 36, axis=1)
-    ahead = weighed(Visibility(power=1.0), one, poses, areas).likelihood.values
-    around = weighed(Visibility(power=1.0), all_alike, poses, areas).likelihood.values
+    ahead = weighed(Visibility(), one, poses, areas).likelihood.values
+    around = weighed(Visibility(), all_alike, poses, areas).likelihood.values
     assert not np.allclose(ahead, around)
 
 
