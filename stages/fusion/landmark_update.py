@@ -34,7 +34,8 @@ MIN_PROPOSED = 0.5
 """Probability of a pose from which on it proposes a place where the belief is not: beside the mapped way, where no pose
 is right, one in six images has one that is metres off."""
 CARRIED, MIN_PROPOSED_CARRIED = 0.5, 0.1
-"""Probability that a robot that was surely carried is elsewhere, and `MIN_PROPOSED` until it is found there."""
+"""Probability that a robot that was surely carried, or started anywhere, is elsewhere; and `MIN_PROPOSED` until it is
+found there."""
 INDEPENDENT = 4.0
 """Distance driven, in length scales, after which a pose against the belief is new evidence: until then images show the
 same things, and in a store's unmapped aisle twelve in a row over 2.6 m agreed on one wrong place."""
@@ -61,9 +62,10 @@ class LandmarkUpdate(Stage):
     errors of the same landmarks, and a robot that stands gains no information. With `kidnapping_probability` the
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
-    Once `track` says that the robot was carried, it is as likely elsewhere as here, until poses that are together all
-    but certain have been proposed. So a first pose of probability 0.1 takes half of the belief, which cannot hold all
-    other places; the confidence says how sure the robot is.
+    Where a log begins with a belief that may be anywhere, or once `track` says that the robot was carried, it is as
+    likely elsewhere as here, until poses that are together all but certain have been proposed. So a first pose of
+    probability 0.1 takes half of the belief, which cannot hold all other places; the confidence says how sure the robot
+    is.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """
@@ -91,7 +93,9 @@ class LandmarkUpdate(Stage):
     ) -> Out:
         """Fuse belief and fix."""
         if motion is None or ctx.tick.first_of_log or restart is not None:
-            last.poses, last.driven, last.elsewhere = np.empty((0, 3)), 0.0, 0.0
+            last.poses, last.driven = np.empty((0, 3)), 0.0
+            _, spread = weighted_moments(belief.poses, belief.weights)
+            last.elsewhere = CARRIED if spread[0, 0] + spread[1, 1] > LOCAL[0] ** 2 else 0.0
         else:
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
             last.driven += math.hypot(motion.x, motion.y)

@@ -129,6 +129,12 @@ def test_a_robot_that_was_carried_is_looked_for_by_poses_that_are_rather_wrong_u
     assert share_at(found, HERE) > 0.9
 
 
+def test_a_robot_that_may_start_anywhere_is_looked_for_by_poses_that_are_rather_wrong() -> None:
+    poor = fix_at(THERE, probabilities=(0.3,))
+    assert share_at(updated(belief(HERE, 20.0), poor), THERE) > 0.7
+    assert share_at(updated(belief(HERE, 0.5), poor), THERE) == 0.0
+
+
 def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:
     misled = [fix_at(THERE, probabilities=(0.6,))] * 8
     standing, driving = Motion(0.0, 0.0, 0.0), Motion(2.0, 0.0, 0.0)
