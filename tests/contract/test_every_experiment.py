@@ -50,7 +50,10 @@ def test_every_experiment_can_be_read_by_the_command_in_its_file():
 
 
 def can_be_read(name):
-    command = (CONF / f"{name}.yaml").read_text().split("\n")[1].partition("  omninav ")[2]
+    text = (CONF / f"{name}.yaml").read_text()
+    inherited = re.search(r"^defaults: \[(\S+),", text, re.MULTILINE)
+    assert inherited is None or inherited[1].startswith("/experiment/"), "else a user's file cannot inherit it"
+    command = text.split("\n")[1].partition("  omninav ")[2]
     config = resolved_but_for_the_experiment(without_graph(shlex.split(command)))
     folder, _, stem = name.partition("/")
     for profile in ("full", "quick"):
