@@ -93,9 +93,9 @@ class LandmarkUpdate(Stage):
     ) -> Out:
         """Fuse belief and fix."""
         if motion is None or ctx.tick.first_of_log or restart is not None:
-            last.poses, last.driven = np.empty((0, 3)), 0.0
-            _, spread = weighted_moments(belief.poses, belief.weights)
-            last.elsewhere = CARRIED if spread[0, 0] + spread[1, 1] > LOCAL[0] ** 2 else 0.0
+            last.poses, last.driven, last.elsewhere = np.empty((0, 3)), 0.0, 0.0
+            if (ctx.tick.first_of_log or restart is not None) and _is_anywhere(belief):
+                last.elsewhere = CARRIED
         else:
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
             last.driven += math.hypot(motion.x, motion.y)
@@ -166,3 +166,10 @@ class LandmarkUpdate(Stage):
         shares = [np.full(kept, old / kept), *(w / total for w in weights[1:]), *(w / total for _, w in recovery)]
         number = sum(len(p) for p, _ in recovery)
         return Particles(np.concatenate(parts), np.concatenate(shares) / sum(s.sum() for s in shares), number)
+
+
+def _is_anywhere(belief: Particles) -> bool:
+    if not len(belief.poses):
+        return False
+    _, spread = weighted_moments(belief.poses, belief.weights)
+    return bool(spread[0, 0] + spread[1, 1] > LOCAL[0] ** 2)

@@ -52,7 +52,7 @@ class LandmarkPose(Stage):
 
     Candidates are the references that share most visual words with the image, over the whole map, and those near the
     belief, both always: a belief may be wrong, and words may be ambiguous. Where they show no likely pose, more
-    references are looked at. Features are matched with the landmarks that
+    references are looked at, and the likelier round counts. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without

@@ -14,12 +14,12 @@ from .world import World
 def room_view(world: WorldConfig, name: str) -> Pixels:
     """The image (rows, columns, 3) taken on day 0 where the robot has room, closest to the middle of a named room.
 
-    Raises `UnreadableRecording` where the room has no place for the robot.
+    Raises `UnreadableRecording` where there is no such room, or none in it for the robot.
     """
     built = World(world)
-    room = next(room for room in built.config.rooms if room.name == name)
-    places = within(standing_room(built.config), room)
-    if not len(places):
+    room = next((room for room in built.config.rooms if room.name == name), None)
+    places = np.empty((0, 2)) if room is None else within(standing_room(built.config), room)
+    if room is None or not len(places):
         raise UnreadableRecording(f"goal: world '{world.name}' has no room for the robot in '{name}'; type another one")
     off = places - np.add(room.corner, np.divide(room.size, 2.0))
     pose = np.append(places[np.argmin(np.hypot(*off.T))], 0.0)
