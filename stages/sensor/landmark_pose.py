@@ -129,8 +129,10 @@ class LandmarkPose(Stage):
             places = near.poses[systematic(near.weights, BELIEF_SAMPLES, 0.5)]
             gaps = ((map.poses[: len(words), None, :2] - places[:, :2]) ** 2).sum(axis=2)
             closest = np.argpartition(gaps, min(NEAR_EACH, len(gaps)) - 1, axis=0)[:NEAR_EACH].ravel()
-        for number in WORD_REFERENCES:
-            yield distinct(np.concatenate([best[:number], closest]))
+        first, more = WORD_REFERENCES
+        yield distinct(np.concatenate([best[:first], closest]))
+        if len(best) > first:
+            yield distinct(np.concatenate([best[:more], closest]))
 
 
 def agreeing(poses: list[BearingPose]) -> npt.NDArray[np.int8]:

@@ -30,7 +30,7 @@ class GoalImage(Stage):
     """
 
     goal: str | int | None = None
-    """An image file, by its suffix; any other names a place, and there is no image."""
+    """An image file, by its suffix; any other names a place or, without `places`, a room whose image is taken."""
     world: WorldConfig | None = None
     """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
@@ -49,7 +49,7 @@ class GoalImage(Stage):
         camera: Camera | None = None
 
     def inputs_digest(self) -> str | None:
-        """Of the image, or of the world in which it is taken; of a place none."""
+        """Hashes the image, or the world in which it is taken; None for a place of the map."""
         file = self._file()
         if file is not None:
             return digest_file(file)

@@ -44,7 +44,7 @@ VARIANTS = ("omninav", "omniview_mcl", "plain_matching", "topological_localisati
 USES = [(camera, variant) for camera in NAMES for variant in VARIANTS] + [
     (f"{name}.yaml", VARIANTS[2]) for name in FILES
 ]
-"""What is checked and run; a camera that a file describes with one variant, for what differs is over by then."""
+"""Pairs of camera and variant that are run: a camera file is tried with one variant, since all read it in one way."""
 ORDINARY = ["unwarp=window", "nodes.unwarp.directions=1"]
 """What docs/logs.md says to type for a webcam."""
 

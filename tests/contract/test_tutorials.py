@@ -11,7 +11,7 @@ from nbclient import NotebookClient
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
 EACH_DAY = ("my_log", "my_stage")
-"""What a newcomer begins with; the others take minutes, and run at night."""
+"""Notebooks that run by day; the others take minutes, and run at night."""
 SHORTER = {
     "nodes.source.seconds=25": "nodes.source.seconds=8",
     "range(3)": "range(2)",

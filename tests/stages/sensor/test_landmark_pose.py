@@ -60,7 +60,7 @@ def test_where_words_say_nothing_the_belief_names_the_candidates() -> None:
 
 def test_where_the_first_references_show_no_pose_more_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     features = seen_from(room(), FIRST)
-    monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", (0,))
+    monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", (0, 0))
     assert fix(features) is None
     monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", (0, 80))
     assert fix(features).poses[0] == pytest.approx(FIRST, abs=1e-3)
@@ -74,7 +74,7 @@ def test_a_mirrored_image_and_one_of_another_room_have_no_pose() -> None:
 
 
 def test_two_places_that_look_the_same_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", (30,))
+    monkeypatch.setattr("omninav.stages.sensor.landmark_pose.WORD_REFERENCES", (30, 30))
     one = np.random.default_rng(2).uniform([0, 0, 0], [8, 6, 2.2], (500, 3))
     points = Points(np.concatenate([one, one + AWAY]), np.tile(np.arange(500), 2))
     points.looks[500::2] = np.random.default_rng(3).integers(0, 100, (250, 128))  # every other one differs
