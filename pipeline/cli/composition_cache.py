@@ -1,39 +1,66 @@
-"""Composes as Hydra does, and what the conditions of an experiment have in common only once."""
+"""Composes as Hydra does, and what the conditions of an experiment or the jobs of a sweep have in common only once."""
 
 import functools
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import hydra
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
-from hydra.errors import ConfigCompositionException
+from hydra.errors import ConfigCompositionException, HydraException
 from omegaconf import OmegaConf, open_dict
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
-from .hydra_session import hydra_errors
+from omninav.pipeline.graph.problems import BadInput
 
 
 def compose(words: Sequence[str]) -> Any:
-    """The configuration that words describe, where Hydra has been started. Raises Hydra's errors.
+    """The configuration that words describe, where Hydra has been started. Raises Hydra's errors."""
+    with hydra_errors():
+        return from_options(functools.partial(_of_options, GlobalHydra.instance().hydra), parsed(words))
+
+
+def parsed(words: Sequence[str]) -> list[Override]:
+    """Words as Hydra reads them. Raises its errors."""
+    return [*OverridesParser.create().parse_overrides([*words])]
+
+
+def from_options(kept: Callable[[tuple[str, ...]], bytes], words: Sequence[Override]) -> Any:
+    """A configuration, where `kept` gives the bytes of the one that options alone describe. Raises Hydra's errors.
 
     Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
     options give is kept, and all else (`day=2`) is set in a copy of it.
     """
-    session = GlobalHydra.instance().hydra
-    with hydra_errors():
-        parsed = OverridesParser.create().parse_overrides([*words])
-        settings = [word for word in parsed if _is_setting(word)]
-        options = tuple(str(word.input_line) for word in parsed if word not in settings)
-        config = pickle.loads(_of_options(session, options))
-        for word in settings:
-            try:
-                _set(config, word)
-            except OmegaConfBaseException as error:
-                raise ConfigCompositionException(f"Error merging override {word.input_line}") from error
+    settings = [word for word in words if _is_setting(word)]
+    config = pickle.loads(kept(tuple(str(word.input_line) for word in words if word not in settings)))
+    for word in settings:
+        try:
+            _set(config, word)
+        except OmegaConfBaseException as error:
+            raise ConfigCompositionException(f"Error merging override {word.input_line}") from error
     return config
+
+
+@contextmanager
+def hydra_errors() -> Iterator[None]:
+    """Whatever Hydra stumbles over is an error of Hydra's."""
+    try:
+        yield
+    except (HydraException, OmegaConfBaseException, BadInput):
+        raise
+    except (
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+        AssertionError,
+    ) as error:
+        raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
 
 
 def _set(config: Any, word: Override) -> None:

@@ -1,5 +1,6 @@
 """Hydra as omninav starts it: it composes configurations and launches jobs, and calls nothing else that they name."""
 
+import os
 import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +14,6 @@ from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.plugins import Plugins
-from hydra.errors import ConfigCompositionException, HydraException
 from hydra.plugins.config_source import ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
@@ -21,14 +21,19 @@ from omegaconf import MISSING, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from hydra_plugins.omninav_launcher import OmninavLauncher
-from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown
 from omninav.pipeline.graph.registry import Entry, plugins
 
 from .artifact_graph import learned, words_of_artifact, words_of_variant
+from .composition_cache import from_options, hydra_errors, parsed
 from .config_groups import CONF
 from .config_sources import CheckedFolder, OwnFiles
 from .interpolations import interpolations_limited
 
+CONFIG = "config"
+"""The file that every configuration is composed from."""
+RUN_ALONE = "hydra.mode=RUN"
+"""Word by which a job that is no sweep's is told."""
 VERSION_BASE = "1.3"
 """Version of Hydra whose defaults hold."""
 FOLDERS_OF_JOBS = ("run", "sweep")
@@ -95,30 +100,12 @@ class _SearchPath(SearchPathPlugin):
             search_path.append("command-line", f"{CheckedFolder.scheme()}://{folder}")
 
 
-@contextmanager
-def hydra_errors() -> Iterator[None]:
-    """Whatever Hydra stumbles over is an error of Hydra's."""
-    try:
-        yield
-    except (HydraException, OmegaConfBaseException, BadInput):
-        raise
-    except (
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        RecursionError,
-        AssertionError,
-    ) as error:
-        raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
-
-
 class CheckedLoader(ConfigLoader):
     """Hydra's loader, which refuses whatever stands under `hydra.` beyond folders of jobs, launcher and sweeper."""
 
     def __init__(self, hydras: ConfigLoader) -> None:
         self._hydras = hydras
+        self._kept: dict[tuple[str, ...], bytes] = {}
         self._own: Any = None
         self._last: tuple[list[str], bytes] = ([], b"")
 
@@ -127,7 +114,10 @@ class CheckedLoader(ConfigLoader):
         _refuse_search_path(overrides)
         with hydra_errors():
             words, variant = self._of_artifact(overrides)
-            config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
+            if config_name == CONFIG and RUN_ALONE in words:
+                config = self._of_job(words)
+            else:
+                config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
             _name(config, variant, overrides)
         if config_name is not None:
             if overrides:
@@ -141,10 +131,29 @@ class CheckedLoader(ConfigLoader):
         _refuse_search_path(sweep_overrides)
         with hydra_errors():
             words, variant = self._of_artifact(sweep_overrides)
-            config = self._hydras.load_sweep_config(master_config, words)
+            hydras: Any = OmegaConf.to_container(master_config.hydra.overrides.hydra, resolve=False)
+            config = self._of_job([*hydras, *words])
+            OmegaConf.copy_cache(from_config=master_config, to_config=config)
             _name(config, variant, sweep_overrides)
         self._refuse_foreign(config)
         return config
+
+    def _of_job(self, words: Sequence[str]) -> Any:
+        """The configuration of one job as Hydra gives it. What options give it loads once for all jobs."""
+        given = parsed(words)
+        config = from_options(self._of_options, given)
+        of_job, own = config.hydra.job, [word for word in given if not word.is_hydra_override()]
+        config.hydra.overrides.task = [word.input_line for word in own]
+        config.hydra.runtime.cwd = os.getcwd()
+        form = of_job.config.override_dirname
+        named = sorted(str(word.input_line) for word in own if word.key_or_group not in form.exclude_keys)
+        of_job.override_dirname = form.item_sep.join(named).replace("=", form.kv_sep)
+        return config
+
+    def _of_options(self, options: tuple[str, ...]) -> bytes:
+        if options not in self._kept:
+            self._kept[options] = pickle.dumps(self._hydras.load_configuration(CONFIG, [*options], RunMode.RUN))
+        return self._kept[options]
 
     def _of_artifact(self, words: list[str]) -> tuple[list[str], str]:
         """The words that describe the graph of the artifact that is asked for, and its name; else the words, and ''."""
@@ -154,7 +163,7 @@ class CheckedLoader(ConfigLoader):
         of_variant = words_of_variant(words, self.list_groups(""))
         last, kept = self._last  # most often that variant has just been composed
         same = bool(kept) and last == of_variant
-        variant = pickle.loads(kept) if same else self._hydras.load_configuration("config", of_variant, RunMode.RUN)
+        variant = pickle.loads(kept) if same else self._hydras.load_configuration(CONFIG, of_variant, RunMode.RUN)
         return words_of_artifact(name, variant, words), f"{variant.variant}_{name}"
 
     def _refuse_foreign(self, config: Any) -> None:

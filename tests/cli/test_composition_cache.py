@@ -5,13 +5,15 @@ from unittest.mock import patch
 
 import hydra
 import pytest
+from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli import composition_cache
 from omninav.pipeline.cli.composition import composed
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.hydra_session import hydra_started
+from omninav.pipeline.cli.hydra_session import CONFIG, RUN_ALONE, hydra_started
 from omninav.pipeline.graph.problems import ProblemsFound
 
 
@@ -33,6 +35,18 @@ def _configured() -> Iterator[None]:
 )
 def test_words_give_what_hydra_makes_of_them(words: list[str]):
     assert OmegaConf.to_yaml(compose(words)) == OmegaConf.to_yaml(hydra.compose("config", overrides=words))
+
+
+def test_jobs_are_what_hydra_makes_of_them_with_its_own_part():
+    checked = GlobalHydra.instance().hydra.config_loader
+    words = ["variant=omniview_cml", "tour='a=b.mcap'", "++nodes.match.headings=18", "~match", "log=${tour}"]
+    alone = [*words, "hydra.run.dir=there/${hydra.job.override_dirname}", RUN_ALONE]
+    hydras = OmegaConf.to_yaml(checked._hydras.load_configuration(CONFIG, alone, RunMode.RUN))
+    for _ in range(2):  # composed, and from what was kept
+        assert OmegaConf.to_yaml(checked.load_configuration(CONFIG, alone, RunMode.RUN)) == hydras
+    master = checked._hydras.load_configuration(CONFIG, ["hydra.sweep.subdir=of_${seed}", "seed=1,2"], RunMode.MULTIRUN)
+    job, hydras = (each.load_sweep_config(master, words) for each in (checked, checked._hydras))
+    assert OmegaConf.to_yaml(job) == OmegaConf.to_yaml(hydras)
 
 
 def test_options_are_composed_once_and_what_was_set_is_not_kept():

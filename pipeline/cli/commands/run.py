@@ -13,7 +13,7 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import composed, offer_plugins
-from omninav.pipeline.cli.hydra_session import hydra_started
+from omninav.pipeline.cli.hydra_session import CONFIG, RUN_ALONE, hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_engine
@@ -62,11 +62,11 @@ def _run_experiment(config: Any, arguments: Sequence[str]) -> int:
 def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
     """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
     if flags.hydra_help:
-        hydra.hydra_help("config", flags_parser(), flags)
+        hydra.hydra_help(CONFIG, flags_parser(), flags)
     elif flags.cfg:
-        hydra.show_cfg("config", words, flags.cfg, flags.package, flags.resolve)
+        hydra.show_cfg(CONFIG, words, flags.cfg, flags.package, flags.resolve)
     elif flags.info:
-        hydra.show_info(flags.info, "config", words)
+        hydra.show_info(flags.info, CONFIG, words)
     else:
         with tempfile.TemporaryDirectory() as place:
             outcomes = Path(place) / "outcomes"
@@ -74,7 +74,7 @@ def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[
             if flags.multirun:
                 _sweep(hydra, job, words, outcomes)
             else:
-                hydra.run("config", job, [*words, "hydra.mode=RUN"])
+                hydra.run(CONFIG, job, [*words, RUN_ALONE])
             ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
             show_sweep(Path(page).parent)
@@ -90,7 +90,7 @@ def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[
 def _sweep(hydra: Any, job: Callable[[Any], float | None], words: Sequence[str], outcomes: Path) -> None:
     """Run a sweep. An optimiser that gives up because every job has failed is no error of its own."""
     try:
-        hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
+        hydra.multirun(CONFIG, job, [*words, "hydra.mode=MULTIRUN"])
     except HydraException:
         raise
     except Exception:
