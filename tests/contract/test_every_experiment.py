@@ -1,5 +1,6 @@
 """What experiments of maps that are learned on the way show, and that conditions of all experiments can be built."""
 
+import functools
 import re
 import shlex
 from dataclasses import replace
@@ -7,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from offenders import assert_each
-from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
@@ -33,8 +33,14 @@ def hydra():
         yield
 
 
+@functools.cache
+def settings_of(name: str):
+    return resolved_but_for_the_experiment(without_graph([f"+experiment={name}"]))
+
+
+@functools.cache
 def experiment(name: str, profile: str):
-    return read_experiment(OmegaConf.to_container(without_graph([f"+experiment={name}"]).experiment), profile)
+    return read_experiment(settings_of(name)["experiment"], profile)
 
 
 def typed(found, condition):
@@ -121,7 +127,7 @@ def test_at_a_small_scale_no_test_world_is_looked_at():
 
 
 def looks_at_no_test_world(name):
-    config = resolved_but_for_the_experiment(without_graph([f"+experiment={name}"]))
+    config = settings_of(name)
     for profile in {"quick", "development"} & set(config["experiment"].get("profiles", {})):
         typed = " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())
         assert {int(draw) for draw in re.findall(r"world\.draw=(\d+)", typed)} <= {0, *range(7, 18)}
