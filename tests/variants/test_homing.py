@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
+from golden_figures import SMALL_CAMERA
 
 from omninav.pipeline.mcap.reader import LogReader
 
 WORDS = (
     "variant=homing",
+    *SMALL_CAMERA,
     "nodes.source.seconds=16",
     "nodes.source.start=[5.0,5.0,0.4]",
     "kidnappings=[{at: 0.5, to: [4.0, 4.2, 1.5]}]",
@@ -53,6 +55,7 @@ def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: P
 WARPED = (
     "variant=homing_field",
     "homing=warping",
+    *SMALL_CAMERA,
     "nodes.source.target=[5.0,5.0,0.4]",
     "nodes.source.spacing_m=0.4",
     "nodes.source.radius_m=1.2",

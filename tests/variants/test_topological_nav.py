@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
 from conftest import DATA, DRIVE, TOUR, needs_data
+from golden_figures import SMALL_CAMERA
 
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.graph.ground_truth import truth_in_the_loop
 from omninav.stages.values.topological_map import TopologicalMap
 
 HOUSE = DATA / "photoreal-house"
-WORDS = ("variant=topological_nav", "world=home_store_demo")
+WORDS = ("variant=topological_nav", "world=home_store_demo", *SMALL_CAMERA)
 SECONDS = ("nodes.source.seconds=40", "checkpoint_s=0.5")
 KILLED = ("nodes.source.seconds=12", "checkpoint_s=0.5")
 
