@@ -16,6 +16,11 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from omninav.pipeline.graph.problems import BadInput
 
+CONFIG = "config"
+"""The file that every configuration is composed from."""
+RUN_ALONE = "hydra.mode=RUN"
+"""Word by which a job that is no sweep's is told."""
+
 
 def compose(words: Sequence[str]) -> Any:
     """The configuration that words describe, where Hydra has been started. Raises Hydra's errors."""
@@ -99,8 +104,8 @@ def _set(config: Any, word: Override) -> None:
 
 @functools.lru_cache(maxsize=256)
 def _of_options(session: Any, options: tuple[str, ...]) -> bytes:
-    # A configuration is read from its bytes five times as fast as it is copied.
-    return pickle.dumps(hydra.compose("config", overrides=[*options]))
+    # A configuration is read from its bytes five times as fast as it is copied. A run of the same options needs it too.
+    return pickle.dumps(hydra.compose(CONFIG, overrides=[*options, RUN_ALONE]))
 
 
 def _is_setting(word: Override) -> bool:

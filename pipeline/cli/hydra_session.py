@@ -25,15 +25,11 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown
 from omninav.pipeline.graph.registry import Entry, plugins
 
 from .artifact_graph import learned, words_of_artifact, words_of_variant
-from .composition_cache import from_options, hydra_errors, parsed
+from .composition_cache import CONFIG, RUN_ALONE, from_options, hydra_errors, parsed
 from .config_groups import CONF
 from .config_sources import CheckedFolder, OwnFiles
 from .interpolations import interpolations_limited
 
-CONFIG = "config"
-"""The file that every configuration is composed from."""
-RUN_ALONE = "hydra.mode=RUN"
-"""Word by which a job that is no sweep's is told."""
 VERSION_BASE = "1.3"
 """Version of Hydra whose defaults hold."""
 FOLDERS_OF_JOBS = ("run", "sweep")
@@ -115,7 +111,7 @@ class CheckedLoader(ConfigLoader):
         with hydra_errors():
             words, variant = self._of_artifact(overrides)
             if config_name == CONFIG and RUN_ALONE in words:
-                config = self._of_job(words)
+                config = self._of_job(words, *args, **kwargs)
             else:
                 config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
             _name(config, variant, overrides)
@@ -132,16 +128,22 @@ class CheckedLoader(ConfigLoader):
         with hydra_errors():
             words, variant = self._of_artifact(sweep_overrides)
             hydras: Any = OmegaConf.to_container(master_config.hydra.overrides.hydra, resolve=False)
-            config = self._of_job([*hydras, *words])
+            config = self._of_job([*hydras, *words], RunMode.RUN)
             OmegaConf.copy_cache(from_config=master_config, to_config=config)
             _name(config, variant, sweep_overrides)
         self._refuse_foreign(config)
         return config
 
-    def _of_job(self, words: Sequence[str]) -> Any:
+    def _of_job(self, words: Sequence[str], *args: Any, **kwargs: Any) -> Any:
         """The configuration of one job as Hydra gives it. What options give it loads once for all jobs."""
+
+        def kept(options: tuple[str, ...]) -> bytes:
+            if options not in self._kept:
+                self._kept[options] = pickle.dumps(self._hydras.load_configuration(CONFIG, [*options], *args, **kwargs))
+            return self._kept[options]
+
         given = parsed(words)
-        config = from_options(self._of_options, given)
+        config = from_options(kept, given)
         of_job, own = config.hydra.job, [word for word in given if not word.is_hydra_override()]
         config.hydra.overrides.task = [word.input_line for word in own]
         config.hydra.runtime.cwd = os.getcwd()
@@ -149,11 +151,6 @@ class CheckedLoader(ConfigLoader):
         named = sorted(str(word.input_line) for word in own if word.key_or_group not in form.exclude_keys)
         of_job.override_dirname = form.item_sep.join(named).replace("=", form.kv_sep)
         return config
-
-    def _of_options(self, options: tuple[str, ...]) -> bytes:
-        if options not in self._kept:
-            self._kept[options] = pickle.dumps(self._hydras.load_configuration(CONFIG, [*options], RunMode.RUN))
-        return self._kept[options]
 
     def _of_artifact(self, words: list[str]) -> tuple[list[str], str]:
         """The words that describe the graph of the artifact that is asked for, and its name; else the words, and ''."""

@@ -12,8 +12,8 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli import composition_cache
 from omninav.pipeline.cli.composition import composed
-from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.hydra_session import CONFIG, RUN_ALONE, hydra_started
+from omninav.pipeline.cli.composition_cache import CONFIG, RUN_ALONE, compose
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.graph.problems import ProblemsFound
 
 

@@ -13,7 +13,8 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import composed, offer_plugins
-from omninav.pipeline.cli.hydra_session import CONFIG, RUN_ALONE, hydra_started
+from omninav.pipeline.cli.composition_cache import CONFIG, RUN_ALONE
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_engine
