@@ -71,18 +71,18 @@ def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav
 
 
 @pytest.mark.parametrize(
-    ("tour", "log", "grid"),
+    ("tour", "log", "grid", "stride"),
     [
-        pytest.param(TOUR, DRIVE, GRID, id="a store and its grid"),
-        pytest.param(TOUR, DRIVE, "from_tour", id="a store and a stand-in"),
-        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", HOUSE / "map.yaml", id="a house", marks=needs_data),
+        pytest.param(TOUR, DRIVE, GRID, 1, id="a store and its grid"),
+        pytest.param(TOUR, DRIVE, "from_tour", 1, id="a store and a stand-in"),
+        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", HOUSE / "map.yaml", 2, id="a house", marks=needs_data),
     ],
 )
 def test_a_robot_that_starts_anywhere_finds_itself(
-    omninav, shared_cache: Path, tmp_path: Path, tour: Path, log: Path, grid: Path | str
+    omninav, shared_cache: Path, tmp_path: Path, tour: Path, log: Path, grid: Path | str, stride: int
 ):
     words = ("variant=retrieval_mcl", f"tour={tour}", f"log={log}", f"grid={grid}", "plots=all")
-    omninav(*words, f"cache={shared_cache}", check=True)
+    omninav(*words, f"nodes.source.stride={stride}", f"cache={shared_cache}", check=True)
     run = (tmp_path / "runs" / "latest").resolve()
     metrics = json.loads((run / "metrics.json").read_text())
     after = metrics["after_convergence"]

@@ -104,7 +104,7 @@ def test_nothing_that_steers_the_robot_knows_the_truth():
     ("tour", "log", "stride", "images"),
     [
         pytest.param(TOUR, DRIVE, 2, 26, id="a store"),
-        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", 1, 130, id="a house", marks=needs_data),
+        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", 3, 44, id="a house", marks=needs_data),
     ],
 )
 def test_a_drive_is_known_by_its_places(omninav, tmp_path: Path, tour: Path, log: Path, stride: int, images: int):
