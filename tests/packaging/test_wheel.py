@@ -104,6 +104,7 @@ def test_an_installed_wheel_makes_a_map_and_localises_in_it_in_an_empty_folder(w
         "-q",
         "--no-deps",
         "--no-index",
+        "--no-compile",
         "--target",
         installed,
         wheel,

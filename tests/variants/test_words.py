@@ -13,7 +13,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
 
 FOUND = ("candidates=words", f"log={DRIVE}", "nodes.candidates.compare_all_up_to=0", "plots=none")
-MADE = ("variant=omniview_mcl", *FOUND, f"tour={TOUR}")
+MADE = ("variant=omniview_mcl", *FOUND, f"tour={TOUR}", "nodes.source.stop=12")
 LOCALISERS = {
     "omninav": "nodes.mapping.distance_m=0.6",
     "omniview_mcl": "nodes.mapping.distance_m=0.6",

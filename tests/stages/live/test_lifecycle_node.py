@@ -79,7 +79,7 @@ def drive(other_end: OtherEnd) -> str:
 
 
 def test_the_node_is_led_through_its_life_and_starts_afresh_after_a_kill(
-    other_end: OtherEnd, start: Start, tmp_path: Path
+    other_end: OtherEnd, start: Start, tmp_path: Path, shared_cache: Path
 ):
     types = LogReader(DRIVE).topics
     for recorded, topic in TOPICS.items():
@@ -90,7 +90,8 @@ def test_the_node_is_led_through_its_life_and_starts_afresh_after_a_kill(
     assert "[omninav]: 1 problem:\n  map: place.omap: there is no such file" in log
     assert "Traceback" not in log
 
-    learnt = run_here(tmp_path, "learn=map", "variant=omniview_mcl", f"log={TOUR}", "plots=none")
+    words = ("learn=map", "variant=omniview_mcl", f"log={TOUR}", "plots=none", f"cache={shared_cache}")
+    learnt = run_here(tmp_path, *words)
     assert learnt.returncode == 0, learnt.stderr
     shutil.copy(next((tmp_path / "runs").glob("*_map/*.omap")), tmp_path / "place.omap")
     assert change(other_end, CONFIGURE)
