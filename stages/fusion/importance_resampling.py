@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
@@ -35,16 +35,28 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
     return math.ceil((cells - 1) / (2.0 * error) * (1.0 - part + math.sqrt(part) * float(ndtri(confidence))) ** 3)
 
 
+class Carried(State):
+    """`weight`: that of a uniform belief, of a robot that was carried at any image so far."""
+
+    weight: float = 0.0
+
+
 class ImportanceResampling(Stage):
     """Multiplies particle weights by the likelihood; resamples systematically where the effective size is small.
 
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking).
 
-    Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty x mean
-    likelihood, goes to the `proposals`, poses that the view itself suggests. They join the recovery particles, which
-    are resampled among themselves by how well they fit the view, so that evidence for a hypothesis accumulates over
-    images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
-    those of one mixture throughout; only the allocation of particles differs.
+    Recovery from kidnapping: the weight that a uniform belief would get goes to the `proposals`, poses that the view
+    itself suggests. The robot may have been carried at this image or at any before, so that of an image of novelty v
+    and mean likelihood m, after which the belief's weights sum to Z,
+
+        u <- (u m^v + kidnapping_probability v m) / Z.
+
+    The images since then count for proposals as for any place, m^v each, and against the belief as much as they do
+    (Z); the image that suggests a place counts whole, being the first that says something of it. They join the recovery
+    particles, which are resampled among themselves by how well they fit the view, so that evidence for a hypothesis
+    accumulates over images however small its weight. Once they outweigh their share they are resampled with all others.
+    Weights are those of one mixture throughout, but that a place which several images suggest is counted for each.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -63,7 +75,14 @@ class ImportanceResampling(Stage):
 
         belief: Particles
 
-    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        carried: Carried,
+        particles: Particles,
+        likelihood: Likelihood,
+        proposals: Particles | None,
+    ) -> Out:
         """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
         total, new = float(np.add.reduce(weighted)), 0.0
@@ -72,8 +91,10 @@ class ImportanceResampling(Stage):
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
         moved = self.kidnapping_probability * likelihood.novelty
         if proposals is not None and likelihood.mean_likelihood is not None:
-            new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
+            anywhere = likelihood.mean_likelihood
+            new = carried.weight * anywhere**likelihood.novelty + moved * anywhere
             weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
+        carried.weight = new / total
         tracked = len(poses) - particles.recovery_particles
         wanted = self._wanted(poses[:tracked])
         weights = weighted / total

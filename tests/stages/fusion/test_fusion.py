@@ -3,7 +3,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
+from omninav.stages.fusion.importance_resampling import Carried, ImportanceResampling, kld_number
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
@@ -19,7 +19,7 @@ def fuse(
 ) -> Particles:
     ctx = Context("fusion", np.random.default_rng(seed))
     likelihood = Likelihood(values, more.get("anywhere"))  # type: ignore[arg-type]
-    return stage.step(ctx, particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
+    return stage.step(ctx, Carried(), particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
 
 
 def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:
@@ -43,7 +43,7 @@ def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
 def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> None:
     ctx, particles = Context("fusion", np.random.default_rng(0)), belief()
-    out = ImportanceResampling(number=1000).step(ctx, particles, Likelihood(values), None).belief
+    out = ImportanceResampling(number=1000).step(ctx, Carried(), particles, Likelihood(values), None).belief
     assert np.allclose(out.weights, particles.weights)
     assert ctx.counts["belief_without_support"] == 1
 
@@ -77,20 +77,31 @@ def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> 
 def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
     # Each picture speaks 10:1 against the belief, for the proposals of the first; later ones propose nothing of worth.
     # Bayes by hand, with a prior of 1e-6 for "put there at the first picture": odds 1e-6 x 10^n after n more pictures.
-    stage, ctx = (
-        ImportanceResampling(number=5000, kidnapping_probability=1e-6),
-        Context("fusion", np.random.default_rng(0)),
-    )
+    stage, carried = ImportanceResampling(number=5000, kidnapping_probability=1e-6), Carried()
+    ctx = Context("fusion", np.random.default_rng(0))
     there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
     elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
-    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
+    now = stage.step(ctx, carried, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
     assert now.recovery_particles == 500
     for picture in range(1, 11):
         values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
-        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
+        now = stage.step(ctx, carried, now, Likelihood(values, 1e-9), elsewhere).belief
         share, odds = now.weights[now.poses[:, 0] == 77.0].sum(), 1e-6 * 10.0**picture
         assert share == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
     assert (now.poses[:, 0] == 77.0).mean() > 0.4  # the particles have followed the weights
+
+
+def test_a_place_that_only_a_later_picture_suggests_has_the_evidence_since_the_kidnapping() -> None:
+    # Uniform beliefs by hand, of novelty 0.5, where anywhere is 4 and the belief 0.1: a half of 4 p over 0.1 after the
+    # first picture, 20 p; then twice that, for 4^0.5, and 2 p more, over 0.1: 420 p, and 8420 p.
+    stage, carried = ImportanceResampling(number=5000, kidnapping_probability=1e-7), Carried()
+    now, shares = belief(5000), []
+    for x in (-77.0, -77.0, 77.0):
+        likelihood = Likelihood(np.full(len(now.poses), 0.1), 4.0, 0.5)
+        proposals = Particles(np.full((50, 3), x), np.full(50, 0.02))
+        now = stage.step(Context("fusion"), carried, now, likelihood, proposals).belief
+        shares.append(now.weights[now.poses[:, 0] == x].sum())
+    assert shares[2] == pytest.approx(8420e-7, rel=0.02)
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
@@ -98,7 +109,8 @@ def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
     ctx, stage = Context("fusion"), ImportanceResampling(kidnapping_probability=1e-3)
     shares = []
     for fresh in (1.0, 0.1):
-        out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals).belief
+        likelihood = Likelihood(np.ones(5000), 1.0, fresh)
+        out = stage.step(ctx, Carried(), particles, likelihood, proposals).belief
         shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
     assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
 
@@ -132,7 +144,8 @@ def with_recovery(weight: float, kidnapping_probability: float, novelty: float =
     stage = ImportanceResampling(number=10, recovery_share=0.2, kidnapping_probability=kidnapping_probability)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]] * 2), np.array([0.5, 0.5]))
     likelihood = Likelihood(np.ones(10), 1.0, novelty)
-    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals).belief
+    believed = Particles(poses, weights, 2)
+    return stage.step(Context("fusion"), Carried(), believed, likelihood, proposals).belief
 
 
 def test_of_a_mixture_the_uniform_part_has_the_weight_of_a_kidnapping() -> None:
@@ -165,7 +178,8 @@ def test_recovery_particles_that_weigh_just_their_share_stay_apart() -> None:
     stage = ImportanceResampling(number=8, recovery_share=0.25, kidnapping_probability=0.5)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]]), np.ones(1))
     believed = Particles(poses, np.full(8, 0.125), 4)
-    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals).belief
+    carried, likelihood = Carried(), Likelihood(np.ones(8), 1.0)
+    out = stage.step(Context("fusion"), carried, believed, likelihood, proposals).belief
     assert out.poses[:6, 0].tolist() == [0.0] * 6
     assert 5.0 in out.poses[6:, 0]
 
