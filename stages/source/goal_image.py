@@ -83,10 +83,10 @@ class GoalImage(Stage):
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():
-            what = "goal=PLACE, its name or number, or goal=IMAGE.png" if self.places else "goal=IMAGE.png"
-            raise BadInput(f"goal: no goal is named; type {what}")
-        if not str(self.goal or "").lower().endswith(SUFFIXES):
-            if not self.places and (self.world is None or not known_rooms(None, self.world)):
+            place = "goal=PLACE, its name or number, or " if self.places else "goal=ROOM, or " if self._rooms() else ""
+            raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png")
+        if not str(self.goal).lower().endswith(SUFFIXES):
+            if not self.places and not self._rooms():
                 raise BadInput(
                     f"goal: {self.goal} is no image, and the map has no places; type goal=IMAGE.png, what the robot's "
                     "camera saw there"
@@ -97,6 +97,9 @@ class GoalImage(Stage):
         if not file.is_file():
             raise BadInput(f"goal: there is no file {file}; give an image, or a place's number or name")
         return file
+
+    def _rooms(self) -> bool:
+        return self.world is not None and bool(known_rooms(None, self.world))
 
     def _refuse_unknown(self, name: str) -> None:
         """Raise BadInput for a name that no place of the map can have which is still to be learned."""
