@@ -83,10 +83,10 @@ class GoalImage(Stage):
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():
-            place = "goal=PLACE, its name or number, or " if self.places else "goal=ROOM, or " if self._rooms() else ""
+            place = "goal=PLACE, its name or number, or " if self.places else "goal=ROOM, or " if self._has_rooms() else ""
             raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png")
         if not str(self.goal).lower().endswith(SUFFIXES):
-            if not self.places and not self._rooms():
+            if not self.places and not self._has_rooms():
                 raise BadInput(
                     f"goal: {self.goal} is no image, and the map has no places; type goal=IMAGE.png, what the robot's "
                     "camera saw there"
@@ -98,7 +98,7 @@ class GoalImage(Stage):
             raise BadInput(f"goal: there is no file {file}; give an image, or a place's number or name")
         return file
 
-    def _rooms(self) -> bool:
+    def _has_rooms(self) -> bool:
         return self.world is not None and bool(known_rooms(None, self.world))
 
     def _refuse_unknown(self, name: str) -> None:
