@@ -19,7 +19,7 @@ from omninav.pipeline.graph.problems import BadInput
 CONFIG = "config"
 """The file that every configuration is composed from."""
 RUN_ALONE = "hydra.mode=RUN"
-"""Word by which a job that is no sweep's is told."""
+"""The word that tells Hydra that a job belongs to no sweep."""
 
 
 def compose(words: Sequence[str]) -> Any:
@@ -29,12 +29,12 @@ def compose(words: Sequence[str]) -> Any:
 
 
 def parsed(words: Sequence[str]) -> list[Override]:
-    """Words as Hydra reads them. Raises its errors."""
+    """Reads words as Hydra does. Raises its errors."""
     return [*OverridesParser.create().parse_overrides([*words])]
 
 
 def from_options(kept: Callable[[tuple[str, ...]], bytes], words: Sequence[Override]) -> Any:
-    """A configuration, where `kept` gives the bytes of the one that options alone describe. Raises Hydra's errors.
+    """Sets words in the configuration that their options give, whose bytes `kept` returns. Raises Hydra's errors.
 
     Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
     options give is kept, and all else (`day=2`) is set in a copy of it.

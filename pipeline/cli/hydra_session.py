@@ -43,6 +43,8 @@ OWN_WORDS = ("hydra/job_logging=disabled", "hydra/hydra_logging=disabled", "hydr
 """Values that config.yaml gives to those parts that a configuration cannot set."""
 CALLED_BY_NAME = ("custom_search_space",)
 """Parameters of a sweeper that name a function to call."""
+MAX_KEPT = 256
+"""Configurations of options that a process keeps, each of some 100 kB."""
 
 
 @contextmanager
@@ -103,7 +105,6 @@ class CheckedLoader(ConfigLoader):
         self._hydras = hydras
         self._kept: dict[tuple[str, ...], bytes] = {}
         self._own: Any = None
-        self._last: tuple[list[str], bytes] = ([], b"")
 
     def load_configuration(self, config_name: str | None, overrides: list[str], *args: Any, **kwargs: Any) -> Any:
         """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
@@ -111,15 +112,12 @@ class CheckedLoader(ConfigLoader):
         with hydra_errors():
             words, variant = self._of_artifact(overrides)
             if config_name == CONFIG and RUN_ALONE in words:
-                config = self._of_job(words, *args, **kwargs)
+                config = self._of_job(words)
             else:
                 config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
             _name(config, variant, overrides)
-        if config_name is not None:
-            if overrides:
-                self._refuse_foreign(config)
-            if not variant:
-                self._last = ([*overrides], pickle.dumps(config))
+        if config_name is not None and overrides:
+            self._refuse_foreign(config)
         return config
 
     def load_sweep_config(self, master_config: Any, sweep_overrides: list[str]) -> Any:
@@ -128,18 +126,24 @@ class CheckedLoader(ConfigLoader):
         with hydra_errors():
             words, variant = self._of_artifact(sweep_overrides)
             hydras: Any = OmegaConf.to_container(master_config.hydra.overrides.hydra, resolve=False)
-            config = self._of_job([*hydras, *words], RunMode.RUN)
+            config = self._of_job([*hydras, *words])
             OmegaConf.copy_cache(from_config=master_config, to_config=config)
             _name(config, variant, sweep_overrides)
         self._refuse_foreign(config)
         return config
 
-    def _of_job(self, words: Sequence[str], *args: Any, **kwargs: Any) -> Any:
-        """The configuration of one job as Hydra gives it. What options give it loads once for all jobs."""
+    def _of_job(self, words: Sequence[str]) -> Any:
+        """Composes the configuration of one job as Hydra does.
+
+        It loads what options give once, so that files edited meanwhile count from the next start on.
+        """
 
         def kept(options: tuple[str, ...]) -> bytes:
             if options not in self._kept:
-                self._kept[options] = pickle.dumps(self._hydras.load_configuration(CONFIG, [*options], *args, **kwargs))
+                if len(self._kept) >= MAX_KEPT:
+                    self._kept.pop(next(iter(self._kept)))
+                loaded = self._hydras.load_configuration(CONFIG, [*options], RunMode.RUN, from_shell=False)
+                self._kept[options] = pickle.dumps(loaded)
             return self._kept[options]
 
         given = parsed(words)
@@ -157,10 +161,7 @@ class CheckedLoader(ConfigLoader):
         name = learned(words)
         if name is None:
             return words, ""
-        of_variant = words_of_variant(words, self.list_groups(""))
-        last, kept = self._last  # most often that variant has just been composed
-        same = bool(kept) and last == of_variant
-        variant = pickle.loads(kept) if same else self._hydras.load_configuration(CONFIG, of_variant, RunMode.RUN)
+        variant = self._of_job([*words_of_variant(words, self.list_groups("")), RUN_ALONE])
         return words_of_artifact(name, variant, words), f"{variant.variant}_{name}"
 
     def _refuse_foreign(self, config: Any) -> None:
