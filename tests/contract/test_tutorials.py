@@ -13,7 +13,7 @@ NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
 EACH_DAY = ("my_log", "my_stage")
 """Notebooks that run by day; the others take minutes, and run at night."""
 SHORTER = {
-    r"\"simulate\", ": r"\"simulate\", \"world.timing.images=1\", ",
+    r"tool(\"simulate\", ": r"tool(\"simulate\", \"world.timing.images=1\", ",
     "nodes.source.seconds=25": "nodes.source.seconds=8",
     "range(3)": "range(2)",
     "n_trials=5": "n_trials=2",

@@ -53,7 +53,8 @@ def test_killed_on_its_way_it_goes_on_to_the_same_bytes(tmp_path: Path, shared_c
 
 
 def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, navigate, tmp_path: Path):
-    omninav("variant=wander", "nodes.source.start=[4.2,4.0,0.5]", "nodes.source.seconds=0.2", check=True)
+    words = ("nodes.source.start=[4.2,4.0,0.5]", "nodes.source.seconds=0.2")
+    omninav("variant=wander", *SMALL_CAMERA, *words, check=True)
     navigate("goal=runs/latest/image.png", "nodes.source.seconds=3", check=True)
     found = metrics_of(tmp_path)["navigation"]
     assert found["state"] == "under way"

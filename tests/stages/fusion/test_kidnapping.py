@@ -56,7 +56,7 @@ BUILD, BUILT = BuildReferenceIndex(), Context("reference_index")
 BUILD.setup(BUILT)
 INDEX = BUILD.step(BUILT, MAP, BuildReferenceIndexState()).index
 DRIVE = [np.array([4.0 + 0.3 * k, 5.25, 0.0]) for k in range(30)]
-ELSEWHERE = [np.array([24.15, 25.0 - 0.3 * k, -np.pi / 2]) for k in range(34)]
+ELSEWHERE = [np.array([24.15, 25.0 - 0.3 * k, -np.pi / 2]) for k in range(24)]
 
 
 class Filtered(NamedTuple):
@@ -142,9 +142,10 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
     assert np.std(ratio) < 0.7
 
 
-@pytest.mark.parametrize(("candidates", "seed"), [(some, 0), (some, 1), (whole, 1)])
-def test_a_robot_that_is_put_elsewhere_is_found_within_some_tens_of_pictures(candidates, seed: int) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("candidates", [some, whole])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_robot_that_is_put_elsewhere_is_found_within_ten_pictures(candidates, seed: int) -> None:  # type: ignore[no-untyped-def]
     errors = drive(DRIVE[:15] + ELSEWHERE, candidates(), seed).errors
     assert errors[10:15].max() < 0.5
     assert errors[15] > 10
-    assert errors[15 + 30 :].max() < 0.5
+    assert errors[15 + 10 :].max() < 0.5

@@ -99,6 +99,8 @@ def test_without_places_a_room_is_the_image_that_the_simulated_robot_takes_there
     assert found.image is not None
     assert found.image.pixels.shape == (12, 16, 3)
     assert stage.inputs_digest() is not None
+    with pytest.raises(BadInput, match=r"no goal is named; type goal=ROOM, or goal=IMAGE\.png"):
+        GoalImage(goal=None, world=ROOMS, places=False).inputs_digest()
     with pytest.raises(BadInput, match=r"no place .3.; type goal=kitchen, or goal=IMAGE\.png"):
         GoalImage(goal="3", world=ROOMS, places=False).inputs_digest()
     with pytest.raises(BadInput, match="goal: kitchen is no image, and the map has no places"):
