@@ -26,7 +26,7 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
     kills = 0
     while process.poll() is None and kills < 2:
         if kills:  # the first one is killed at once: a fast machine is soon done
-            time.sleep(moments.uniform(0.0, 0.5 if cached else 2.0))
+            time.sleep(moments.uniform(0.0, 0.5 if cached else 1.0))
         if process.poll() is None:
             kill(process)
             kills += 1
