@@ -83,7 +83,8 @@ class GoalImage(Stage):
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():
-            place = "goal=PLACE, its name or number, or " if self.places else "goal=ROOM, or " if self._has_rooms() else ""
+            room = "goal=ROOM, or " if self._has_rooms() else ""
+            place = "goal=PLACE, its name or number, or " if self.places else room
             raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png")
         if not str(self.goal).lower().endswith(SUFFIXES):
             if not self.places and not self._has_rooms():
