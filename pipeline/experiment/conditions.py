@@ -194,10 +194,17 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
 
 
 def results_by_condition(runs: Sequence[ConditionRun], development: bool = False) -> Results:
-    """Returns the runs by condition, scenario and seed: of the scenarios that count, or of those of development."""
+    """Returns the runs by condition, scenario and seed: of the scenarios that count, or of those of development.
+
+    A repetition of a condition that failed has a result without figures.
+    """
     found: dict[tuple[tuple[str, str], ...], dict[tuple[str, int], dict[str, Any]]] = {}
     for run in runs:
         if run.development is development:
             of_condition = found.setdefault(key_of(run.condition.labels), {})
             of_condition |= {(run.scenario, seed): result for seed, result in run.results.items()}
+            if run.error:
+                of_condition |= {
+                    (run.scenario, seed): {"metrics": {}, "timing": {}, "facts": {}} for seed in run.missing
+                }
     return found

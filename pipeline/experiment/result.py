@@ -159,7 +159,7 @@ def _lines(experiment: Experiment, results: Results, curve: Curve) -> Iterator[L
         for condition in conditions:
             if curve.panels and condition.labels[curve.panels] != panel:
                 continue
-            runs = list(results.get(key_of(condition.labels), {}).values())
+            runs = [run for run in results.get(key_of(condition.labels), {}).values() if run["metrics"]]
             for label, path in curve.reference.items():
                 x, y = series_of(runs, path, curve.x_path)
                 if len(x) and label not in common:
