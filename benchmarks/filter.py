@@ -3,7 +3,7 @@
 import numpy as np
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState
+from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
@@ -50,7 +50,7 @@ def _step() -> list[Row]:
         predicted = motion.step(ctx, start, moved, MeasuredNoise()).belief
         weighted = sensor.step(ctx, field, predicted, whole, moved, length_scale)
         proposed = proposals.step(ctx, weighted.field, whole, length_scale).proposals
-        fusion.step(ctx, ImportanceResamplingState(), predicted, weighted.likelihood, proposed)
+        fusion.step(ctx, predicted, weighted.likelihood, proposed)
 
     functions = {"ours": ours}
     peer = _library()

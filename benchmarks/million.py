@@ -28,7 +28,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.stages.candidates.index import IndexedCandidates, search_in
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState
+from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.measured_noise import MeasuredNoise
@@ -70,11 +70,7 @@ class Filter:
         self.prior, self.motion = ParticlePrior(at=start), RotationTranslationRotation()
         self.candidates = IndexedCandidates()
         self.match, self.sensor = SelectiveMatch(), NearReferences()
-        self.proposals, self.fusion, self.fusion_state = (
-            SimilarityProposals(),
-            ImportanceResampling(),
-            ImportanceResamplingState(),
-        )
+        self.proposals, self.fusion = SimilarityProposals(), ImportanceResampling()
         stages = (self.prior, self.motion, self.candidates, self.match, self.sensor, self.proposals, self.fusion)
         self.ctx = {stage: Context(str(n), np.random.default_rng(n)) for n, stage in enumerate(stages)}
         for stage, ctx in self.ctx.items():
@@ -104,9 +100,7 @@ class Filter:
         alike = self.match.step(self._at(self.match, number), view, self.map, chosen).similarities
         out = self.sensor.step(self._at(self.sensor, number), alike, belief, self.map, moved, self.scale)
         proposed = self.proposals.step(self._at(self.proposals, number), out.field, self.map, self.scale).proposals
-        self.belief = self.fusion.step(
-            self._at(self.fusion, number), self.fusion_state, belief, out.likelihood, proposed
-        ).belief
+        self.belief = self.fusion.step(self._at(self.fusion, number), belief, out.likelihood, proposed).belief
         self.compared = len(alike.values)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
@@ -35,29 +35,16 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
     return math.ceil((cells - 1) / (2.0 * error) * (1.0 - part + math.sqrt(part) * float(ndtri(confidence))) ** 3)
 
 
-class ImportanceResamplingState(State):
-    """Remembers `carried`: the weight, against a belief of 1, of a robot that was carried off at some image so far."""
-
-    carried: float = 0.0
-
-
 class ImportanceResampling(Stage):
     """Multiplies particle weights by the likelihood; resamples systematically where the effective size is small.
 
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking).
 
-    Recovery from kidnapping: `proposals`, poses that the view itself suggests, get the weight that a uniform belief
-    would have. The robot may have been carried at this image or at any before since there are recovery particles, so
-    the uniform belief's weight u, after an image of novelty v and mean likelihood m in which all weights sum to Z, is
-
-        u <- (u m^v + kidnapping_probability v m) / Z.
-
-    The first image after a carry counts whole, as none before was taken there. Those since count m^v each, as if they
-    repeated each other (the mean of their likelihoods is at most that), and against the belief as much as they do (Z).
-    Proposals join the recovery particles, which are resampled among themselves by how well they fit the view, so that
-    evidence for a hypothesis accumulates over images however small its weight. Once these outweigh their share they are
-    resampled with all others, and u begins anew. Weights are those of one mixture, but that a place is counted again by
-    each image that suggests it: n images that say nothing give it kidnapping_probability n^2 / 2 in place of n.
+    Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty x mean
+    likelihood, goes to the `proposals`, poses that the view itself suggests. They join the recovery particles, which
+    are resampled among themselves by how well they fit the view, so that evidence for a hypothesis accumulates over
+    images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
+    those of one mixture throughout; only the allocation of particles differs.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -76,33 +63,25 @@ class ImportanceResampling(Stage):
 
         belief: Particles
 
-    def step(
-        self,
-        ctx: Context,
-        last: ImportanceResamplingState,
-        particles: Particles,
-        likelihood: Likelihood,
-        proposals: Particles | None,
-    ) -> Out:
+    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
-        tracked = len(poses) - particles.recovery_particles
-        total, new, fresh = float(np.add.reduce(weighted)), 0.0, 0.0
+        total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
         moved = self.kidnapping_probability * likelihood.novelty
-        if proposals is not None and likelihood.mean_likelihood is not None and moved > 0.0:
-            before = last.carried if particles.recovery_particles else 0.0
-            fresh = moved * likelihood.mean_likelihood
-            new = before * likelihood.mean_likelihood**likelihood.novelty + fresh
+        if proposals is not None and likelihood.mean_likelihood is not None:
+            new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
             weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
+        tracked = len(poses) - particles.recovery_particles
         wanted = self._wanted(poses[:tracked])
         weights = weighted / total
         recovery = int(self.recovery_share * wanted) if new > 0.0 else 0
-        last.carried = new / total
-        if float(np.add.reduce(weights[tracked:])) * wanted > recovery:
-            tracked, last.carried = len(poses), fresh / total  # they weigh enough to be resampled with the others
+        if (
+            float(np.add.reduce(weights[tracked:])) * wanted > recovery
+        ):  # they weigh enough to be resampled with the others
+            tracked = len(poses)
         main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - recovery)
         if proposals is None or not recovery:
             return self.Out(belief=Particles(main[0], main[1] / np.add.reduce(main[1])))

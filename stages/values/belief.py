@@ -108,9 +108,9 @@ class PlaceBelief(Belief):
 class Likelihood(Value):
     """Likelihood of the present view for each particle, or each place. `values`: (N,), not negative, any scale.
 
-    `mean_likelihood`: the mean over all poses of the map of the whole image's likelihood, as if all of it were new, on
-    the scale of `values`: what a pose drawn uniformly would get. None where it is not known. `novelty`: the share of
-    the image's evidence that is new, in [0, 1]; below 1 where the robot has hardly moved since the previous image.
+    `mean_likelihood`: on the same scale, the mean over all poses of the map: what a pose drawn uniformly would get.
+    None where it is not known. `novelty`: the share of the image's evidence that is new, in [0, 1]; below 1 where the
+    robot has hardly moved since the previous image.
     """
 
     values: Annotated[Array, Shape("N"), Bounds(ge=0)]

@@ -3,7 +3,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState, kld_number
+from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
@@ -19,7 +19,7 @@ def fuse(
 ) -> Particles:
     ctx = Context("fusion", np.random.default_rng(seed))
     likelihood = Likelihood(values, more.get("anywhere"))  # type: ignore[arg-type]
-    return stage.step(ctx, ImportanceResamplingState(), particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
+    return stage.step(ctx, particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
 
 
 def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:
@@ -43,11 +43,7 @@ def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
 def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> None:
     ctx, particles = Context("fusion", np.random.default_rng(0)), belief()
-    out = (
-        ImportanceResampling(number=1000)
-        .step(ctx, ImportanceResamplingState(), particles, Likelihood(values), None)
-        .belief
-    )
+    out = ImportanceResampling(number=1000).step(ctx, particles, Likelihood(values), None).belief
     assert np.allclose(out.weights, particles.weights)
     assert ctx.counts["belief_without_support"] == 1
 
@@ -81,56 +77,20 @@ def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> 
 def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
     # Each picture speaks 10:1 against the belief, for the proposals of the first; later ones propose nothing of worth.
     # Bayes by hand, with a prior of 1e-6 for "put there at the first picture": odds 1e-6 x 10^n after n more pictures.
-    stage, last = ImportanceResampling(number=5000, kidnapping_probability=1e-6), ImportanceResamplingState()
-    ctx = Context("fusion", np.random.default_rng(0))
+    stage, ctx = (
+        ImportanceResampling(number=5000, kidnapping_probability=1e-6),
+        Context("fusion", np.random.default_rng(0)),
+    )
     there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
     elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
-    now = stage.step(ctx, last, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
+    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
     assert now.recovery_particles == 500
     for picture in range(1, 11):
         values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
-        now = stage.step(ctx, last, now, Likelihood(values, 1e-9), elsewhere).belief
+        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
         share, odds = now.weights[now.poses[:, 0] == 77.0].sum(), 1e-6 * 10.0**picture
         assert share == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
     assert (now.poses[:, 0] == 77.0).mean() > 0.4  # the particles have followed the weights
-
-
-def test_a_place_that_only_a_later_picture_suggests_has_the_evidence_since_the_kidnapping() -> None:
-    # Uniform beliefs by hand, of novelty 0.5, where anywhere is 4 and the belief 0.1: a half of 4 p over 0.1 after the
-    # first picture, 20 p; then twice that, for 4^0.5, and 2 p more, over 0.1: 420 p, and 8420 p.
-    stage, last = ImportanceResampling(number=5000, kidnapping_probability=1e-7), ImportanceResamplingState()
-    now, shares = belief(5000), []
-    for x in (-77.0, -77.0, 77.0):
-        likelihood = Likelihood(np.full(len(now.poses), 0.1), 4.0, 0.5)
-        proposals = Particles(np.full((50, 3), x), np.full(50, 0.02))
-        now = stage.step(Context("fusion"), last, now, likelihood, proposals).belief
-        shares.append(now.weights[now.poses[:, 0] == x].sum())
-    assert shares[2] == pytest.approx(8420e-7, rel=0.02)
-
-
-def test_a_place_counts_again_by_each_picture_that_suggests_it() -> None:
-    stage, last = ImportanceResampling(number=5000, kidnapping_probability=1e-7), ImportanceResamplingState()
-    ctx = Context("fusion", np.random.default_rng(0))
-    now, there = belief(5000), Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
-    for _ in range(100):
-        now = stage.step(ctx, last, now, Likelihood(np.ones(5000), 1.0), there).belief
-    assert now.weights[now.poses[:, 0] == 77.0].sum() == pytest.approx(1e-7 * 100 * 101 / 2, rel=0.2)
-
-
-def test_a_new_belief_has_no_evidence_of_a_kidnapping() -> None:
-    stage, last = ImportanceResampling(kidnapping_probability=1e-7), ImportanceResamplingState(carried=0.9)
-    there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
-    out = stage.step(Context("fusion"), last, belief(5000), Likelihood(np.ones(5000), 0.5, 0.05), there).belief
-    assert out.weights[out.poses[:, 0] == 77.0].sum() < 1e-6
-
-
-def test_a_picture_without_novelty_says_nothing() -> None:
-    stage, last = ImportanceResampling(number=500), ImportanceResamplingState(carried=0.5)
-    believed = Particles(np.zeros((500, 3)), np.full(500, 1 / 500), 50)
-    there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
-    out = stage.step(Context("fusion"), last, believed, Likelihood(np.ones(500), 1.0, 0.0), there).belief
-    assert np.isfinite(out.weights).all()
-    assert not (out.poses[:, 0] == 77.0).any()
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
@@ -138,8 +98,7 @@ def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
     ctx, stage = Context("fusion"), ImportanceResampling(kidnapping_probability=1e-3)
     shares = []
     for fresh in (1.0, 0.1):
-        likelihood = Likelihood(np.ones(5000), 1.0, fresh)
-        out = stage.step(ctx, ImportanceResamplingState(), particles, likelihood, proposals).belief
+        out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals).belief
         shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
     assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
 
@@ -173,8 +132,7 @@ def with_recovery(weight: float, kidnapping_probability: float, novelty: float =
     stage = ImportanceResampling(number=10, recovery_share=0.2, kidnapping_probability=kidnapping_probability)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]] * 2), np.array([0.5, 0.5]))
     likelihood = Likelihood(np.ones(10), 1.0, novelty)
-    believed = Particles(poses, weights, 2)
-    return stage.step(Context("fusion"), ImportanceResamplingState(), believed, likelihood, proposals).belief
+    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals).belief
 
 
 def test_of_a_mixture_the_uniform_part_has_the_weight_of_a_kidnapping() -> None:
@@ -207,8 +165,7 @@ def test_recovery_particles_that_weigh_just_their_share_stay_apart() -> None:
     stage = ImportanceResampling(number=8, recovery_share=0.25, kidnapping_probability=0.5)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]]), np.ones(1))
     believed = Particles(poses, np.full(8, 0.125), 4)
-    last, likelihood = ImportanceResamplingState(), Likelihood(np.ones(8), 1.0)
-    out = stage.step(Context("fusion"), last, believed, likelihood, proposals).belief
+    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals).belief
     assert out.poses[:6, 0].tolist() == [0.0] * 6
     assert 5.0 in out.poses[6:, 0]
 
