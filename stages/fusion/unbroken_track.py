@@ -21,8 +21,10 @@ from omninav.stages.values.track import Track
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-NEAR = (1.0, math.radians(30.0))
-"""Distance (m) and turn (rad) within which two poses are of one place."""
+NEAR = (0.3, math.radians(10.0))
+"""Distance (m) and turn (rad) within which two poses are of one place: shelves repeat themselves each 0.9 m."""
+FREQUENT = (1.0, math.radians(30.0))
+"""Way (m) and turn (rad) between two images of a robot that drove from one to the other, where both tell it."""
 SURE, LIKELY = 0.95, 0.5
 """Probability of a pose by landmarks from which on it confirms the belief, and from which on it counts against it."""
 BELIEVED, CONTRADICTED = 0.5, 0.02
@@ -137,7 +139,7 @@ class UnbrokenTrack(Stage):
         how = carried(before, now, moved) if len(before[0]) else Carried(math.inf, False)
         state.carried = max(state.carried, how.at_most)
         # a narrow view turns out of what it saw
-        surely = how.surely and driven < NEAR[0] and abs(float(moved[2])) < NEAR[1]
+        surely = how.surely and driven < FREQUENT[0] and abs(float(moved[2])) < FREQUENT[1]
         if math.isinf(state.carried):
             state.confirmed, state.carried = 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before

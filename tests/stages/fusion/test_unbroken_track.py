@@ -58,10 +58,11 @@ def driven(
     scale: float = 0.5,
     dark_at: int | None = None,
     step: float = 0.3,
+    twin: np.ndarray = TWIN,
 ) -> list:
-    """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show the twin
-    hall; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not measure; the
-    one of `dark_at` shows nothing."""
+    """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show a `twin`
+    so far away; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not
+    measure; the one of `dark_at` shows nothing."""
     poses = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0
@@ -75,7 +76,7 @@ def driven(
         motion = Motion(*between(believed[n - 1], believed[n]).tolist()) if n else None
         spread = np.random.default_rng(n).normal(0.0, 0.05, (100, 3))
         belief = Particles(np.concatenate([believed[n] + spread, TWIN[None]]), np.full(101, 1 / 101), 1)
-        fix = fix_at(believed[n] if n < twin_from else believed[n] + TWIN, probability)
+        fix = fix_at(believed[n] if n < twin_from else believed[n] + twin, probability)
         ctx = Context("track", np.random.default_rng(0), Tick(1, n))
         out.append(stage.step(ctx, state, belief, images[n], fix, motion, LengthScale(scale)))
     return out
@@ -86,6 +87,11 @@ def test_a_hall_that_looks_the_same_is_left_out_for_as_long_a_way_as_the_track_w
     assert [each.fix is not None for each in out] == [True] * 10 + [False] * 8 + [True] * 6  # 9 x 0.3 m before
     assert all(each.track.unbroken and not each.belief.recovery_particles for each in out[10:18])
     assert out[-1].belief.recovery_particles == 1
+
+
+def test_the_next_of_shelves_that_look_the_same_is_left_out():
+    out = driven(twin_from=10, twin=np.array([-0.9, 0.0, 0.0]))
+    assert all(each.fix is None and each.track.unbroken for each in out[10:16])
 
 
 def test_a_robot_that_was_carried_may_be_anywhere_at_once():
