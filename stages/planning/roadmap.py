@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.landmarks.unbroken_view import of_one_place
 from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
@@ -26,8 +27,9 @@ Ints = npt.NDArray[np.int64]
 
 MIN_PROBABILITY = 0.5
 """Least confidence in the estimate with which the robot drives, and probability of a pose that tells of an arrival."""
-MIN_GOAL_PROBABILITY = 0.9
-"""Least probability of the goal's pose: the robot drives there by this one image."""
+MIN_GOAL_PROBABILITY, SURE_GOAL_PROBABILITY = 0.2, 0.95
+"""Least probability of a pose of the goal's image that the robot drives to, and the one below which it compares images
+there: taken anywhere in an office, 19 of 100 images have a right pose with less (docs/experiments/landmarks.md)."""
 LOOKAHEAD_M = 0.8
 """Distance along the path of the point that the robot drives towards, metres."""
 LEG_M = 2.0
@@ -45,14 +47,17 @@ SEARCH_S = 120.0
 class RoadmapPlannerState(State):
     """The goal and the path there.
 
-    `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `metres`, `next` (R,): of the shortest
-    path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked` times, and
-    from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is; None: it
-    does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was planned.
-    `leg`: its number, and `left`: metres to go when it began, inf before it does.
+    `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `rivals` (K, 3): where else its image
+    may have been taken; `doubtful`: whether the look of the place has to bear it out. `metres`, `next` (R,): of the
+    shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked`
+    times, and from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
+    None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
+    planned. `leg`: its number, and `left`: metres to go when it began, inf before it does.
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
+    rivals: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    doubtful: bool = False
     metres: Array = field(default_factory=lambda: np.zeros(0))
     next: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     extra: Array = field(default_factory=lambda: np.zeros(0))
@@ -74,8 +79,10 @@ class RoadmapPlanner(Stage):
     The roadmap's points are the references, joined along the drive and wherever two are closer than the robot is wide,
     so that no wall is between them. The goal's pose is that of its image by landmarks. While the confidence in its own
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
-    landmarks tell. It has arrived where landmarks in its present image say so. Where a path is blocked, ways around are
-    preferred, and after too many it gives up. Raises BadInput for a goal that the map's landmarks cannot place.
+    landmarks tell. It has arrived where landmarks in its present image say so, and, where landmarks are not sure of the
+    goal, its image shows what the goal's does; else it goes on to the other place that they name. Where a path is
+    blocked, ways around are preferred, and after too many it gives up. Raises BadInput for a goal that the map's
+    landmarks cannot place.
     """
 
     goal: str | int | None = None
@@ -101,14 +108,18 @@ class RoadmapPlanner(Stage):
         fix: LandmarkFix | None = None,
         goal_fix: LandmarkFix | None = None,
         goal_features: LocalFeatures | None = None,
+        features: LocalFeatures | None = None,
         status: DrivingStatus | None = None,
         point: GoalPoint | None = None,
     ) -> Out:
         """Say where to drive; `status` is that of the tick before, `point` where a running robot is asked to go."""
         if point is not None:
             self._set_out(state, map, np.array([point.x, point.y, math.nan]))
+            state.rivals, state.doubtful = np.zeros((0, 3)), False
         elif not len(state.goal):
-            self._set_out(state, map, goal_pose(self.goal, goal_fix, goal_features, map))
+            poses, state.doubtful = goal_poses(self.goal, goal_fix, goal_features, map)
+            self._set_out(state, map, poses[0])
+            state.rivals = poses[1:]
         if state.ended:
             return _stopped(state)
         here, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
@@ -139,8 +150,8 @@ class RoadmapPlanner(Stage):
         known = state.left < math.inf
         turn = self._dock(state, here, fix)
         if state.docking and abs(turn) <= math.radians(MAX_HEADING_ERROR_DEG):
-            state.ended = "arrived"
-            return _stopped(state)
+            self._judge(state, map, goal_features, features, turn)
+            return _stopped(state) if state.ended else self.Out(route=_route(state, "under way"))
         vector = HomingVector(
             number=state.leg,
             direction=wrap_angle(math.atan2(y, x) - here[2]),
@@ -171,10 +182,33 @@ class RoadmapPlanner(Stage):
         known = Paths(state.metres, state.next)
         return path_from(here[:2], map.poses[:, :2], known, 2.0 * self.robot_radius_m, to_goal)
 
+    def _judge(
+        self,
+        state: RoadmapPlannerState,
+        map: ReferenceGraph,
+        goal: LocalFeatures | None,
+        features: LocalFeatures | None,
+        turn: float,
+    ) -> None:
+        """End at a goal that is not doubtful or looks as its image does; else set out for the next, or give up."""
+        if not state.doubtful or (goal is not None and features is not None and _look_alike(goal, features, turn)):
+            state.ended = "arrived"
+        elif len(state.rivals):
+            next_one, state.rivals = state.rivals[0], state.rivals[1:]
+            self._set_out(state, map, next_one)
+        else:
+            state.ended = "gave up"
+            state.why = (
+                f"where landmarks put {self.goal} it looks different; give an image from closer to the map's way"
+            )
+
     def _dock(self, state: RoadmapPlannerState, here: Array, fix: LandmarkFix | None) -> float:
-        """The turn to the goal's heading (rad); docking begins, and ends, by landmarks alone."""
-        if fix is not None and fix.probabilities[0] >= MIN_PROBABILITY:
+        """The turn to the goal's heading (rad); docking begins, and ends, by landmarks alone, but for a doubtful goal,
+        where few are seen."""
+        told = fix is not None and fix.probabilities[0] >= MIN_PROBABILITY
+        if fix is not None and told:
             here = fix.poses[0]
+        if told or state.doubtful:
             allowed = ARRIVAL_M * (2.0 if state.docking else 1.0)
             state.docking = math.dist(here[:2], state.goal[:2]) <= allowed
         return 0.0 if math.isnan(state.goal[2]) else wrap_angle(state.goal[2] - here[2])
@@ -198,15 +232,21 @@ def _stopped(state: RoadmapPlannerState) -> RoadmapPlanner.Out:
     return RoadmapPlanner.Out(progress=there, route=_route(state, "arrived"))
 
 
-def goal_pose(
+def _look_alike(goal: LocalFeatures, features: LocalFeatures, turn: float) -> bool:
+    """Tells whether an image was taken where the goal's was, but for a turn (rad)."""
+    before, now = (goal.bearings, goal.descriptors), (features.bearings, features.descriptors)
+    return of_one_place(before, now, -turn)
+
+
+def goal_poses(
     goal: str | int | None, fix: LandmarkFix | None, features: LocalFeatures | None, map: ReferenceGraph
-) -> Array:
-    """The pose (3,) from which the goal's image was taken. Raises BadInput where landmarks do not tell it."""
+) -> tuple[Array, bool]:
+    """The poses (K, 3) from which the goal's image may have been taken, the likeliest first; and whether it is doubtful
+    that the first is right. Raises BadInput where landmarks tell none."""
     if map.landmarks is None:
         raise BadInput("goal: the map was saved without landmarks; learn it again from its tour with landmarks=sift")
     if fix is not None and fix.probabilities[0] >= MIN_GOAL_PROBABILITY:
-        pose: Array = fix.poses[0]
-        return pose
+        return fix.poses, bool(fix.probabilities[0] < SURE_GOAL_PROBABILITY)
     seen = 0 if features is None else len(features)
     agree = "too few landmarks agree on where it was taken"
     if fix is not None:

@@ -1,6 +1,7 @@
 """Driving to an image's place in a room of landmarks."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.planning.roadmap import MAX_BLOCKED, RoadmapPlanner, RoadmapPlannerState, goal_pose
+from omninav.stages.planning.roadmap import MAX_BLOCKED, RoadmapPlanner, RoadmapPlannerState, goal_poses
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GoalPoint
@@ -59,6 +60,7 @@ class Drive:
             fix,
             self.goal,
             self.features,
+            seen_from(room(), self.pose),
             status or self.status,
             point,
         )
@@ -87,6 +89,37 @@ def test_only_landmarks_tell_that_it_has_arrived() -> None:
     drive = Drive(start=GOAL)
     assert not drive.step().progress.docking
     assert drive.step(fix=fix_at(GOAL)).route.state == "arrived"
+
+
+def doubtful(drive: Drive, *poses) -> None:
+    """Few landmarks agreed on the places where the goal's image may have been taken."""
+    drive.goal = replace(
+        drive.goal,
+        poses=np.array(poses),
+        covariances=np.repeat(drive.goal.covariances[:1], len(poses), axis=0),
+        inliers=np.full(len(poses), 12),
+        probabilities=np.array([0.5, 0.3])[: len(poses)],
+        agree=None,
+    )
+
+
+def test_a_doubtful_goal_is_borne_out_by_its_look_else_the_robot_goes_to_the_rival() -> None:
+    wrong = (7.0, 3.2, -1.0)
+    drive = Drive(start=wrong)
+    doubtful(drive, wrong, GOAL)
+    out = drive.step()
+    assert (out.vector, out.route.state, out.route.goal.x) == (None, "under way", GOAL[0])
+    while out.route.state != "arrived" and drive.tick < 100:
+        out = drive.step()  # at a doubtful goal its own estimate tells too
+    assert math.dist(drive.pose[:2], GOAL[:2]) < 0.03
+    assert out.route.state == "arrived"
+
+
+def test_where_no_place_looks_like_a_doubtful_goal_the_robot_says_so() -> None:
+    drive = Drive(start=(7.0, 3.2, -1.0))
+    doubtful(drive, (7.0, 3.2, -1.0))
+    route = drive.step().route
+    assert (route.state, route.why[:47]) == ("gave up", "where landmarks put shelf.png it looks differen")
 
 
 def test_a_robot_that_does_not_know_where_it_is_has_no_route() -> None:
@@ -140,4 +173,4 @@ def test_an_image_of_elsewhere_is_refused_with_what_was_seen() -> None:
     with pytest.raises(BadInput, match=rf"where shelf.png was taken: it shows {len(elsewhere)} features, and .* agree"):
         drive.step()
     with pytest.raises(BadInput, match="without landmarks; learn it again"):
-        goal_pose("shelf.png", None, None, graph_of(tour_poses()))
+        goal_poses("shelf.png", None, None, graph_of(tour_poses()))
