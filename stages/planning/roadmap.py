@@ -52,7 +52,8 @@ class RoadmapPlannerState(State):
     shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked`
     times, and from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
     None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
-    planned. `leg`: its number, and `left`: metres to go when it began, inf before it does.
+    planned. `leg`: its number, and `left`: metres to go when it began, inf before it does. `arrival`: metres from the
+    goal at which it docks.
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
@@ -69,6 +70,7 @@ class RoadmapPlannerState(State):
     leg: int = 0
     left: float = math.inf
     docking: bool = False
+    arrival: float = ARRIVAL_M
     ended: Literal["", "arrived", "gave up"] = ""
     why: str = ""
 
@@ -81,7 +83,8 @@ class RoadmapPlanner(Stage):
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
     landmarks tell. It has arrived where landmarks in its present image say so, and, where landmarks are not sure of the
     goal, its image shows what the goal's does; else it goes on to the other place that they name. Where a path is
-    blocked, ways around are preferred, and after too many it gives up. Raises BadInput for a goal that the map's
+    blocked, ways around are preferred, and after too many it gives up; closer to the goal than it is wide, it ends
+    there. Raises BadInput for a goal that the map's
     landmarks cannot place.
     """
 
@@ -129,7 +132,11 @@ class RoadmapPlanner(Stage):
             return _stopped(state)
         places = self._path(state, map, here)
         new = sure and math.isinf(state.left)
-        if places is not None and status is not None and status.state == "blocked" and tick.stamp >= state.retry:
+        away = math.dist(here[:2], state.goal[:2])
+        blocked = status is not None and status.state == "blocked" and tick.stamp >= state.retry
+        if blocked and state.arrival < away <= self.robot_radius_m:
+            state.arrival = away  # as close as what stands there today allows
+        elif blocked and status is not None and places is not None:
             ctx.count("blocked_path")
             ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
             state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
@@ -170,7 +177,7 @@ class RoadmapPlanner(Stage):
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra, state.places = goal, np.zeros(len(map)), np.zeros(0, np.int64)
         state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
-        state.lost_since = None
+        state.lost_since, state.arrival = None, ARRIVAL_M
         self._plan(state, map)
 
     def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:
@@ -209,7 +216,7 @@ class RoadmapPlanner(Stage):
         if fix is not None and told:
             here = fix.poses[0]
         if told or state.doubtful:
-            allowed = ARRIVAL_M * (2.0 if state.docking else 1.0)
+            allowed = state.arrival * (2.0 if state.docking else 1.0)
             state.docking = math.dist(here[:2], state.goal[:2]) <= allowed
         return 0.0 if math.isnan(state.goal[2]) else wrap_angle(state.goal[2] - here[2])
 

@@ -157,6 +157,13 @@ def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_u
     assert drive.status.state == "waiting"
 
 
+def test_where_something_stands_at_the_goal_the_robot_ends_before_it() -> None:
+    before = (GOAL[0] - 0.2, GOAL[1], GOAL[2])
+    drive = Drive(start=before)
+    assert drive.step(fix=fix_at(before)).route.state == "under way"
+    assert drive.step(fix=fix_at(before), status=DrivingStatus("blocked", "a chair")).route.state == "arrived"
+
+
 def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
     drive = Drive(start=GOAL)
     drive.step(fix=fix_at(GOAL))
