@@ -21,10 +21,11 @@ from omninav.stages.values.track import Track
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-NEAR = (0.3, math.radians(10.0))
-"""Distance (m) and turn (rad) within which two poses are of one place: shelves repeat themselves each 0.9 m."""
+NEAR = (0.3, math.radians(30.0))
+"""Distance (m) and turn (rad) within which two poses are of one place: the next of shelves that look the same is 0.9 m
+on. Some way after the last pose that confirmed the track, odometry may be off by as much (`DRIFT`)."""
 FREQUENT = (1.0, math.radians(30.0))
-"""Way (m) and turn (rad) between two images of a robot that drove from one to the other, where both tell it."""
+"""Way (m) and turn (rad) between two images, below which different surroundings tell that the robot was carried."""
 SURE, LIKELY = 0.95, 0.5
 """Probability of a pose by landmarks from which on it confirms the belief, and from which on it counts against it."""
 BELIEVED, CONTRADICTED = 0.5, 0.02

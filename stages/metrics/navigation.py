@@ -127,12 +127,12 @@ def lost_metres(drive: Drive) -> float | None:
 
 def first_of_last_goal(routes: Sequence[PlannedRoute | None]) -> int:
     """The tick from which on all routes lead to the goal of the last one: 0, where there was no other."""
-    last: Any = None
+    last: int | None = None
     for k in range(len(routes) - 1, -1, -1):
         route = routes[k]
         if route is None or (route.goal is None and not len(route.places)):
             continue
-        goal = int(route.places[-1]) if route.goal is None else (route.goal.x, route.goal.y)
+        goal = int(route.places[-1]) if route.goal is None else route.asked
         if last is not None and goal != last:
             return k + 1
         last = goal

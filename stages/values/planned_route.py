@@ -16,7 +16,7 @@ class PlannedRoute(Value):
 
     On a map of references these are references, and the goal is a point beside them, `goal`. `state`: `locating`, it is
     not yet known where the robot is; `under way`; `arrived`; `gave up`; and `why`, where one would ask. `number`:
-    another way has another, from 0; -1 before the first.
+    another way has another, from 0; -1 before the first. `asked`: how many goals the robot was sent to before.
     """
 
     places: Annotated[npt.NDArray[np.int64], Shape("K"), Bounds(ge=0)]
@@ -24,3 +24,4 @@ class PlannedRoute(Value):
     number: Annotated[int, Bounds(ge=-1)]
     why: str = ""
     goal: GoalPoint | None = None
+    asked: Annotated[int, Bounds(ge=0)] = 0

@@ -1,4 +1,4 @@
-"""Tells how far a robot may have been carried between two images."""
+"""Tells how far a robot may have been carried between two images, and whether these are of one place."""
 
 import math
 from typing import NamedTuple
@@ -20,7 +20,7 @@ RATIO = 0.8
 TOLERANCE = math.radians(1.0)
 """Angle of a bearing to the plane of the motion and the other bearing, above which a match does not fit (rad)."""
 TURNS = np.radians(np.arange(-6.0, 7.0))
-"""Errors of odometry's turn that are tried (rad)."""
+"""Errors of a turn that are tried (rad)."""
 STANDING_M = 0.02
 """Way below which only the turn counts (m)."""
 SAME_PLACE_TOLERANCE = math.radians(2.0)
@@ -66,7 +66,7 @@ def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array
 
 
 def of_one_place(one: tuple[Array, Bytes], other: tuple[Array, Bytes], turn: float) -> bool:
-    """Tells whether two images were taken within some 10 cm of each other, the other one turned by `turn` (rad)."""
+    """Tells whether two images were taken within a decimetre or two, the other one turned by `turn` (rad)."""
     pairs = mutual_nearest_units(root_descriptors(one[1]), root_descriptors(other[1]), RATIO)
     first, second = np.ascontiguousarray(one[0][pairs.first]), np.ascontiguousarray(other[0][pairs.second])
     return _fit(first, second, np.array([0.0, 0.0, turn]), SAME_PLACE_TOLERANCE)

@@ -11,7 +11,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.planning.roadmap import MAX_BLOCKED, RoadmapPlanner, RoadmapPlannerState, goal_poses
+from omninav.stages.planning.roadmap import MAX_BLOCKED, UNLIKE_IMAGES, RoadmapPlanner, RoadmapPlannerState, goal_poses
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GoalPoint
@@ -46,7 +46,7 @@ class Drive:
         self.features = seen_from(room(), np.array(GOAL)) if goal_features is None else goal_features
         self.goal = fix_of(self.features)
 
-    def step(self, confidence=1.0, fix=None, point=None, status=None) -> RoadmapPlanner.Out:
+    def step(self, confidence=1.0, fix=None, point=None, status=None, sees=True) -> RoadmapPlanner.Out:
         tick, ctx = Tick(self.tick, 10**15 + self.tick * 200_000_000), Context("planning")
         self.tick += 1
         pose = Pose(*self.pose.tolist())
@@ -60,7 +60,7 @@ class Drive:
             fix,
             self.goal,
             self.features,
-            seen_from(room(), self.pose),
+            seen_from(room(), self.pose) if sees else None,
             status or self.status,
             point,
         )
@@ -91,35 +91,53 @@ def test_only_landmarks_tell_that_it_has_arrived() -> None:
     assert drive.step(fix=fix_at(GOAL)).route.state == "arrived"
 
 
-def doubtful(drive: Drive, *poses) -> None:
-    """Few landmarks agreed on the places where the goal's image may have been taken."""
+WRONG = (7.0, 3.2, -1.0)
+
+
+def doubtful(drive: Drive, *poses, probabilities=(0.5, 0.3)) -> None:
+    """Makes the goal one on whose place few landmarks agree."""
     drive.goal = replace(
         drive.goal,
         poses=np.array(poses),
         covariances=np.repeat(drive.goal.covariances[:1], len(poses), axis=0),
         inliers=np.full(len(poses), 12),
-        probabilities=np.array([0.5, 0.3])[: len(poses)],
+        probabilities=np.array(probabilities)[: len(poses)],
         agree=None,
     )
 
 
+def looked(drive: Drive, **how) -> RoadmapPlanner.Out:
+    """Stands where it is for as many images as it takes to judge a place."""
+    return [drive.step(**how) for _ in range(UNLIKE_IMAGES)][-1]
+
+
 def test_a_doubtful_goal_is_borne_out_by_its_look_else_the_robot_goes_to_the_rival() -> None:
-    wrong = (7.0, 3.2, -1.0)
-    drive = Drive(start=wrong)
-    doubtful(drive, wrong, GOAL)
-    out = drive.step()
+    drive = Drive(start=WRONG)
+    doubtful(drive, WRONG, GOAL)
+    assert looked(drive, sees=False).route.goal.x == WRONG[0]  # no image says nothing
+    out = looked(drive)
     assert (out.vector, out.route.state, out.route.goal.x) == (None, "under way", GOAL[0])
     while out.route.state != "arrived" and drive.tick < 100:
         out = drive.step()  # at a doubtful goal its own estimate tells too
     assert math.dist(drive.pose[:2], GOAL[:2]) < 0.03
-    assert out.route.state == "arrived"
+    assert (out.route.state, out.route.asked) == ("arrived", 0)
 
 
-def test_where_no_place_looks_like_a_doubtful_goal_the_robot_says_so() -> None:
-    drive = Drive(start=(7.0, 3.2, -1.0))
-    doubtful(drive, (7.0, 3.2, -1.0))
-    route = drive.step().route
-    assert (route.state, route.why[:47]) == ("gave up", "where landmarks put shelf.png it looks differen")
+@pytest.mark.parametrize(("poses", "probabilities"), [([WRONG], [0.3]), ([WRONG, GOAL], [0.9, 0.05])])
+def test_where_no_likely_place_looks_like_a_doubtful_goal_the_robot_says_so(poses, probabilities) -> None:
+    drive = Drive(start=WRONG)
+    doubtful(drive, *poses, probabilities=probabilities)
+    route = looked(drive).route
+    assert route.state == "gave up"
+    assert "where landmarks put shelf.png it looks different" in route.why
+
+
+def test_a_robot_that_is_not_sure_where_it_is_judges_no_place() -> None:
+    drive = Drive(start=WRONG)
+    doubtful(drive, WRONG)
+    assert looked(drive, confidence=0.3).route.state == "locating"
+    drive.step(point=GoalPoint(7.0, 3.2))
+    assert drive.step(fix=fix_at(WRONG)).route.state == "arrived"  # of a point there is no image
 
 
 def test_a_robot_that_does_not_know_where_it_is_has_no_route() -> None:
@@ -157,11 +175,28 @@ def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_u
     assert drive.status.state == "waiting"
 
 
-def test_where_something_stands_at_the_goal_the_robot_ends_before_it() -> None:
-    before = (GOAL[0] - 0.2, GOAL[1], GOAL[2])
+BLOCKED = DrivingStatus("blocked", "a chair")
+
+
+def test_where_something_stands_at_the_goal_the_robot_turns_and_ends_before_it() -> None:
+    before = np.array((GOAL[0] - 0.2, GOAL[1], GOAL[2] + 1.0))
     drive = Drive(start=before)
-    assert drive.step(fix=fix_at(before)).route.state == "under way"
-    assert drive.step(fix=fix_at(before), status=DrivingStatus("blocked", "a chair")).route.state == "arrived"
+    for _ in range(3):
+        out = drive.step(fix=fix_at(before))
+        assert (out.route.state, out.progress.docking) == ("under way", False)
+        drive.pose = before
+    assert drive.step(fix=fix_at(before), status=BLOCKED).progress.docking
+    while out.route.state != "arrived" and drive.tick < 100:
+        out = drive.step(fix=fix_at(drive.pose))
+    assert math.dist(drive.pose[:2], GOAL[:2]) == pytest.approx(0.2, abs=0.01)
+    assert abs(drive.pose[2] - GOAL[2]) < math.radians(3.0)
+    assert out.route.number == 0
+
+
+def test_farther_from_the_goal_a_blocked_robot_looks_for_a_way_around() -> None:
+    drive = Drive(start=(GOAL[0] - 0.4, GOAL[1], GOAL[2]))
+    drive.step()
+    assert drive.step(fix=fix_at(drive.pose), status=BLOCKED).route.number == 1
 
 
 def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
