@@ -143,14 +143,14 @@ class RoadmapPlanner(Stage):
         if not standing and not state.docking:
             state.arrival = ARRIVAL_M
         blocked = standing and tick.stamp >= state.retry
+        if blocked and status is not None:
+            state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
         if blocked and known and away <= self.robot_radius_m:  # what stands there today lets it no closer
-            state.arrival, state.retry = away + ARRIVAL_M, tick.stamp + int(RETRY_S * 1e9)
-            state.blocked += 1
-        elif blocked and status is not None and places is not None:
+            state.arrival = away + ARRIVAL_M
+        elif blocked and places is not None:
             ctx.count("blocked_path")
             ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
             state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
-            state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
             self._plan(state, map)
             places, new = self._path(state, map, here), True
         if places is None or state.blocked > MAX_BLOCKED:
