@@ -15,7 +15,7 @@ from omninav.pipeline.experiment.pages import Judged
 from omninav.pipeline.experiment.result import ExperimentResult, read_result, result_files
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
 from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
-from omninav.pipeline.experiment.verdicts import Verdict, in_words
+from omninav.pipeline.experiment.verdicts import Verdict
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, counted
 
 from .composition import complete, read_words
@@ -60,12 +60,10 @@ def verdict_table(experiment: Experiment, verdicts: Mapping[str, Verdict]) -> "T
 
     table = TerminalTable.grid(padding=(0, 3, 0, 0))
     for key, verdict in verdicts.items():
-        word = in_words(verdict.holds)
         holding = sum(case.holds is True for case in verdict.cases)
         cases = f" ({holding} of {len(verdict.cases)} cases hold)" if 0 < holding < len(verdict.cases) else ""
-        table.add_row(
-            Text(word, "bold red" if verdict.holds is False else ""), Text(f"{experiment.claims[key].statement}{cases}")
-        )
+        word = Text(verdict.words, "bold red" if verdict.holds is False else "")
+        table.add_row(word, Text(f"{experiment.claims[key].statement}{cases}"))
     return table
 
 

@@ -163,6 +163,7 @@ def _verdict(experiment: Experiment, claim: Claim, verdict: Verdict) -> dict[str
         + (f" Struck: {claim.struck}." if claim.struck else ""),
         "measure": measure.title,
         "holds": in_words(verdict.holds),
+        "words": verdict.words,
         "rows": [_case(case, measure) for case in verdict.cases],
     }
 
@@ -185,6 +186,7 @@ def _case(case: Case, measure: Measure) -> dict[str, str]:
         "difference": difference,
         "interval": interval,
         "holds": in_words(case.holds),
+        "words": Verdict((case,)).words,
     }
 
 

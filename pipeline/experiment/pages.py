@@ -7,7 +7,7 @@ from .intervals import CONFIDENCE
 from .page import markdown_page, number
 from .result import ExperimentResult
 from .specification import Claim, Experiment
-from .verdicts import Verdict, headline, in_words
+from .verdicts import Verdict, headline
 
 INDEX, CLAIMS = "results.md", "claims.md"
 """Files with the index and with the papers' claims."""
@@ -60,7 +60,7 @@ def claims_page(judged: Judged) -> str:
                 claim.paper,
                 claim.where,
                 f"[{experiment.title}]({experiment.name}.md): {claim.statement}",
-                in_words(verdict.holds),
+                verdict.words,
                 _ours(experiment, claim, verdict),
             )
             for experiment, claim, verdict in claims_of(judged, source)

@@ -64,6 +64,13 @@ class Verdict:
             return False
         return None if None in found or not found else True
 
+    @property
+    def words(self) -> str:
+        """The verdict, with how many runs keep to the limit where it holds without all of them."""
+        counted = [case for case in self.cases if case.kept is not None]
+        kept, ran = sum(case.kept or 0 for case in counted), sum(case.repetitions for case in counted)
+        return in_words(self.holds) + (f" in {kept} of {ran} runs" if self.holds and kept < ran else "")
+
 
 def in_words(holds: bool | None) -> str:
     """Verdict on a claim or a case in words."""

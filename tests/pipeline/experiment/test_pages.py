@@ -12,7 +12,7 @@ from omninav.pipeline.experiment.page import markdown_page
 from omninav.pipeline.experiment.pages import Judged, by_chance, claims_of, claims_page, counts, index_page, sources
 from omninav.pipeline.experiment.result import ExperimentResult, result_text
 from omninav.pipeline.experiment.specification import read_experiment
-from omninav.pipeline.experiment.verdicts import Case, in_words
+from omninav.pipeline.experiment.verdicts import Case, Verdict
 from omninav.pipeline.graph.problems import BadInput
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "experiments"
@@ -123,11 +123,11 @@ def test_a_page_says_what_its_result_file_does(committed: Judged, monkeypatch: p
     monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
     for experiment, result in committed:
         page = str(markdown_page(experiment, result)[f"{experiment.name}.md"])
-        said = re.findall(r"\| (holds|does not hold|undecided) \|\n", page)
-        assert said == [in_words(each.holds) for key in experiment.claims for each in result.verdicts[key]]
+        said = re.findall(r"\| (holds(?: in \d+ of \d+ runs)?|does not hold|undecided) \|\n", page)
+        assert said == [Verdict((each,)).words for key in experiment.claims for each in result.verdicts[key]]
         for key, verdict in result.judged(experiment).items():
             assert f"\n| {experiment.claims[key].statement} (" in page
-            assert f"): **{in_words(verdict.holds)}** |" in page
+            assert f"): **{verdict.words}** |" in page
 
 
 def test_the_five_papers_have_claims_and_a_page_each(committed: Judged) -> None:

@@ -161,6 +161,13 @@ def test_a_claim_about_the_worst_run_counts_those_that_keep_to_the_limit(
     assert (case.ours, case.kept, case.holds, case.interval) == (12.0, kept, holds, None)
 
 
+def test_a_verdict_that_holds_without_all_runs_says_in_how_many():
+    verdict = judged({"at_most": 59.0}, over_runs="largest", seeds=10, a=[float(n) for n in range(1, 61)])
+    assert (verdict.holds, verdict.words) == (True, "holds in 59 of 60 runs")
+    assert judged({"at_most": 60.0}, over_runs="largest", seeds=10, a=[1.0] * 60).words == "holds"
+    assert judged({"at_most": 5.0}, over_runs="largest", a=[float(n) for n in range(1, 13)]).words == "does not hold"
+
+
 def test_a_run_without_a_figure_does_not_keep_to_the_limit():
     (case,) = judged({"at_least": 1.0}, over_runs="smallest", a=[*([3.0] * 11), np.nan]).cases
     assert (case.kept, case.judged, case.repetitions, case.holds) == (11, 11, 12, None)
