@@ -19,7 +19,7 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, PATCH_RADIUS_PX, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
-from omninav.stages.homing.local_mapping import MIN_VERIFIED_INLIERS, LocalMapping, LocalMappingState
+from omninav.stages.homing.local_mapping import MIN_VERIFIED_INLIERS, LocalMapping, LocalMappingState, Matches
 from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
@@ -267,6 +267,21 @@ def test_an_arrival_four_decimetres_away_is_not_believed(pose: tuple[float, floa
     homing.map = homing.mapped.map = replace(homing.map, goal_translation=homing.map.translation + 0.001)
     homing.at(pose)
     assert (homing.ctx.counts["false_map"] == 0) == believed
+
+
+@pytest.mark.parametrize(("share", "nearness", "believed"), [(65, 0.01, False), (75, 0.01, True), (65, 0.04, True)])
+def test_at_the_target_seven_of_ten_matches_must_have_its_bearings(share: int, nearness: float, believed: bool) -> None:
+    homing, rng = Homing(verify=True), np.random.default_rng(0)
+    while homing.at((4.97, 4.98, -0.5)).state != "tracking":
+        pass
+    ahead = np.array([nearness * homing.map.depth(), 0.0, 0.0])
+    near = replace(homing.map, goal_translation=homing.map.translation + ahead)
+    seen_there = rng.normal(size=(100, 3))
+    seen_there /= np.linalg.norm(seen_there, axis=1)[:, None]
+    seen_here = seen_there @ (near.rotation.T @ near.goal_rotation).T
+    seen_here[share:] *= -1.0
+    matches = Matches(seen_here, np.zeros((100, 2)), seen_there, np.arange(100))
+    assert homing.mapping._contradicted(near, matches) is not believed
 
 
 def covered(pose) -> Image:
