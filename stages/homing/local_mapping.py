@@ -38,8 +38,8 @@ MAX_OUTLIER_DEG = 3.0
 half of the features are closer than a typical one."""
 SAME_SHARE, SAME_SHARE_AT_TARGET, AT_TARGET = 0.5, 0.7, 0.03
 """Share of the matches that must have the target's bearings; and the share from this distance on, over the features'
-typical distance, at which the robot may stop: in 29 development drives 98 % of the images there have 0.77 and more, and
-those of five drives that stopped elsewhere 0.5 to 0.68 (docs/experiments/atlas.md)."""
+typical distance, at which the robot may stop: in 20 development drives 98 % of the images there have 0.77 and more, and
+those of four drives that stopped elsewhere 0.5 to 0.68 (docs/experiments/atlas.md)."""
 MIN_INLIERS = 6
 """Features that must agree with a pose."""
 MIN_REBUILD_DISTANCE = 0.1
