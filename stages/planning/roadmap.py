@@ -139,20 +139,19 @@ class RoadmapPlanner(Stage):
         new = sure and math.isinf(state.left)
         told = fix is not None and fix.probabilities[0] >= MIN_PROBABILITY
         at, known = fix.poses[0] if fix is not None and told else here, told or (state.doubtful and sure)
-        away, standing = math.dist(at[:2], state.goal[:2]), status is not None and status.state == "blocked"
-        if not standing and not state.docking:
-            state.arrival = ARRIVAL_M
-        blocked = standing and tick.stamp >= state.retry
-        if blocked and status is not None:
+        away = math.dist(at[:2], state.goal[:2])
+        if status is None or status.state != "blocked":
+            state.arrival = state.arrival if state.docking else ARRIVAL_M
+        elif tick.stamp >= state.retry:
             state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
-        if blocked and known and away <= self.robot_radius_m:  # what stands there today lets it no closer
-            state.arrival = away + ARRIVAL_M
-        elif blocked and places is not None:
-            ctx.count("blocked_path")
-            ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
-            state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
-            self._plan(state, map)
-            places, new = self._path(state, map, here), True
+            if known and away <= self.robot_radius_m:  # what stands there today lets it no closer
+                state.arrival = away + ARRIVAL_M
+            elif places is not None:
+                ctx.count("blocked_path")
+                ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
+                state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
+                self._plan(state, map)
+                places, new = self._path(state, map, here), True
         if places is None or state.blocked > MAX_BLOCKED:
             state.ended = "gave up"
             state.why = "no path leads to the goal" if places is None else state.why
@@ -216,18 +215,20 @@ class RoadmapPlanner(Stage):
         """End at a goal that is not doubtful or looks as its image does; else set out for the next, or give up."""
         if not state.doubtful:
             state.ended = "arrived"
-        elif goal is None or features is None:
             return
-        elif of_one_place((goal.bearings, goal.descriptors), (features.bearings, features.descriptors), -turn):
+        if goal is None or features is None:
+            return
+        if of_one_place((goal.bearings, goal.descriptors), (features.bearings, features.descriptors), -turn):
             state.ended = "arrived"
-        elif state.unlike + 1 < UNLIKE_IMAGES:
-            state.unlike += 1
-        elif len(state.rivals):
-            ctx.count("looks_different")
+            return
+        state.unlike += 1
+        if state.unlike < UNLIKE_IMAGES:
+            return
+        ctx.count("looks_different")
+        if len(state.rivals):
             goal_pose, state.rivals = state.rivals[0], state.rivals[1:]
             self._set_out(state, map, goal_pose)
         else:
-            ctx.count("looks_different")
             state.ended = "gave up"
             reached = ", from as close as what stands there allows" if state.arrival > ARRIVAL_M else ""
             hint = "give an image from closer to the mapped way"

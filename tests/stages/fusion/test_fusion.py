@@ -15,11 +15,15 @@ def belief(number: int = 1000, spread: float = 1.0) -> Particles:
 
 
 def fuse(
-    stage: ImportanceResampling, particles: Particles, values: np.ndarray, seed: int = 0, **more: object
+    stage: ImportanceResampling,
+    particles: Particles,
+    values: np.ndarray,
+    seed: int = 0,
+    anywhere: float | None = None,
+    proposals: Particles | None = None,
 ) -> Particles:
     ctx = Context("fusion", np.random.default_rng(seed))
-    likelihood = Likelihood(values, more.get("anywhere"))  # type: ignore[arg-type]
-    return stage.step(ctx, particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
+    return stage.step(ctx, particles, Likelihood(values, anywhere), proposals).belief
 
 
 def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:

@@ -1,5 +1,6 @@
 """The whole filter on a map of some thousand references: tracking near the belief, and a robot put elsewhere."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -143,7 +144,9 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
 
 @pytest.mark.parametrize("candidates", [some, whole])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_robot_that_is_put_elsewhere_is_found_within_ten_pictures(candidates, seed: int) -> None:  # type: ignore[no-untyped-def]
+def test_a_robot_that_is_put_elsewhere_is_found_within_ten_images(
+    candidates: Callable[[], IndexedCandidates], seed: int
+) -> None:
     errors = drive(DRIVE[:15] + ELSEWHERE, candidates(), seed).errors
     assert errors[10:15].max() < 0.5
     assert errors[15] > 10
