@@ -3,7 +3,7 @@
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -74,15 +74,8 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
             seeds=tuple(range(index * number, (index + 1) * number)),  # draws of stages differ, too
         )
         for condition in experiment.conditions()
-        for index, scenario, own in _numbered(experiment)
+        for index, (scenario, own) in enumerate(experiment.all_scenarios.items())
     ]
-
-
-def _numbered(experiment: Experiment) -> Iterator[tuple[int, str, str]]:
-    """Number, label and overrides of each scenario; those of development are numbered by themselves."""
-    beside = list(experiment.development)
-    for index, (scenario, own) in enumerate(experiment.all_scenarios.items()):
-        yield beside.index(scenario) if scenario in beside else index, scenario, own
 
 
 def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[list[ConditionRun]]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.report.rendering import render
 
@@ -97,12 +98,13 @@ def markdown_page(experiment: Experiment, result: ExperimentResult) -> dict[str,
 
 
 def _repeated(experiment: Experiment) -> str:
-    runs, seeds, scenarios = experiment.runs_of_a_condition, experiment.repetitions, experiment.scenarios
+    runs, seeds = experiment.runs_of_a_condition, experiment.repetitions
+    scenarios = experiment.scenarios or experiment.development
     named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
-    several = f", {seeds} in each of {len(scenarios)} scenarios ({', '.join(scenarios)})" if scenarios else ""
-    beside = experiment.development
-    chosen_on = f", and in each of {len(beside)} of development ({', '.join(beside)})" if beside else ""
-    return f"{runs} repetitions of each condition with {named}{several}{chosen_on}"
+    several = (
+        f", {seeds} in each of {counted(len(scenarios), 'scenario')} ({', '.join(scenarios)})" if scenarios else ""
+    )
+    return f"{runs} repetitions of each condition with {named}{several}"
 
 
 def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]) -> dict[str, Any]:

@@ -181,8 +181,8 @@ class Experiment:
     """Label -> overrides: other data. Each condition is run in each of them, with seeds of its own. Intervals
     resample them first."""
     development: Mapping[str, str] = field(default_factory=dict)
-    """Label -> overrides of scenarios on which choices were made: their mean stands beside the others and is never
-    judged. Their seeds are 0, 1, 2, … too."""
+    """Label -> overrides of scenarios on which choices are made. They run where there are no `scenarios`, and are never
+    judged."""
     without: tuple[Mapping[str, Any], ...] = ()
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
@@ -219,12 +219,12 @@ class Experiment:
     @property
     def runs_of_a_condition(self) -> int:
         """Number of repetitions of each condition that count: every seed in every scenario."""
-        return self.repetitions * max(1, len(self.scenarios))
+        return self.repetitions * len(self.all_scenarios)
 
     @property
     def all_scenarios(self) -> dict[str, str]:
-        """Scenarios, with those of development last; a nameless one where there are none."""
-        return {**(self.scenarios or ({} if self.development else {"": ""})), **self.development}
+        """Scenarios that run: those that are judged, else those of development, else a nameless one."""
+        return dict(self.scenarios or self.development or {"": ""})
 
     def labels(self, factor: str) -> list[str]:
         """The labels of a factor, in the file's order."""

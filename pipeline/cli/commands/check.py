@@ -124,9 +124,8 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
-    kinds = (experiment.scenarios, ""), (experiment.development, " of development")
-    numbers = [f"{counted(len(those), 'scenario')}{which}" for those, which in kinds if those]
-    over = f" in each of {' and '.join(numbers)}" if numbers else ""
+    named = experiment.scenarios or experiment.development
+    over = f" in each of {counted(len(named), 'scenario')}" if named else ""
     conditions = counted(len(experiment.conditions()), "condition")
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     references = len(run.all_runs) - len(run.conditions)
