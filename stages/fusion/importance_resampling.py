@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.probability.particles import effective_size, is_narrow, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
 Array = npt.NDArray[np.float64]
@@ -20,6 +20,10 @@ CELL_M = 0.25
 """Width of the cells counted with `adapt: kld`, metres."""
 CELL_DEG = 10.0
 """Height of a cell in heading, degrees."""
+NARROW_M = 1.0
+"""Largest standard deviation of the position, metres, of a first belief that its particles stand for."""
+LEFT_OUT = 0.5
+"""Probability of the places that the particles of a wider first belief do not stand for."""
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
@@ -35,6 +39,12 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
     return math.ceil((cells - 1) / (2.0 * error) * (1.0 - part + math.sqrt(part) * float(ndtri(confidence))) ** 3)
 
 
+class ImportanceResamplingState(State):
+    """`left_out`: probability of the places that no particle has stood for since the start."""
+
+    left_out: float = 0.0
+
+
 class ImportanceResampling(Stage):
     """Multiplies particle weights by the likelihood; resamples systematically where the effective size is small.
 
@@ -45,6 +55,10 @@ class ImportanceResampling(Stage):
     are resampled among themselves by how well they fit the view, so that evidence for a hypothesis accumulates over
     images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
     those of one mixture throughout; only the allocation of particles differs.
+
+    A robot that may start anywhere: a few thousand particles leave most places out, and the belief would settle on one
+    that looks alike. So half of the belief belongs to these places at first; of it, each image hands the part that it
+    is new to its proposals, and the rest changes with the mean likelihood.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -63,17 +77,29 @@ class ImportanceResampling(Stage):
 
         belief: Particles
 
-    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        particles: Particles,
+        likelihood: Likelihood,
+        proposals: Particles | None,
+        state: ImportanceResamplingState,
+    ) -> Out:
         """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
         total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
-        moved = self.kidnapping_probability * likelihood.novelty
+        if ctx.tick.first_of_log:
+            narrow = is_narrow(poses, particles.weights, NARROW_M)
+            state.left_out = 0.0 if narrow or not self.kidnapping_probability else LEFT_OUT
+        moved = max(self.kidnapping_probability, state.left_out) * likelihood.novelty
         if proposals is not None and likelihood.mean_likelihood is not None:
-            new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
+            anywhere = likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
+            new = moved * anywhere
             weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
+            state.left_out *= (1.0 - likelihood.novelty) * anywhere / total
         tracked = len(poses) - particles.recovery_particles
         wanted = self._wanted(poses[:tracked])
         weights = weighted / total

@@ -11,7 +11,13 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.geometry.probability.gaussians import intersected
-from omninav.stages.geometry.probability.particles import are_within, share_within, systematic, weighted_moments
+from omninav.stages.geometry.probability.particles import (
+    are_within,
+    is_narrow,
+    share_within,
+    systematic,
+    weighted_moments,
+)
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
@@ -94,7 +100,7 @@ class LandmarkUpdate(Stage):
         """Fuse belief and fix."""
         if motion is None or ctx.tick.first_of_log or restart is not None:
             last.poses, last.driven, last.elsewhere = np.empty((0, 3)), 0.0, 0.0
-            if (ctx.tick.first_of_log or restart is not None) and _is_anywhere(belief):
+            if (ctx.tick.first_of_log or restart is not None) and not is_narrow(belief.poses, belief.weights, LOCAL[0]):
                 last.elsewhere = CARRIED
         else:
             last.poses = compose(last.poses, np.array([motion.x, motion.y, motion.turn]))
@@ -166,10 +172,3 @@ class LandmarkUpdate(Stage):
         shares = [np.full(kept, old / kept), *(w / total for w in weights[1:]), *(w / total for _, w in recovery)]
         number = sum(len(p) for p, _ in recovery)
         return Particles(np.concatenate(parts), np.concatenate(shares) / sum(s.sum() for s in shares), number)
-
-
-def _is_anywhere(belief: Particles) -> bool:
-    if not len(belief.poses):
-        return False
-    _, spread = weighted_moments(belief.poses, belief.weights)
-    return bool(spread[0, 0] + spread[1, 1] > LOCAL[0] ** 2)

@@ -24,6 +24,14 @@ def weighted_moments(poses: Array, weights: Array) -> tuple[Array, Array]:
     return mean, _covariance(poses, weights, mean, everyone)
 
 
+def is_narrow(poses: Array, weights: Array, sigma_m: float) -> bool:
+    """True if the position of weighted poses (N, 3) has at most this standard deviation, or there is none."""
+    if not len(poses):
+        return True
+    _, covariance = weighted_moments(poses, weights)
+    return bool(covariance[0, 0] + covariance[1, 1] <= sigma_m**2)
+
+
 def weighted_mean(poses: Array, weights: Array) -> Array:
     """Mean pose (3,) of weighted poses (N, 3); the heading's mean is circular."""
     poses, weights = np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64)
