@@ -28,7 +28,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.stages.candidates.index import IndexedCandidates, search_in
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState
+from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.measured_noise import MeasuredNoise
@@ -81,7 +81,6 @@ class Filter:
     def begin(self) -> None:
         """Go back to the first belief."""
         self.belief = self.prior.step(self._at(self.prior, 0), self.map, None, self.scale).belief
-        self.start = ImportanceResamplingState()
 
     def error(self, frame: Frame) -> float:
         """Distance of the estimate from the truth (m)."""
@@ -101,8 +100,7 @@ class Filter:
         alike = self.match.step(self._at(self.match, number), view, self.map, chosen).similarities
         out = self.sensor.step(self._at(self.sensor, number), alike, belief, self.map, moved, self.scale)
         proposed = self.proposals.step(self._at(self.proposals, number), out.field, self.map, self.scale).proposals
-        fused = self.fusion.step(self._at(self.fusion, number), belief, out.likelihood, proposed, self.start)
-        self.belief = fused.belief
+        self.belief = self.fusion.step(self._at(self.fusion, number), belief, out.likelihood, proposed).belief
         self.compared = len(alike.values)
 
 

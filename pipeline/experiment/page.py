@@ -51,7 +51,7 @@ def write_page(content: PageContent, results: Results, development: Results, fol
     """Write `<name>.md`, `<name>.html`, its plots and `<name>.result.json` into the experiment's folder.
 
     All of it follows from the results as they stand; conditions that failed or are still to run are named. Those of
-    `development` stand beside the others in the tables, and nothing else is made of them.
+    `development` stand in the tables, and nothing else is made of them.
     """
     experiment = content.experiment
     result = experiment_result(content, results, development)

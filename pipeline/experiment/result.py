@@ -118,7 +118,7 @@ def rows_of(experiment: Experiment) -> list[Labels]:
 def figures_of(
     experiment: Experiment, results: Results, development: Results
 ) -> tuple[dict[str, tuple[Case, ...]], dict[str, tuple[Cell, ...]], tuple[tuple[Line, ...], ...]]:
-    """Verdicts, cells and curves of what has run. Those of `development` stand beside the others in the cells only."""
+    """Verdicts, cells and curves of what has run. Those of `development` stand in the cells only."""
     verdicts = {key: verdict.cases for key, verdict in judge(experiment, results).items()}
     cells = {name: tuple(_cells(experiment, results, development, name)) for name in experiment.measures}
     return verdicts, cells, tuple(tuple(_lines(experiment, results, curve)) for curve in experiment.curves)

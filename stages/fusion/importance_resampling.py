@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.probability.particles import effective_size, is_narrow, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
@@ -23,7 +23,7 @@ CELL_DEG = 10.0
 NARROW_M = 1.0
 """Largest standard deviation of the position, metres, of a first belief that its particles stand for."""
 LEFT_OUT = 0.5
-"""Probability of the places that the particles of a wider first belief do not stand for."""
+"""Probability of the places that no particle of a wider first belief covers."""
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
@@ -39,12 +39,6 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
     return math.ceil((cells - 1) / (2.0 * error) * (1.0 - part + math.sqrt(part) * float(ndtri(confidence))) ** 3)
 
 
-class ImportanceResamplingState(State):
-    """`left_out`: probability of the places that no particle has stood for since the start."""
-
-    left_out: float = 0.0
-
-
 class ImportanceResampling(Stage):
     """Multiplies particle weights by the likelihood; resamples systematically where the effective size is small.
 
@@ -56,9 +50,8 @@ class ImportanceResampling(Stage):
     images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
     those of one mixture throughout; only the allocation of particles differs.
 
-    A robot that may start anywhere: a few thousand particles leave most places out, and the belief would settle on one
-    that looks alike. So half of the belief belongs to these places at first; of it, each image hands the part that it
-    is new to its proposals, and the rest changes with the mean likelihood.
+    Where a log begins with a belief that may be anywhere, a few thousand particles leave most places out, and it would
+    settle on one that looks alike: half of it goes to the poses that the first image suggests.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -68,7 +61,8 @@ class ImportanceResampling(Stage):
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
     """Effective size, as a share of the number, below which particles are resampled."""
     kidnapping_probability: Annotated[float, Bounds(ge=0, lt=1)] = 1e-7
-    """Probability per image of full novelty that the robot was kidnapped."""
+    """Probability per image of full novelty that the robot was kidnapped; 0: it never was, nor is the start searched
+    beyond the particles."""
     recovery_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
     """Share of the particles that are recovery particles."""
 
@@ -77,29 +71,19 @@ class ImportanceResampling(Stage):
 
         belief: Particles
 
-    def step(
-        self,
-        ctx: Context,
-        particles: Particles,
-        likelihood: Likelihood,
-        proposals: Particles | None,
-        state: ImportanceResamplingState,
-    ) -> Out:
+    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
         total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
-        if ctx.tick.first_of_log:
-            narrow = is_narrow(poses, particles.weights, NARROW_M)
-            state.left_out = 0.0 if narrow or not self.kidnapping_probability else LEFT_OUT
-        moved = max(self.kidnapping_probability, state.left_out) * likelihood.novelty
+        moved = self.kidnapping_probability * likelihood.novelty
+        if ctx.tick.first_of_log and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
+            moved = LEFT_OUT
         if proposals is not None and likelihood.mean_likelihood is not None:
-            anywhere = likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
-            new = moved * anywhere
+            new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
             weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
-            state.left_out *= (1.0 - likelihood.novelty) * anywhere / total
         tracked = len(poses) - particles.recovery_particles
         wanted = self._wanted(poses[:tracked])
         weights = weighted / total

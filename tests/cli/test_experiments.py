@@ -310,6 +310,7 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     chosen_on = (place / "runs/laps_development/laps.md").read_text()
     assert "2 in each of 1 scenario (chosen on)" in chosen_on
     assert chosen_on.count("development ") >= 3
+    assert "| holds |" in page
     assert "| holds |" not in chosen_on
 
 

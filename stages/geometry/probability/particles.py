@@ -25,7 +25,7 @@ def weighted_moments(poses: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def is_narrow(poses: Array, weights: Array, sigma_m: float) -> bool:
-    """True if the position of weighted poses (N, 3) has at most this standard deviation, or there is none."""
+    """True if the position of weighted poses (N, 3) has at most this standard deviation, or there are no poses."""
     if not len(poses):
         return True
     _, covariance = weighted_moments(poses, weights)

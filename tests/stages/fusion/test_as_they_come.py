@@ -7,7 +7,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.fusion.covariance_intersection import CovarianceIntersection
 from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState, kld_number
+from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
 from omninav.stages.fusion.particle_clustering import ParticleClustering
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.fusion.uniform_recovery import UniformRecovery
@@ -43,21 +43,13 @@ def test_beliefs_are_resampled_below_half_of_their_effective_size() -> None:
     for ratio, share, kept in ((3.0, 0.5, True), (99.0, 0.5, True), (np.inf, 0.5, True), (np.inf, 0.25, False)):
         values = np.where(np.arange(4096) < share * 4096, 1.0, 1.0 / ratio)
         belief = Particles(np.arange(12288.0).reshape(4096, 3), np.full(4096, 1 / 4096))
-        out = (
-            ImportanceResampling(number=4096)
-            .step(context(), belief, Likelihood(values), None, ImportanceResamplingState())
-            .belief
-        )
+        out = ImportanceResampling(number=4096).step(context(), belief, Likelihood(values), None).belief
         assert np.array_equal(out.poses, belief.poses) == kept
 
 
 def test_a_kidnapping_has_a_ten_millionth_and_its_hypotheses_a_tenth_of_5000_particles() -> None:
     believed, there = particles(*[(0.0, 0.0, 0.0)] * 5000), particles((9.0, 0.0, 0.0))
-    out = (
-        ImportanceResampling()
-        .step(context(), believed, Likelihood(np.ones(5000), 1e6), there, ImportanceResamplingState())
-        .belief
-    )
+    out = ImportanceResampling().step(context(), believed, Likelihood(np.ones(5000), 1e6), there).belief
     assert (len(out.poses), out.recovery_particles) == (5000, 500)
     assert out.weights[out.poses[:, 0] == 9.0].sum() == pytest.approx(0.1 / (0.1 + 1.0), rel=1e-6)
 
@@ -71,11 +63,9 @@ def test_the_number_of_particles_follows_cells_of_a_quarter_of_a_metre_and_ten_d
         for h in range(36)
     ]
     stage = ImportanceResampling(adapt="kld", number=100_000)
-    out = stage.step(
-        context(), particles(*poses), Likelihood(np.ones(len(poses))), None, ImportanceResamplingState()
-    ).belief
+    out = stage.step(context(), particles(*poses), Likelihood(np.ones(len(poses))), None).belief
     assert len(out.poses) == kld_number(432, 0.05, 0.99) > 4000
-    few = stage.step(context(), particles(*poses[:2]), Likelihood(np.ones(2)), None, ImportanceResamplingState()).belief
+    few = stage.step(context(), particles(*poses[:2]), Likelihood(np.ones(2)), None).belief
     assert len(few.poses) == 500
 
 

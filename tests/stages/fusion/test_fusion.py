@@ -3,7 +3,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState, kld_number
+from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
@@ -23,7 +23,7 @@ def fuse(
     proposals: Particles | None = None,
 ) -> Particles:
     ctx = Context("fusion", np.random.default_rng(seed))
-    return stage.step(ctx, particles, Likelihood(values, anywhere), proposals, ImportanceResamplingState()).belief
+    return stage.step(ctx, particles, Likelihood(values, anywhere), proposals).belief
 
 
 def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:
@@ -47,11 +47,7 @@ def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
 def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> None:
     ctx, particles = Context("fusion", np.random.default_rng(0)), belief()
-    out = (
-        ImportanceResampling(number=1000)
-        .step(ctx, particles, Likelihood(values), None, ImportanceResamplingState())
-        .belief
-    )
+    out = ImportanceResampling(number=1000).step(ctx, particles, Likelihood(values), None).belief
     assert np.allclose(out.weights, particles.weights)
     assert ctx.counts["belief_without_support"] == 1
 
@@ -91,39 +87,27 @@ def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
     )
     there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
     elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
-    state = ImportanceResamplingState()
-    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there, state).belief
+    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
     assert now.recovery_particles == 500
     for picture in range(1, 11):
         values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
-        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere, state).belief
+        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
         share, odds = now.weights[now.poses[:, 0] == 77.0].sum(), 1e-6 * 10.0**picture
         assert share == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
     assert (now.poses[:, 0] == 77.0).mean() > 0.4  # the particles have followed the weights
 
 
 @pytest.mark.parametrize(("spread", "share"), [(0.5, 1e-7), (20.0, 0.5)])
-def test_a_belief_that_may_be_anywhere_leaves_half_to_places_that_it_does_not_hold(spread: float, share: float) -> None:
-    # By hand: half of it, or the kidnapping probability, to the proposals of an image that is all new.
-    ctx, state = Context("fusion", np.random.default_rng(0)), ImportanceResamplingState()
-    ctx.tick = Tick(0, 0, first_of_log=True)
-    there, stage = Particles(np.full((50, 3), 777.0), np.full(50, 0.02)), ImportanceResampling()
-    start = belief(5000, spread=spread)
-    out = stage.step(ctx, start, Likelihood(np.ones(5000), 1.0), there, state).belief
-    assert out.weights[out.poses[:, 0] == 777.0].sum() == pytest.approx(share, rel=1e-3)
-    assert state.left_out == 0.0
-
-
-def test_of_what_the_start_left_out_an_image_proposes_what_is_new_to_it() -> None:
-    # By hand: a quarter is new, so an eighth of the belief goes to the proposals and three eighths wait; the belief
-    # explains the image ten times as well as the map does on average.
-    ctx, state = Context("fusion", np.random.default_rng(0)), ImportanceResamplingState()
-    ctx.tick = Tick(0, 0, first_of_log=True)
-    there, stage = Particles(np.full((50, 3), 777.0), np.full(50, 0.02)), ImportanceResampling()
-    out = stage.step(ctx, belief(5000, spread=20.0), Likelihood(np.ones(5000), 0.1, 0.25), there, state).belief
-    total = 7 / 8 + 0.1 / 8
-    assert out.weights[out.poses[:, 0] == 777.0].sum() == pytest.approx(0.1 / 8 / total, rel=1e-3)
-    assert state.left_out == pytest.approx(3 / 8 * 0.1 / total)
+def test_half_of_a_first_belief_that_may_be_anywhere_goes_to_what_the_image_suggests(
+    spread: float, share: float
+) -> None:
+    # Bayes by hand: half of it, or the kidnapping probability, where the image is as likely there as in the belief.
+    ctx, stage = Context("fusion", np.random.default_rng(0)), ImportanceResampling()
+    there = Particles(np.full((50, 3), 777.0), np.full(50, 0.02))
+    for first, expected in ((True, share), (False, 1e-7)):
+        ctx.tick = Tick(0, 0, first_of_log=first)
+        out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), there).belief
+        assert out.weights[out.poses[:, 0] == 777.0].sum() == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
@@ -131,9 +115,7 @@ def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
     ctx, stage = Context("fusion"), ImportanceResampling(kidnapping_probability=1e-3)
     shares = []
     for fresh in (1.0, 0.1):
-        out = stage.step(
-            ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals, ImportanceResamplingState()
-        ).belief
+        out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals).belief
         shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
     assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
 
@@ -167,8 +149,7 @@ def with_recovery(weight: float, kidnapping_probability: float, novelty: float =
     stage = ImportanceResampling(number=10, recovery_share=0.2, kidnapping_probability=kidnapping_probability)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]] * 2), np.array([0.5, 0.5]))
     likelihood = Likelihood(np.ones(10), 1.0, novelty)
-    state = ImportanceResamplingState()
-    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals, state).belief
+    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals).belief
 
 
 def test_of_a_mixture_the_uniform_part_has_the_weight_of_a_kidnapping() -> None:
@@ -201,8 +182,7 @@ def test_recovery_particles_that_weigh_just_their_share_stay_apart() -> None:
     stage = ImportanceResampling(number=8, recovery_share=0.25, kidnapping_probability=0.5)
     proposals = Particles(np.array([[9.0, 0.0, 0.0]]), np.ones(1))
     believed = Particles(poses, np.full(8, 0.125), 4)
-    state = ImportanceResamplingState()
-    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals, state).belief
+    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals).belief
     assert out.poses[:6, 0].tolist() == [0.0] * 6
     assert 5.0 in out.poses[6:, 0]
 

@@ -9,7 +9,7 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.candidates.index import IndexedCandidates
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
-from omninav.stages.fusion.importance_resampling import ImportanceResampling, ImportanceResamplingState
+from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
@@ -83,7 +83,6 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
         stage.setup(contexts[name])
     start, motion, match, sensor, proposals, fusion, _ = stages.values()
     noise, errors, said, compared = np.random.default_rng(9), [], [], []
-    state = ImportanceResamplingState()
     for k, pose in enumerate(path):
         for ctx in contexts.values():
             ctx.tick = Tick(index=k, stamp=k, first_of_log=k == 0)
@@ -96,7 +95,7 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
         alike = match.step(contexts["match"], view, MAP, chosen).similarities
         out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, LENGTH_SCALE)
         proposed = proposals.step(contexts["proposals"], out.field, MAP, LENGTH_SCALE).proposals
-        belief = fusion.step(contexts["fusion"], belief, out.likelihood, proposed, state).belief
+        belief = fusion.step(contexts["fusion"], belief, out.likelihood, proposed).belief
         estimate = belief.estimate().pose
         errors.append(np.hypot(estimate.x - pose[0], estimate.y - pose[1]))
         said.append(out.likelihood)
