@@ -173,7 +173,10 @@ def _bars(experiment: Experiment, result: ExperimentResult, name: str) -> bytes:
                 )
         if experiment.published.get(name):
             axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
-        axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, int(column_in / LETTER_IN)) for c in columns])
+        axes.set_xticks(
+            np.arange(len(columns)),
+            [textwrap.fill(c, int(column_in / LETTER_IN), break_long_words=False) for c in columns],
+        )
         _title_beside(axes, measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
