@@ -215,14 +215,13 @@ def figure_table(experiment: Experiment, result: ExperimentResult, name: str) ->
 
 
 def reference_text(content: PageContent, index: int) -> str:
-    """A sentence with the figures of its reference runs, but those of development."""
+    """A sentence with the figures of its reference runs."""
     reference = content.experiment.reference_runs[index]
     measure = Measure("", (reference.measure,), reference.scale)
     parts = []
     for label in content.experiment.labels(reference.over):
         runs = [run for run in content.references[index] if run.condition.labels[reference.over] == label]
-        counted = [run for run in runs if not run.development]
-        found = [figure_of(measure, result) for run in counted for result in run.results.values()]
+        found = [figure_of(measure, result) for run in runs for result in run.results.values()]
         known = [figure for figure in found if figure is not None]
         parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
     return reference.text.replace("{}", "; ".join(parts))

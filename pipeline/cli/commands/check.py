@@ -124,8 +124,9 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
+    kind = "scenario" if experiment.scenarios else "development draw"
     named = experiment.scenarios or experiment.development
-    over = f" in each of {counted(len(named), 'scenario')}" if named else ""
+    over = f" in each of {counted(len(named), kind)}" if named else ""
     conditions = counted(len(experiment.conditions()), "condition")
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     references = len(run.all_runs) - len(run.conditions)
