@@ -99,7 +99,7 @@ def markdown_page(experiment: Experiment, result: ExperimentResult) -> dict[str,
 
 def _repeated(experiment: Experiment) -> str:
     runs, seeds = experiment.runs_of_a_condition, experiment.repetitions
-    scenarios = experiment.scenarios or experiment.development
+    scenarios = experiment.named_scenarios
     named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
     several = (
         f", {seeds} in each of {counted(len(scenarios), 'scenario')} ({', '.join(scenarios)})" if scenarios else ""

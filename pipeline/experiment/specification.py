@@ -222,9 +222,14 @@ class Experiment:
         return self.repetitions * len(self.all_scenarios)
 
     @property
-    def all_scenarios(self) -> dict[str, str]:
-        """Scenarios that run: those that are judged, else those of development, else a nameless one."""
-        return dict(self.scenarios or self.development or {"": ""})
+    def named_scenarios(self) -> Mapping[str, str]:
+        """Scenarios that run: those that are judged, else those of development."""
+        return self.scenarios or self.development
+
+    @property
+    def all_scenarios(self) -> Mapping[str, str]:
+        """The same, or a nameless one where there are none."""
+        return self.named_scenarios or {"": ""}
 
     def labels(self, factor: str) -> list[str]:
         """The labels of a factor, in the file's order."""

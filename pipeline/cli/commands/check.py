@@ -125,8 +125,8 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
     kind = "scenario" if experiment.scenarios else "development draw"
-    named = experiment.scenarios or experiment.development
-    over = f" in each of {counted(len(named), kind)}" if named else ""
+    number = len(experiment.named_scenarios)
+    over = f" in each of {counted(number, kind)}" if number else ""
     conditions = counted(len(experiment.conditions()), "condition")
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     references = len(run.all_runs) - len(run.conditions)
