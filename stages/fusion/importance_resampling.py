@@ -78,7 +78,7 @@ class ImportanceResampling(Stage):
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
-        moved = self.kidnapping_probability * likelihood.novelty
+        moved = min(self.kidnapping_probability * likelihood.novelty * likelihood.kidnapping_ratio, LEFT_OUT)
         if ctx.tick.first_of_log and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
             moved = LEFT_OUT
         if proposals is not None and likelihood.mean_likelihood is not None:

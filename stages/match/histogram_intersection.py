@@ -11,6 +11,7 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import WordSimilarities
 
+from .last_view import LastView
 from .reference_match import ReferenceMatch
 
 
@@ -23,6 +24,7 @@ class HistogramIntersection(ReferenceMatch, Stage):
     def step(  # type: ignore[override]
         self,
         ctx: Context,
+        last: LastView,
         features: SegmentHistograms,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
@@ -30,7 +32,7 @@ class HistogramIntersection(ReferenceMatch, Stage):
         length_scale: LengthScale | None = None,
     ) -> ReferenceMatch.Out:
         """Compare one view."""
-        return super().step(ctx, features, map, candidates, words, length_scale)
+        return super().step(ctx, last, features, map, candidates, words, length_scale)
 
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None

@@ -18,6 +18,9 @@ from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visual_words import WordSimilarities
 
 from .calibration import MapCalibration
+from .last_view import LastView
+
+Floats = npt.NDArray[np.float32]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -46,6 +49,7 @@ class ReferenceMatch(ABC):
     def step(
         self,
         ctx: Context,
+        last: LastView,
         features: SegmentFeatures,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
@@ -58,21 +62,22 @@ class ReferenceMatch(ABC):
         values = self.compare(map, features, candidates.references)
         if words is not None and self.word_power:
             values = values * words.factors(len(map), candidates.references, self.word_power)[:, None]
-        similarities = Similarities(
-            values, candidates.references, candidates.sampling_weight, *self.exponent_and_scale(features)
-        )
+        how = candidates.references, candidates.sampling_weight, *self.exponent_and_scale(features)
         if not ctx.is_read("calibration"):
-            return self.Out(similarities=similarities)
+            return self.Out(similarities=Similarities(values, *how))
 
-        def of_view(view: int, chosen: npt.NDArray[np.int64]) -> npt.NDArray[np.float32]:
+        def of_one(view: Floats) -> Floats:
+            one = ReferenceGraph(np.zeros((1, 3)), view, features.kind, np.empty((0, 2), np.int64), "truth")
+            return self.compare(one, features, None)
+
+        def of_view(view: int, chosen: npt.NDArray[np.int64]) -> Floats:
             return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
 
+        similarities = Similarities(values, *how, last.similarity(ctx, features.values, of_one))
         return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
 
     @abstractmethod
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None) -> Floats:
         """Similarities to the chosen references, None for all: (chosen, headings)."""
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:

@@ -19,6 +19,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 
 from .calibration import MapCalibration
+from .last_view import LastView
 from .reference_match import check_same_kind
 
 Floats = npt.NDArray[np.float32]
@@ -127,12 +128,14 @@ class Retrieval(Stage):
     def step(
         self,
         ctx: Context,
+        last: LastView,
         features: SegmentHistograms,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         length_scale: LengthScale | None = None,
     ) -> Out:
         """Query the map with one view; `length_scale` is for the calibration only."""
+        panoramic = features.directions is None
         if features.directions is None:
             check_same_kind(features, map)
             headings = self.headings if len(features.values) > 1 else 1
@@ -142,10 +145,11 @@ class Retrieval(Stage):
             queries = features.values[window_turns(features.directions), None]
         candidates = candidates or Candidates()
         values = normalised_intersections(map.features, queries, features.scales, candidates.references)
-        similarities = Similarities(values, candidates.references, candidates.sampling_weight)
-        answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None
-        calibration = None
+        calibration, of_last = None, None
         if ctx.is_read("calibration"):
+
+            def of_one(view: Floats) -> Floats:
+                return normalised_intersections(view if panoramic else view[0, :, None], queries, features.scales)
 
             def of_view(view: int, chosen: Ints) -> Floats:
                 turned = turned_views(np.asarray(map.features[view]), headings)
@@ -153,6 +157,10 @@ class Retrieval(Stage):
 
             headings = self.headings if map.features.shape[1] > 1 else 1
             calibration = self._calibration.of(ctx, map, of_view, length_scale)
+            of_last = last.similarity(ctx, features.values, of_one)
+        weights = candidates.sampling_weight
+        similarities = Similarities(values, candidates.references, weights, last_view=of_last)
+        answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None
         return self.Out(similarities=similarities, answers=answers, calibration=calibration)
 
 

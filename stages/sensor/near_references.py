@@ -18,7 +18,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 
-from .calibrated_similarity import likelihood_ratios
+from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from .compared_rows import ComparedRows
 
 Array = npt.NDArray[np.float64]
@@ -236,8 +236,8 @@ class NearReferences(Stage):
         driven = None if motion is None else math.hypot(motion.x, motion.y)
         if calibration is not None:
             far = self.independence_distance * calibration.correlation_m
-            novelty = evidence_novelty(driven, far)
-            return self._calibrated(similarities, particles, map, rows, unit, calibration, novelty)
+            new = novelty_and_kidnapping(similarities, calibration, driven, far)
+            return self._calibrated(similarities, particles, map, rows, unit, calibration, *new)
         best, each = similarities.best, similarities.sampling_weight
         floor = 0.0
         if self.background_quantile is not None:
@@ -260,13 +260,14 @@ class NearReferences(Stage):
         unit: float,
         calibration: SimilarityCalibration,
         novelty: float,
+        carried: float,
     ) -> Out:
         ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
         near = self._cells.of(particles.poses)
         expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), self._fade_m(unit), 0.0)
         field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
-        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty)
+        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, carried)
         return self.Out(likelihood=likelihood, field=field)
 
     def _expected(

@@ -17,7 +17,7 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 from omninav.stages.values.visibility import VisibilityAreas
 
-from .calibrated_similarity import likelihood_ratios
+from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from .compared_rows import ComparedRows
 from .near_references import similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
@@ -108,11 +108,13 @@ class Visibility(Stage):
         window = None if panoramic else math.radians(WINDOW_DEG), sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
-        unit = metres_of(length_scale)
-        unit = unit if calibration is None else calibration.correlation_m
         driven = None if motion is None else math.hypot(motion.x, motion.y)
-        novelty = evidence_novelty(driven, self.independence_distance * unit)
-        likelihood = Likelihood(mean**novelty, background_level, novelty)
+        if calibration is None:
+            novelty, carried = evidence_novelty(driven, self.independence_distance * metres_of(length_scale)), 1.0
+        else:
+            far = self.independence_distance * calibration.correlation_m
+            novelty, carried = novelty_and_kidnapping(similarities, calibration, driven, far)
+        likelihood = Likelihood(mean**novelty, background_level, novelty, carried)
         if not ctx.is_read("field"):
             return self.Out(likelihood=likelihood)
         weighed = replace(similarities, values=raised.astype(np.float32))

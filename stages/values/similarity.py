@@ -24,6 +24,8 @@ class Similarities(Value):
     How they were compared, so that other stages can compare in the same way: S = max_k (sum of the k largest s_j)
     k^-exponent n^-(1-exponent) over the n segments, where of all but histograms s_j = 1 - |difference| /
     `colour_scale`; with `exponent` None S = 1 - |whole difference| / `colour_scale`, and with both something else.
+
+    `last_view`: similarity to the view before, at the best heading; None at the first, and where nobody asks for it.
     """
 
     values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
@@ -31,6 +33,7 @@ class Similarities(Value):
     sampling_weight: Annotated[npt.NDArray[np.float64] | None, Shape("references"), Bounds(gt=0)] = None
     exponent: float | None = None
     colour_scale: float | None = None
+    last_view: Annotated[float | None, Bounds(ge=0, le=1)] = None
 
     @cached_property
     def best(self) -> npt.NDArray[np.float32]:

@@ -13,6 +13,8 @@ Floats = npt.NDArray[np.float32]
 RIDGE = 1e-3
 """Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
 MAX_LOG_ODDS = 30.0
+MIN_SIMILARITY = 1e-6
+"""Similarity below which all are alike, so that its logarithm is finite."""
 TAIL = 0.4
 """Share of the slope that is left above the largest ratio that the examples show."""
 
@@ -22,12 +24,23 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
 
     `sampling_weight` (R,): how many references of the map each represents; None: one each.
     """
-    logarithms = np.log(np.maximum(similarity, np.float32(1e-6)))
-    best = best_headings(logarithms)[0].astype(np.float64)
+    logarithms = np.log(np.maximum(similarity, np.float32(MIN_SIMILARITY)))
+    centre, spread = _centre_and_spread(best_headings(logarithms)[0], sampling_weight)
+    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / spread)
+    return scores
+
+
+def standard_score(similarity: float, best: Floats, sampling_weight: Array | None = None) -> float:
+    """The same of one more similarity, given the references' at their best headings: `best` (R,)."""
+    centre, spread = _centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
+    return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / spread
+
+
+def _centre_and_spread(logarithms: Floats, sampling_weight: Array | None) -> tuple[float, float]:
+    best = logarithms.astype(np.float64)
     centre = float(np.average(best, weights=sampling_weight))
     spread = math.sqrt(float(np.average(np.square(best - centre), weights=sampling_weight)))
-    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, 1e-6))
-    return scores
+    return centre, max(spread, 1e-6)
 
 
 def logistic_fit(scores: Array, weights: Array, right: npt.NDArray[np.bool_]) -> tuple[float, float]:

@@ -1,12 +1,13 @@
 """Sensors that weigh by calibrated likelihood ratios."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.sensor.calibrated_similarity import likelihood_ratios
+from omninav.stages.sensor.calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.calibration import SimilarityCalibration
@@ -63,3 +64,17 @@ def test_a_calibration_that_says_nothing_weighs_all_places_alike():
     values = weighed(PLACES, calibration=nothing).likelihood.values
     assert values.max() / values.min() == pytest.approx(1.0, abs=1e-5)
     assert math.isfinite(float(values.sum()))
+
+
+@pytest.mark.parametrize(("last_view", "moved", "novelty", "ratio"), [
+    (0.9, 0.2, 0.1, 1.0),  # the image continues the last
+    (0.3, 0.2, 1.0, 500.0**0.9),  # it looks like any other place
+    (0.3, 2.0, 1.0, 1.0),  # after so long a way it may
+    (None, 0.2, 0.1, 1.0),  # nobody compared
+])  # fmt: skip
+def test_a_view_that_does_not_continue_the_last_is_new_and_says_that_the_robot_was_carried(
+    last_view: float | None, moved: float, novelty: float, ratio: float
+):
+    seen = replace(similarities(), last_view=last_view)
+    calibration = replace(CALIBRATION, slope=8.0)
+    assert novelty_and_kidnapping(seen, calibration, moved, 2.0) == pytest.approx((novelty, ratio), rel=0.01)
