@@ -40,6 +40,8 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
     command = option.removesuffix("_live").replace("_", " ")
     if group == "variant" and command in tools():
         return f"it is a command; type omninav {command} …; `omninav {command} --help` shows what it takes"
+    if group in config_file() and not is_group(group):
+        return f"a folder {group} in the --config-dir makes a group of this setting; move or rename that folder"
     return replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
 
 

@@ -45,6 +45,14 @@ def test_a_run_lies_where_hydra_run_dir_says(toy, tmp_path: Path):
     assert "there is a run in it" in again.stderr
 
 
+def test_a_folder_of_runs_in_the_config_dir_is_said_to_be_in_the_way(toy, tmp_path: Path):
+    (tmp_path / "mine" / "runs" / "latest").mkdir(parents=True)
+    (tmp_path / "mine" / "runs" / "latest" / "config.yaml").write_text("seed: 0\n")
+    refused = toy("--config-dir=mine", "runs=elsewhere")
+    assert refused.returncode == 2
+    assert "a folder runs in the --config-dir makes a group of this setting" in refused.stderr
+
+
 def test_a_run_that_is_refused_leaves_no_folder(toy, tmp_path: Path):
     assert toy("--config-dir=mine", "hydra.run.dir=out", "nodes.sum._target_=toys.Nothing").returncode == 2
     assert not (tmp_path / "out").exists()
