@@ -24,6 +24,8 @@ NARROW_M = 1.0
 """Largest standard deviation of the position, metres, of a first belief that its particles stand for."""
 LEFT_OUT = 0.5
 """Probability of the places that no particle of a wider first belief covers."""
+MAX_CARRIED = 0.5
+"""Probability of a kidnapping, at most, where the image does not look like the last."""
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
@@ -45,10 +47,11 @@ class ImportanceResampling(Stage):
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking).
 
     Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty x mean
-    likelihood, goes to the `proposals`, poses that the view itself suggests. They join the recovery particles, which
-    are resampled among themselves by how well they fit the view, so that evidence for a hypothesis accumulates over
-    images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
-    those of one mixture throughout; only the allocation of particles differs.
+    likelihood (and x the likelihood's `kidnapping_factor`), goes to the `proposals`, poses that the view itself
+    suggests. They join the recovery particles, which are resampled among themselves by how well they fit the view, so
+    that evidence for a hypothesis accumulates over images however small its weight. Once they outweigh their share they
+    are resampled with all others. Weights are those of one mixture throughout; only the allocation of particles
+    differs.
 
     Where a log begins with a belief that may be anywhere, a few thousand particles leave most places out, and it would
     settle on one that looks alike: half of it goes to the poses that the first image suggests.
@@ -78,7 +81,8 @@ class ImportanceResampling(Stage):
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
-        moved = min(self.kidnapping_probability * likelihood.novelty * likelihood.kidnapping_ratio, LEFT_OUT)
+        moved = self.kidnapping_probability * likelihood.novelty
+        moved = max(moved, min(moved * likelihood.kidnapping_factor, MAX_CARRIED))
         if ctx.tick.first_of_log and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
             moved = LEFT_OUT
         if proposals is not None and likelihood.mean_likelihood is not None:

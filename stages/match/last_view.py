@@ -11,15 +11,22 @@ Floats = npt.NDArray[np.float32]
 
 
 class LastView(State):
-    """The features (segments, bins) of the image before; None at the first of a log."""
+    """The features (segments, bins) of the last view and the tick they are of; None before the first.
+
+    `stages/geometry/landmarks/unbroken_view.py` compares two images by their local features.
+    """
 
     values: Floats | None = None
+    index: int = -1
 
     def similarity(self, ctx: Context, values: Floats, compare: Callable[[Floats], Floats]) -> float | None:
-        """Similarity of a view to the one before, at the best heading, which it then takes the place of.
+        """Gives the similarity of a view to the one before, at the best heading, and keeps the view in its place.
 
-        `compare`: similarities of the view to a map (1, segments, bins) of that one alone.
+        `compare`: similarities of the view to another one. None where the tick before had no view, or was of another
+        log, and of a view that is not divided around the robot, which changes as the robot turns.
         """
-        before = None if ctx.tick.first_of_log else self.values
-        self.values = values
-        return None if before is None else float(compare(before[None]).max())
+        follows = ctx.tick.index == self.index + 1 and not ctx.tick.first_of_log
+        before, self.values, self.index = self.values if follows else None, values, ctx.tick.index
+        if before is None or before.shape != values.shape or len(values) < 2:
+            return None
+        return float(compare(before).max())

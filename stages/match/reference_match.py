@@ -67,18 +67,24 @@ class ReferenceMatch(ABC):
             return self.Out(similarities=Similarities(values, *how))
 
         def of_one(view: Floats) -> Floats:
-            one = ReferenceGraph(np.zeros((1, 3)), view, features.kind, np.empty((0, 2), np.int64), "truth")
-            return self.compare(one, features, None)
+            return self.compare_view(map, features, view)
 
         def of_view(view: int, chosen: npt.NDArray[np.int64]) -> Floats:
             return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
 
-        similarities = Similarities(values, *how, last.similarity(ctx, features.values, of_one))
+        weighed = words is not None and self.word_power > 0.0  # by words, which no last view has
+        of_last = None if weighed else last.similarity(ctx, features.values, of_one)
+        similarities = Similarities(values, *how, of_last)
         return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
 
     @abstractmethod
     def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None) -> Floats:
         """Similarities to the chosen references, None for all: (chosen, headings)."""
+
+    def compare_view(self, map: ReferenceGraph, features: SegmentFeatures, view: Floats) -> Floats:
+        """Similarities to one more view (segments, bins), as if it were a reference of the map: (1, headings)."""
+        one = ReferenceGraph(np.zeros((1, 3)), view[None], features.kind, np.empty((0, 2), np.int64), "truth")
+        return self.compare(one, features, None)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         """`exponent` and `colour_scale` of the similarities."""

@@ -149,7 +149,7 @@ class Retrieval(Stage):
         if ctx.is_read("calibration"):
 
             def of_one(view: Floats) -> Floats:
-                return normalised_intersections(view if panoramic else view[0, :, None], queries, features.scales)
+                return normalised_intersections(view[None], queries, features.scales)
 
             def of_view(view: int, chosen: Ints) -> Floats:
                 turned = turned_views(np.asarray(map.features[view]), headings)
@@ -157,7 +157,7 @@ class Retrieval(Stage):
 
             headings = self.headings if map.features.shape[1] > 1 else 1
             calibration = self._calibration.of(ctx, map, of_view, length_scale)
-            of_last = last.similarity(ctx, features.values, of_one)
+            of_last = last.similarity(ctx, features.values, of_one) if panoramic else None
         weights = candidates.sampling_weight
         similarities = Similarities(values, candidates.references, weights, last_view=of_last)
         answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None

@@ -42,6 +42,14 @@ class WhitenedMatch(ReferenceMatch, Stage):
         some = whitening.of(np.asarray(map.features[:] if chosen is None else map.features[chosen], np.float32))
         return cosine_similarities(some, whitening.of(features.values), self.headings)
 
+    def compare_view(
+        self, map: ReferenceGraph, features: SegmentFeatures, view: npt.NDArray[np.float32]
+    ) -> npt.NDArray[np.float32]:
+        if not len(map):
+            return np.zeros((1, self.headings), np.float32)
+        whitening = self._whitening(map)
+        return cosine_similarities(whitening.of(view[None]), whitening.of(features.values), self.headings)
+
     def _whitening(self, map: ReferenceGraph) -> Whitening:
         """Learned once, and again where the map has grown."""
         if self._learned is None or self._learned[0] is not map or self._learned[1] != len(map):

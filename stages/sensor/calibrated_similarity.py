@@ -5,14 +5,15 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.probability.evidence import evidence_novelty
+from omninav.stages.geometry.probability.evidence import MIN_SPREAD, evidence_novelty
 from omninav.stages.geometry.probability.likelihood_ratio import (
-    MAX_LOG_ODDS,
+    ratios_of,
     saturated_ratios,
     standard_score,
     standard_scores,
 )
 from omninav.stages.values.calibration import SimilarityCalibration
+from omninav.stages.values.pose import AssumedMotion, BridgedMotion, Motion
 from omninav.stages.values.similarity import Similarities
 
 OUTLIERS = 0.1
@@ -29,17 +30,21 @@ def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibra
 
 
 def novelty_and_kidnapping(
-    similarities: Similarities, calibration: SimilarityCalibration, driven_m: float | None, independence_m: float
+    similarities: Similarities, calibration: SimilarityCalibration, motion: Motion | None, independence_distance: float
 ) -> tuple[float, float]:
-    """How new an image is, in [0, 1], and how many times likelier than usual the robot was carried, from 1 on.
+    """Gives the novelty of an image, in [0, 1], and the factor, at least 1, by which a kidnapping is likelier.
 
-    By the distance driven (`evidence_novelty`); but where the robot has hardly moved, an image looks like the one
-    before. One that looks like another place is all new, and somebody may have carried the robot.
+    The novelty follows from the distance driven (`evidence_novelty`), up to `independence_distance` times the
+    calibration's correlation length. But where the robot has hardly moved, as odometry has measured, an image looks
+    like the one before. One that looks like another place instead is all new, and the robot may have been carried.
     """
-    novelty = evidence_novelty(driven_m, independence_m)
-    if similarities.last_view is None:
+    driven = None if motion is None else math.hypot(motion.x, motion.y)
+    novelty = evidence_novelty(driven, independence_distance * calibration.correlation_m)
+    measured = motion is not None and not isinstance(motion, AssumedMotion | BridgedMotion)
+    told = calibration.slope > 0.0 and similarities.spread > MIN_SPREAD
+    if similarities.last_view is None or not measured or not told:
         return novelty, 1.0
     score = standard_score(similarities.last_view, similarities.best, similarities.sampling_weight)
-    same = math.exp(min(max(calibration.slope * (score - calibration.middle), -MAX_LOG_ODDS), MAX_LOG_ODDS))
-    ratio = max(1.0 / (BROKEN + (1.0 - BROKEN) * same), 1.0) ** (1.0 - novelty)
-    return novelty + (1.0 - novelty) / (1.0 + same), ratio
+    same = float(ratios_of(np.array([score], np.float32), calibration.slope, calibration.middle)[0])
+    factor = max(1.0 / (BROKEN + (1.0 - BROKEN) * same), 1.0) ** (1.0 - novelty)
+    return novelty + (1.0 - novelty) / (1.0 + same), factor

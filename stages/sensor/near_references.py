@@ -199,7 +199,8 @@ class NearReferences(Stage):
     """Distance, in length scales, over which a reference loses its influence (sigma of a Gaussian); null: none does."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.75
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always. Needs `motion`. With a
-    `calibration`, in the distances over which its evidence was measured to lose its correlation."""
+    `calibration`, in the distances over which its evidence was measured to lose its correlation; an image that does
+    not look like the one before is new at once."""
 
     class Out(Outputs):
         """Likelihood of each particle, and the weights over the whole map; `field` absent with an empty map."""
@@ -233,10 +234,8 @@ class NearReferences(Stage):
             self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
         candidates, rows = self._rows.of(similarities.candidates)
-        driven = None if motion is None else math.hypot(motion.x, motion.y)
         if calibration is not None:
-            far = self.independence_distance * calibration.correlation_m
-            new = novelty_and_kidnapping(similarities, calibration, driven, far)
+            new = novelty_and_kidnapping(similarities, calibration, motion, self.independence_distance)
             return self._calibrated(similarities, particles, map, rows, unit, calibration, *new)
         best, each = similarities.best, similarities.sampling_weight
         floor = 0.0
@@ -244,6 +243,7 @@ class NearReferences(Stage):
             places, distance = map.poses[candidates], BACKGROUND_DISTANCE * unit
             floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
+        driven = None if motion is None else math.hypot(motion.x, motion.y)
         novelty = evidence_novelty(driven, self.independence_distance * unit)
         top = max(float(np.maximum.reduce(best)), 1e-12)
         field = similarity_field(similarities, floor, top, power)
@@ -260,14 +260,14 @@ class NearReferences(Stage):
         unit: float,
         calibration: SimilarityCalibration,
         novelty: float,
-        carried: float,
+        kidnapping: float,
     ) -> Out:
         ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
         near = self._cells.of(particles.poses)
         expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), self._fade_m(unit), 0.0)
         field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
-        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, carried)
+        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, kidnapping)
         return self.Out(likelihood=likelihood, field=field)
 
     def _expected(

@@ -54,7 +54,8 @@ class Visibility(Stage):
     of the area weigh the same, as in the paper. Not in length scales, which differ between cameras in one place."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.0
     """Distance driven, in length scales, after which an image is fully new evidence; 0: always, as in the paper. With a
-    `calibration`, in the distances over which its evidence was measured to lose its correlation."""
+    `calibration`, in the distances over which its evidence was measured to lose its correlation; an image that does
+    not look like the one before is new at once."""
     retrieval: bool = True
     """False: the ablation of section VI-E, in which all particles in any visibility area weigh 1 and all others 0."""
 
@@ -108,13 +109,13 @@ class Visibility(Stage):
         window = None if panoramic else math.radians(WINDOW_DEG), sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
-        driven = None if motion is None else math.hypot(motion.x, motion.y)
+        far, kidnapping = self.independence_distance, 1.0
         if calibration is None:
-            novelty, carried = evidence_novelty(driven, self.independence_distance * metres_of(length_scale)), 1.0
+            driven = None if motion is None else math.hypot(motion.x, motion.y)
+            novelty = evidence_novelty(driven, far * metres_of(length_scale))
         else:
-            far = self.independence_distance * calibration.correlation_m
-            novelty, carried = novelty_and_kidnapping(similarities, calibration, driven, far)
-        likelihood = Likelihood(mean**novelty, background_level, novelty, carried)
+            novelty, kidnapping = novelty_and_kidnapping(similarities, calibration, motion, far)
+        likelihood = Likelihood(mean**novelty, background_level, novelty, kidnapping)
         if not ctx.is_read("field"):
             return self.Out(likelihood=likelihood)
         weighed = replace(similarities, values=raised.astype(np.float32))

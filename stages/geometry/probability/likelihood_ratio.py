@@ -13,6 +13,7 @@ Floats = npt.NDArray[np.float32]
 RIDGE = 1e-3
 """Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
 MAX_LOG_ODDS = 30.0
+"""Logarithm of the largest ratio, so that none is infinite."""
 MIN_SIMILARITY = 1e-6
 """Similarity below which all are alike, so that its logarithm is finite."""
 TAIL = 0.4
@@ -31,7 +32,7 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
 
 
 def standard_score(similarity: float, best: Floats, sampling_weight: Array | None = None) -> float:
-    """The same of one more similarity, given the references' at their best headings: `best` (R,)."""
+    """Standardises one more similarity as `standard_scores` does, given the references' at their best headings (R,)."""
     centre, spread = _centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
     return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / spread
 
@@ -65,6 +66,12 @@ def logistic_fit(scores: Array, weights: Array, right: npt.NDArray[np.bool_]) ->
     return float(found[1]), float(-found[0] / found[1])
 
 
+def ratios_of(scores: Floats, slope: float, middle: float) -> Floats:
+    """The likelihood ratio of each score: exp(slope (z - middle))."""
+    odds: Floats = np.exp(np.clip(np.float32(slope) * (scores - np.float32(middle)), -MAX_LOG_ODDS, MAX_LOG_ODDS))
+    return odds
+
+
 def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: float, images: int) -> Floats:
     """The likelihood ratio r = exp(slope (z - middle)), saturated: (e + (1 - e) r) / (1 + (r / n)^(1 - `TAIL`)).
 
@@ -72,7 +79,7 @@ def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: floa
     it was learned on show nothing rarer than one among them: above n it grows with a `TAIL` of the slope only, by which
     the nearest of several right references still stands out.
     """
-    odds = np.exp(np.clip(np.float32(slope) * (scores - np.float32(middle)), -MAX_LOG_ODDS, MAX_LOG_ODDS))
+    odds = ratios_of(scores, slope, middle)
     above = np.power(odds / np.float32(images), np.float32(1.0 - TAIL))
     ratios: Floats = (np.float32(outliers) + np.float32(1.0 - outliers) * odds) / (np.float32(1) + above)
     return ratios

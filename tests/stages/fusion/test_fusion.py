@@ -119,7 +119,7 @@ def test_a_robot_that_stands_is_kidnapped_less_often_and_one_whose_view_breaks_o
         shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
     assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
     assert shares[2] == pytest.approx(300 * shares[1], rel=0.05)
-    assert shares[3] == pytest.approx(0.5, rel=0.01)  # at most half of the belief
+    assert shares[3] == pytest.approx(0.5, rel=0.01)  # half of the belief, at most
 
 
 def test_the_number_follows_the_cells_the_belief_fills() -> None:

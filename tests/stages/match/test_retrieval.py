@@ -152,10 +152,18 @@ def test_a_view_is_compared_with_the_one_before() -> None:
     views = histograms(30, 4, 20)
     stage, ctx, last = Retrieval(), Context("match"), LastView()
     said = []
-    for index, view in enumerate([views[0], np.roll(views[0], 1, axis=0), views[9], views[9]]):
+    for index, view in ((0, views[0]), (1, np.roll(views[0], 1, axis=0)), (2, views[9]), (3, views[9]), (5, views[9])):
         ctx.tick = Tick(index, index, first_of_log=index in (0, 3))
         said.append(stage.step(ctx, last, SegmentHistograms(view), a_map(views)).similarities.last_view)
-    assert said[0] is None
-    assert said[3] is None  # of another log
+    assert (said[0], said[3], said[4]) == (None, None, None)  # the first, of another log, and after a lost image
     assert said[1] == pytest.approx(1.0, abs=1e-6)  # turned on the spot
     assert said[2] == pytest.approx(float(normalised_intersections(views[:1], turned_views(views[9], 36)).max()))
+
+
+def test_a_window_is_not_compared_with_the_one_before_for_a_robot_may_have_turned() -> None:
+    map = a_map(histograms(30, 1, 20))
+    stage, ctx, last = Retrieval(), Context("match"), LastView()
+    for index in range(2):
+        ctx.tick = Tick(index, index)
+        seen = SegmentHistograms(map.features[2], np.zeros(1))
+        assert stage.step(ctx, last, seen, map).similarities.last_view is None

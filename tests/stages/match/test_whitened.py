@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.whitening import learned_whitening
 from omninav.stages.match.cosine import CosineMatch
@@ -51,6 +51,16 @@ def test_a_place_stands_out_from_views_that_a_network_finds_all_alike():
     white = matched(WhitenedMatch(headings=SEGMENTS), seen, map).values
     assert np.unravel_index(int(white.argmax()), white.shape) == (7, 5)
     assert np.sort(white.ravel())[-2] < 0.5 < np.sort(plain.ravel())[-2]
+
+
+@pytest.mark.parametrize("stage", [CosineMatch(headings=SEGMENTS), WhitenedMatch(headings=SEGMENTS)])
+def test_the_view_before_is_compared_as_a_reference_is(stage: CosineMatch | WhitenedMatch):
+    map, last, ctx = a_map(), LastView(), Context("match")
+    stage.setup(ctx)
+    for index, view in enumerate((map.features[4], np.roll(map.features[7], 5, axis=0))):
+        ctx.tick = Tick(index, index)
+        found = stage.step(ctx, last, SegmentDescriptors.of(view), map).similarities
+    assert found.last_view == pytest.approx(float(found.best[4]), abs=1e-5)
 
 
 def test_a_candidate_is_compared_as_in_the_whole_map():

@@ -13,7 +13,7 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.similarity import Similarities
 
 CALIBRATION = SimilarityCalibration(slope=4.0, middle=1.0, images=100, right_distance_m=0.5, correlation_m=2.0)
@@ -27,12 +27,18 @@ def similarities() -> Similarities:
     return Similarities(values)
 
 
-def weighed(poses: np.ndarray, motion: Motion | None = None, calibration: SimilarityCalibration = CALIBRATION):
+def weighed(
+    poses: np.ndarray,
+    motion: Motion | None = None,
+    calibration: SimilarityCalibration = CALIBRATION,
+    last_view: float | None = None,
+):
     particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
     stage = NearReferences(independence_distance=1.0)
     ctx = Context("sensor")
     stage.setup(ctx)
-    return stage.step(ctx, similarities(), particles, WALK, motion, LengthScale(0.5), calibration)
+    seen = replace(similarities(), last_view=last_view)
+    return stage.step(ctx, seen, particles, WALK, motion, LengthScale(0.5), calibration)
 
 
 def test_at_a_reference_the_weight_is_its_ratio_over_the_largest():
@@ -66,15 +72,36 @@ def test_a_calibration_that_says_nothing_weighs_all_places_alike():
     assert math.isfinite(float(values.sum()))
 
 
-@pytest.mark.parametrize(("last_view", "moved", "novelty", "ratio"), [
-    (0.9, 0.2, 0.1, 1.0),  # the image continues the last
-    (0.3, 0.2, 1.0, 500.0**0.9),  # it looks like any other place
-    (0.3, 2.0, 1.0, 1.0),  # after so long a way it may
-    (None, 0.2, 0.1, 1.0),  # nobody compared
+MOVED = Motion(0.2, 0.0, 0.0)
+LOGARITHMS = np.log(similarities().best.astype(float))
+EITHER = math.exp(LOGARITHMS.mean() + CALIBRATION.middle * LOGARITHMS.std())
+"""Similarity that is as likely of the same place as of another one."""
+
+
+@pytest.mark.parametrize(("last_view", "motion", "slope", "novelty", "factor"), [
+    (0.9, MOVED, 8.0, 0.1, 1.0),  # the image continues the last
+    (0.3, MOVED, 8.0, 1.0, 500.0**0.9),  # it looks like any other place
+    (EITHER, MOVED, 8.0, 0.55, 1.0),  # as likely the one as the other
+    (0.3, Motion(1.0, 0.0, 0.0), 8.0, 1.0, 500.0**0.5),  # the way explains half
+    (0.3, Motion(2.0, 0.0, 0.0), 8.0, 1.0, 1.0),  # after so long a way it may
+    (None, MOVED, 8.0, 0.1, 1.0),  # nobody compared
+    (0.3, AssumedMotion(0.2, 0.0, 0.0, 1.0, 1.0), 8.0, 0.1, 1.0),  # nobody knows how far the robot drove
+    (0.3, MOVED, 0.0, 0.1, 1.0),  # similarity says nothing of the place
 ])  # fmt: skip
 def test_a_view_that_does_not_continue_the_last_is_new_and_says_that_the_robot_was_carried(
-    last_view: float | None, moved: float, novelty: float, ratio: float
+    last_view: float | None, motion: Motion, slope: float, novelty: float, factor: float
 ):
-    seen = replace(similarities(), last_view=last_view)
-    calibration = replace(CALIBRATION, slope=8.0)
-    assert novelty_and_kidnapping(seen, calibration, moved, 2.0) == pytest.approx((novelty, ratio), rel=0.01)
+    seen, calibration = replace(similarities(), last_view=last_view), replace(CALIBRATION, slope=slope)
+    assert novelty_and_kidnapping(seen, calibration, motion, 1.0) == pytest.approx((novelty, factor), rel=0.02)
+
+
+@pytest.mark.parametrize("values", [np.zeros((20, 8)), np.full((1, 8), 0.3), np.full((20, 8), 0.3)])
+def test_similarities_that_are_all_alike_tell_of_no_kidnapping(values: np.ndarray):
+    seen = Similarities(values.astype(np.float32), last_view=0.29)
+    assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, 1.0) == (0.1, 1.0)
+
+
+@pytest.mark.parametrize(("last_view", "novelty", "factor"), [(0.9, 0.1, 1.0), (0.2, 1.0, 500.0**0.9)])
+def test_the_likelihood_says_that_the_robot_was_carried(last_view: float, novelty: float, factor: float):
+    said = weighed(PLACES, MOVED, replace(CALIBRATION, slope=8.0), last_view).likelihood
+    assert (said.novelty, said.kidnapping_factor) == pytest.approx((novelty, factor), rel=0.02)
