@@ -270,7 +270,8 @@ def test_calibrated_views_count_less_the_farther_off_they_were_taken_and_an_unkn
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(200)
     calibration = SimilarityCalibration(slope=3.0, middle=0.5, images=50, right_distance_m=0.5, correlation_m=2.0)
-    stage, particles = Visibility(distance_sigma_m=0.4), Particles(poses, np.full(200, 1 / 200))
+    stage = Visibility(distance_sigma_m=0.4, independence_distance=1.0)
+    particles = Particles(poses, np.full(200, 1 / 200))
     stage.setup(Context("sensor"))
     found = stage.step(
         Context("sensor"), Similarities(values), particles, a_map(), areas, None, LengthScale(0.4), calibration
