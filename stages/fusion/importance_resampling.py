@@ -24,8 +24,6 @@ NARROW_M = 1.0
 """Largest standard deviation of the position, metres, of a first belief that its particles stand for."""
 LEFT_OUT = 0.5
 """Probability of the places that no particle of a wider first belief covers."""
-MAX_CARRIED = 0.5
-"""Probability of a kidnapping, at most, where the image does not look like the last."""
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
@@ -46,8 +44,8 @@ class ImportanceResampling(Stage):
 
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking).
 
-    Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty x mean
-    likelihood (and x the likelihood's `kidnapping_factor`), goes to the `proposals`, poses that the view itself
+    Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty (or, if
+    that is more, the likelihood's `carried`) x mean likelihood, goes to the `proposals`, poses that the view itself
     suggests. They join the recovery particles, which are resampled among themselves by how well they fit the view, so
     that evidence for a hypothesis accumulates over images however small its weight. Once they outweigh their share they
     are resampled with all others. Weights are those of one mixture throughout; only the allocation of particles
@@ -82,7 +80,8 @@ class ImportanceResampling(Stage):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
             weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
         moved = self.kidnapping_probability * likelihood.novelty
-        moved = max(moved, min(moved * likelihood.kidnapping_factor, MAX_CARRIED))
+        if moved > 0.0:
+            moved = max(moved, likelihood.carried)
         if ctx.tick.first_of_log and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
             moved = LEFT_OUT
         if proposals is not None and likelihood.mean_likelihood is not None:

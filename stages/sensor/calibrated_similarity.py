@@ -18,6 +18,8 @@ from omninav.stages.values.similarity import Similarities
 
 OUTLIERS = 0.1
 """Share of images that their place does not explain: blocked, changed, or beside the map."""
+CARRIED = 1e-3
+"""Probability that a robot is carried between two images."""
 BROKEN = 0.002
 """Share of images that do not look like the one before although the robot was not carried: none of 3000 in twelve
 offices, two of 900 on recordings."""
@@ -32,7 +34,7 @@ def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibra
 def novelty_and_kidnapping(
     similarities: Similarities, calibration: SimilarityCalibration, motion: Motion | None, independence_distance: float
 ) -> tuple[float, float]:
-    """Gives the novelty of an image, in [0, 1], and the factor, at least 1, by which a kidnapping is likelier.
+    """Gives the novelty of an image, in [0, 1], and the probability that the robot was carried since the last one.
 
     The novelty follows from the distance driven (`evidence_novelty`), up to `independence_distance` times the
     calibration's correlation length. But where the robot has hardly moved, as odometry has measured, an image looks
@@ -43,8 +45,8 @@ def novelty_and_kidnapping(
     measured = motion is not None and not isinstance(motion, AssumedMotion | BridgedMotion)
     told = calibration.slope > 0.0 and similarities.spread > MIN_SPREAD
     if similarities.last_view is None or not measured or not told:
-        return novelty, 1.0
+        return novelty, 0.0
     score = standard_score(similarities.last_view, similarities.best, similarities.sampling_weight)
     same = float(ratios_of(np.array([score], np.float32), calibration.slope, calibration.middle)[0])
-    factor = max(1.0 / (BROKEN + (1.0 - BROKEN) * same), 1.0) ** (1.0 - novelty)
-    return novelty + (1.0 - novelty) / (1.0 + same), factor
+    carried = CARRIED / (CARRIED + BROKEN + (1.0 - BROKEN) * same)
+    return novelty + (1.0 - novelty) / (1.0 + same), (1.0 - novelty) * carried

@@ -260,14 +260,14 @@ class NearReferences(Stage):
         unit: float,
         calibration: SimilarityCalibration,
         novelty: float,
-        kidnapping: float,
+        carried: float,
     ) -> Out:
         ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
         near = self._cells.of(particles.poses)
         expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), self._fade_m(unit), 0.0)
         field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
-        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, kidnapping)
+        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, carried)
         return self.Out(likelihood=likelihood, field=field)
 
     def _expected(

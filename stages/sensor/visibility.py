@@ -109,13 +109,13 @@ class Visibility(Stage):
         window = None if panoramic else math.radians(WINDOW_DEG), sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
-        far, kidnapping = self.independence_distance, 1.0
+        far, carried = self.independence_distance, 0.0
         if calibration is None:
             driven = None if motion is None else math.hypot(motion.x, motion.y)
             novelty = evidence_novelty(driven, far * metres_of(length_scale))
         else:
-            novelty, kidnapping = novelty_and_kidnapping(similarities, calibration, motion, far)
-        likelihood = Likelihood(mean**novelty, background_level, novelty, kidnapping)
+            novelty, carried = novelty_and_kidnapping(similarities, calibration, motion, far)
+        likelihood = Likelihood(mean**novelty, background_level, novelty, carried)
         if not ctx.is_read("field"):
             return self.Out(likelihood=likelihood)
         weighed = replace(similarities, values=raised.astype(np.float32))

@@ -110,11 +110,11 @@ class Likelihood(Value):
 
     `mean_likelihood`: on the same scale, the mean over all poses of the map: what a pose drawn uniformly would get.
     None where it is not known. `novelty`: the share of the image's evidence that is new, in [0, 1]; below 1 where the
-    robot has hardly moved since the previous image. `kidnapping_factor`: at least 1, by which it is likelier than
-    usual that the robot was carried since then, as the image does not look like the last.
+    robot has hardly moved since the previous image. `carried`: probability that the robot was carried since
+    then, as the image does not look like the last.
     """
 
     values: Annotated[Array, Shape("N"), Bounds(ge=0)]
     mean_likelihood: Annotated[float | None, Bounds(ge=0)] = None
     novelty: Annotated[float, Bounds(ge=0, le=1)] = 1.0
-    kidnapping_factor: Annotated[float, Bounds(ge=1)] = 1.0
+    carried: Annotated[float, Bounds(ge=0, lt=1)] = 0.0

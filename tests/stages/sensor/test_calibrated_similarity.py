@@ -78,30 +78,32 @@ EITHER = math.exp(LOGARITHMS.mean() + CALIBRATION.middle * LOGARITHMS.std())
 """Similarity that is as likely of the same place as of another one."""
 
 
-@pytest.mark.parametrize(("last_view", "motion", "slope", "novelty", "factor"), [
-    (0.9, MOVED, 8.0, 0.1, 1.0),  # the image continues the last
-    (0.3, MOVED, 8.0, 1.0, 500.0**0.9),  # it looks like any other place
-    (EITHER, MOVED, 8.0, 0.55, 1.0),  # as likely the one as the other
-    (0.3, Motion(1.0, 0.0, 0.0), 8.0, 1.0, 500.0**0.5),  # the way explains half
-    (0.3, Motion(2.0, 0.0, 0.0), 8.0, 1.0, 1.0),  # after so long a way it may
-    (None, MOVED, 8.0, 0.1, 1.0),  # nobody compared
-    (0.3, AssumedMotion(0.2, 0.0, 0.0, 1.0, 1.0), 8.0, 0.1, 1.0),  # nobody knows how far the robot drove
-    (0.3, MOVED, 0.0, 0.1, 1.0),  # similarity says nothing of the place
+@pytest.mark.parametrize(("last_view", "motion", "slope", "novelty", "carried"), [
+    (0.9, MOVED, 8.0, 0.1, 0.0),  # the image continues the last
+    (0.2, MOVED, 8.0, 1.0, 0.3),  # it looks like any other place: 0.9 of 1e-3 against 2e-3
+    (EITHER, MOVED, 8.0, 0.55, 0.9e-3),  # as likely the one as the other
+    (0.2, Motion(1.0, 0.0, 0.0), 8.0, 1.0, 1.0 / 6.0),  # the way explains half
+    (0.2, Motion(2.0, 0.0, 0.0), 8.0, 1.0, 0.0),  # after so long a way it may
+    (None, MOVED, 8.0, 0.1, 0.0),  # nobody compared
+    (0.2, AssumedMotion(0.2, 0.0, 0.0, 1.0, 1.0), 8.0, 0.1, 0.0),  # nobody knows how far the robot drove
+    (0.2, MOVED, 0.0, 0.1, 0.0),  # similarity says nothing of the place
 ])  # fmt: skip
 def test_a_view_that_does_not_continue_the_last_is_new_and_says_that_the_robot_was_carried(
-    last_view: float | None, motion: Motion, slope: float, novelty: float, factor: float
+    last_view: float | None, motion: Motion, slope: float, novelty: float, carried: float
 ):
     seen, calibration = replace(similarities(), last_view=last_view), replace(CALIBRATION, slope=slope)
-    assert novelty_and_kidnapping(seen, calibration, motion, 1.0) == pytest.approx((novelty, factor), rel=0.02)
+    assert novelty_and_kidnapping(seen, calibration, motion, 1.0) == pytest.approx(
+        (novelty, carried), rel=0.02, abs=1e-5
+    )
 
 
 @pytest.mark.parametrize("values", [np.zeros((20, 8)), np.full((1, 8), 0.3), np.full((20, 8), 0.3)])
 def test_similarities_that_are_all_alike_tell_of_no_kidnapping(values: np.ndarray):
     seen = Similarities(values.astype(np.float32), last_view=0.29)
-    assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, 1.0) == (0.1, 1.0)
+    assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, 1.0) == (0.1, 0.0)
 
 
-@pytest.mark.parametrize(("last_view", "novelty", "factor"), [(0.9, 0.1, 1.0), (0.2, 1.0, 500.0**0.9)])
-def test_the_likelihood_says_that_the_robot_was_carried(last_view: float, novelty: float, factor: float):
+@pytest.mark.parametrize(("last_view", "novelty", "carried"), [(0.9, 0.1, 0.0), (0.2, 1.0, 0.3)])
+def test_the_likelihood_says_that_the_robot_was_carried(last_view: float, novelty: float, carried: float):
     said = weighed(PLACES, MOVED, replace(CALIBRATION, slope=8.0), last_view).likelihood
-    assert (said.novelty, said.kidnapping_factor) == pytest.approx((novelty, factor), rel=0.02)
+    assert (said.novelty, said.carried) == pytest.approx((novelty, carried), rel=0.02, abs=1e-5)
