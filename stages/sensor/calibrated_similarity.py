@@ -18,7 +18,7 @@ from omninav.stages.values.similarity import Similarities
 
 OUTLIERS = 0.1
 """Share of images that their place does not explain: blocked, changed, or beside the map."""
-CARRIED = 1e-3
+CARRIED = 1e-4
 """Probability that a robot is carried between two images."""
 BROKEN = 0.002
 """Share of images that do not look like the one before although the robot was not carried: none of 3000 in twelve

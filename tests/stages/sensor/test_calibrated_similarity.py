@@ -80,9 +80,9 @@ EITHER = math.exp(LOGARITHMS.mean() + CALIBRATION.middle * LOGARITHMS.std())
 
 @pytest.mark.parametrize(("last_view", "motion", "slope", "novelty", "carried"), [
     (0.9, MOVED, 8.0, 0.1, 0.0),  # the image continues the last
-    (0.2, MOVED, 8.0, 1.0, 0.3),  # it looks like any other place: 0.9 of 1e-3 against 2e-3
-    (EITHER, MOVED, 8.0, 0.55, 0.9e-3),  # as likely the one as the other
-    (0.2, Motion(1.0, 0.0, 0.0), 8.0, 1.0, 1.0 / 6.0),  # the way explains half
+    (0.2, MOVED, 8.0, 1.0, 0.9 / 21.0),  # it looks like any other place: 0.9 of 1e-4 against 2e-3
+    (EITHER, MOVED, 8.0, 0.55, 0.9e-4),  # as likely the one as the other
+    (0.2, Motion(1.0, 0.0, 0.0), 8.0, 1.0, 0.5 / 21.0),  # the way explains half
     (0.2, Motion(2.0, 0.0, 0.0), 8.0, 1.0, 0.0),  # after so long a way it may
     (None, MOVED, 8.0, 0.1, 0.0),  # nobody compared
     (0.2, AssumedMotion(0.2, 0.0, 0.0, 1.0, 1.0), 8.0, 0.1, 0.0),  # nobody knows how far the robot drove
@@ -103,7 +103,7 @@ def test_similarities_that_are_all_alike_tell_of_no_kidnapping(values: np.ndarra
     assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, 1.0) == (0.1, 0.0)
 
 
-@pytest.mark.parametrize(("last_view", "novelty", "carried"), [(0.9, 0.1, 0.0), (0.2, 1.0, 0.3)])
+@pytest.mark.parametrize(("last_view", "novelty", "carried"), [(0.9, 0.1, 0.0), (0.2, 1.0, 0.9 / 21.0)])
 def test_the_likelihood_says_that_the_robot_was_carried(last_view: float, novelty: float, carried: float):
     said = weighed(PLACES, MOVED, replace(CALIBRATION, slope=8.0), last_view).likelihood
     assert (said.novelty, said.carried) == pytest.approx((novelty, carried), rel=0.02, abs=1e-5)
