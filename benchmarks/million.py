@@ -30,7 +30,6 @@ from omninav.stages.candidates.index import IndexedCandidates, search_in
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
@@ -98,7 +97,7 @@ class Filter:
         belief = self.motion.step(self._at(self.motion, number), self.belief, moved, MeasuredNoise()).belief
         context = self._at(self.candidates, number)
         chosen = self.candidates.step(context, view, self.map, self.index, belief, self.scale).candidates
-        alike = self.match.step(self._at(self.match, number), LastView(), view, self.map, chosen).similarities
+        alike = self.match.step(self._at(self.match, number), view, self.map, chosen).similarities
         out = self.sensor.step(self._at(self.sensor, number), alike, belief, self.map, moved, self.scale)
         proposed = self.proposals.step(self._at(self.proposals, number), out.field, self.map, self.scale).proposals
         self.belief = self.fusion.step(self._at(self.fusion, number), belief, out.likelihood, proposed).belief
@@ -132,7 +131,7 @@ def measured(folder: Path, references: int) -> dict[str, Any]:
     stage.setup(ctx)
 
     def look_up(view: SegmentHistograms) -> Any:
-        return match.step(ctx, LastView(), view, map, stage.step(ctx, view, map, index).candidates).similarities
+        return match.step(ctx, view, map, stage.step(ctx, view, map, index).candidates).similarities
 
     look_up(looked_up.pop())  # compiled
     calls = [lambda view=view: look_up(view) for view in looked_up]

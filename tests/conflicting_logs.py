@@ -23,7 +23,6 @@ from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.features.grey_strip import GreyStrip
 from omninav.stages.features.hsv_histogram import HsvHistogram
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.monitor.map_check import CheckMap
@@ -261,7 +260,7 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
         features = describe.step(ctx, panorama=panorama).features
         watch.step(
             ctx, state, strip.step(ctx, panorama).strip, out.odometry, out.motion,
-            match.step(ctx, LastView(), features, map).similarities, map, scale, of_map,
+            match.step(ctx, features, map).similarities, map, scale, of_map,
         )  # fmt: skip
         found += [Found(number, sentence) for sentence in ctx.warnings[len(found) :]]
     return found

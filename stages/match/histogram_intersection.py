@@ -24,15 +24,15 @@ class HistogramIntersection(ReferenceMatch, Stage):
     def step(  # type: ignore[override]
         self,
         ctx: Context,
-        last: LastView,
         features: SegmentHistograms,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         words: WordSimilarities | None = None,
         length_scale: LengthScale | None = None,
+        last: LastView | None = None,
     ) -> ReferenceMatch.Out:
         """Compare one view."""
-        return super().step(ctx, last, features, map, candidates, words, length_scale)
+        return super().step(ctx, features, map, candidates, words, length_scale, last)
 
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None

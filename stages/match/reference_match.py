@@ -49,12 +49,12 @@ class ReferenceMatch(ABC):
     def step(
         self,
         ctx: Context,
-        last: LastView,
         features: SegmentFeatures,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         words: WordSimilarities | None = None,
         length_scale: LengthScale | None = None,
+        last: LastView | None = None,
     ) -> Out:
         """Compare one view; `length_scale` is for the calibration only, which knows no `words`."""
         check_same_kind(features, map)
@@ -73,7 +73,7 @@ class ReferenceMatch(ABC):
             return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
 
         weighed = words is not None and self.word_power > 0.0  # by words, which no last view has
-        of_last = None if weighed else last.similarity(ctx, features.values, of_one)
+        of_last = None if weighed or last is None else last.similarity(ctx, features.values, of_one)
         similarities = Similarities(values, *how, of_last)
         return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
 

@@ -128,11 +128,11 @@ class Retrieval(Stage):
     def step(
         self,
         ctx: Context,
-        last: LastView,
         features: SegmentHistograms,
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         length_scale: LengthScale | None = None,
+        last: LastView | None = None,
     ) -> Out:
         """Query the map with one view; `length_scale` is for the calibration only."""
         panoramic = features.directions is None
@@ -157,7 +157,7 @@ class Retrieval(Stage):
 
             headings = self.headings if map.features.shape[1] > 1 else 1
             calibration = self._calibration.of(ctx, map, of_view, length_scale)
-            of_last = last.similarity(ctx, features.values, of_one) if panoramic else None
+            of_last = last.similarity(ctx, features.values, of_one) if panoramic and last is not None else None
         weights = candidates.sampling_weight
         similarities = Similarities(values, candidates.references, weights, last_view=of_last)
         answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None

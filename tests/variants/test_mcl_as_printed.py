@@ -74,7 +74,7 @@ def test_wolf_burgard_and_burkhardt(printed):
     # Section IV: several kernels, of sizes up to twice their own; products without a root.
     assert (features.kernels, max(features.scales), features.root) == (((0.0, 1.0), (3.0, 4.0)), 2.0, False)
     # "One simply considers the different channels independently", so that 936 images take far less than 4 MB.
-    assert (features.histogram, features.bins) == ("separate", None)
+    assert (features.histogram, features.bins) == ("separate", 16)
     assert 936 * len(features.kernels) * len(features.scales) * 4 * Binning(8, joint=False).length < 0.6e6
     assert type(stages["match"]) is Retrieval
     # An ordinary camera; the mean of the samples is the estimate.

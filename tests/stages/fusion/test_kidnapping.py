@@ -12,7 +12,6 @@ from omninav.stages.candidates.reference_index import BuildReferenceIndex, Build
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
@@ -93,7 +92,7 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
         belief = motion.step(contexts["motion"], belief, moved, MeasuredNoise()).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
         chosen = candidates.step(contexts["candidates"], view, MAP, INDEX, belief, LENGTH_SCALE).candidates
-        alike = match.step(contexts["match"], LastView(), view, MAP, chosen).similarities
+        alike = match.step(contexts["match"], view, MAP, chosen).similarities
         out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, LENGTH_SCALE)
         proposed = proposals.step(contexts["proposals"], out.field, MAP, LENGTH_SCALE).proposals
         belief = fusion.step(contexts["fusion"], belief, out.likelihood, proposed).belief
@@ -133,7 +132,7 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
             ctx = Context("candidates")
             candidates.setup(ctx)
             chosen = candidates.step(ctx, view, MAP, INDEX, belief, LENGTH_SCALE).candidates
-            alike = match.step(Context("match"), LastView(), view, MAP, chosen).similarities
+            alike = match.step(Context("match"), view, MAP, chosen).similarities
             sensor = NearReferences()
             sensor.setup(ctx)
             said.append(sensor.step(ctx, alike, belief, MAP, None, LENGTH_SCALE).likelihood.mean_likelihood)

@@ -8,7 +8,6 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.features import SegmentHistograms
@@ -54,10 +53,10 @@ def test_a_large_map_is_sampled_and_the_sample_stands_for_all():
 def test_a_match_calibrates_its_map_once_and_the_same_each_time(match: SelectiveMatch | Retrieval):
     walk, view = a_walk(), SegmentHistograms(a_walk().features[7])
     ctx = Context("match")
-    first = match.step(ctx, LastView(), view, walk, length_scale=LengthScale(0.3)).calibration
+    first = match.step(ctx, view, walk, length_scale=LengthScale(0.3)).calibration
     assert first is not None
-    assert match.step(ctx, LastView(), view, walk, length_scale=LengthScale(0.3)).calibration is first
-    again = replace(match).step(Context("match"), LastView(), view, a_walk(), length_scale=LengthScale(0.3)).calibration
+    assert match.step(ctx, view, walk, length_scale=LengthScale(0.3)).calibration is first
+    again = replace(match).step(Context("match"), view, a_walk(), length_scale=LengthScale(0.3)).calibration
     assert again is not None
     assert vars(again) == vars(first)
     assert ctx.facts["similarity_calibration"]["images"] == 80
@@ -69,10 +68,7 @@ def test_nothing_is_compared_where_nobody_reads_the_calibration():
     ctx = Context("match")
     ctx.read = frozenset({"similarities"})
     walk = a_walk()
-    assert (
-        SelectiveMatch(headings=HEADINGS).step(ctx, LastView(), SegmentHistograms(walk.features[0]), walk).calibration
-        is None
-    )
+    assert SelectiveMatch(headings=HEADINGS).step(ctx, SegmentHistograms(walk.features[0]), walk).calibration is None
     assert not ctx.facts
 
 

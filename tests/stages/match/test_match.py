@@ -6,7 +6,6 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.best_match import BestMatch
 from omninav.stages.match.histogram_intersection import HistogramIntersection
 from omninav.stages.match.l2 import L2Match
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
@@ -32,7 +31,7 @@ MATCHES = [SelectiveMatch(headings=SEGMENTS), HistogramIntersection(headings=SEG
 def test_the_place_and_the_turn_are_found(match: SelectiveMatch) -> None:
     map, turn = a_map(), 5
     seen = SegmentHistograms(np.roll(map.features[7], turn, axis=0))
-    similarities = match.step(Context("match"), LastView(), seen, map).similarities
+    similarities = match.step(Context("match"), seen, map).similarities
     assert np.unravel_index(int(np.argmax(similarities.values)), similarities.values.shape) == (7, turn)
     best = BestMatch().step(Context("fusion"), similarities, map).belief
     assert best is not None
@@ -45,7 +44,7 @@ def test_the_place_and_the_turn_are_found(match: SelectiveMatch) -> None:
 def test_the_same_view_gives_the_same_bytes(match: SelectiveMatch) -> None:
     map = a_map()
     seen = SegmentHistograms(map.features[3])
-    one, other = (match.step(Context("match"), LastView(), seen, map).similarities.values for _ in range(2))
+    one, other = (match.step(Context("match"), seen, map).similarities.values for _ in range(2))
     assert one.tobytes() == other.tobytes()
     assert one.dtype == np.float32
 
@@ -54,10 +53,8 @@ def test_the_same_view_gives_the_same_bytes(match: SelectiveMatch) -> None:
 def test_a_candidate_is_compared_as_in_the_whole_map(match: SelectiveMatch) -> None:
     map = a_map(200)
     seen, chosen = SegmentHistograms(map.features[80]), np.array([3, 80, 199])
-    some = match.step(
-        Context("match"), LastView(), seen, map, Candidates(chosen, np.array([1.0, 1.0, 198.0]))
-    ).similarities
-    all_ = match.step(Context("match"), LastView(), seen, map).similarities
+    some = match.step(Context("match"), seen, map, Candidates(chosen, np.array([1.0, 1.0, 198.0]))).similarities
+    all_ = match.step(Context("match"), seen, map).similarities
     np.testing.assert_allclose(some.values, all_.values[chosen], atol=1e-6)
     assert np.array_equal(some.candidates, chosen)
     assert some.sampling_weight is not None
@@ -67,7 +64,7 @@ def test_a_candidate_is_compared_as_in_the_whole_map(match: SelectiveMatch) -> N
 def test_a_map_of_other_features_is_refused_in_one_line() -> None:
     seen = SegmentColours(np.zeros((SEGMENTS, 3), np.float32))
     with pytest.raises(BadInput, match="its views are histograms of 12 segments x 20 bins") as refused:
-        SelectiveMatch().step(Context("match"), LastView(), seen, a_map())
+        SelectiveMatch().step(Context("match"), seen, a_map())
     assert "\n" not in str(refused.value)
 
 
@@ -84,7 +81,7 @@ def test_visual_words_are_a_factor_of_each_reference() -> None:
     features = np.random.default_rng(0).dirichlet(np.ones(20), (3, 12)).astype(np.float32)
     map = ReferenceGraph(np.zeros((3, 3)), features, "histograms", np.zeros((0, 2), np.int64), "truth")
     words = WordSimilarities(np.array([1.0, 0.25, 0.04], np.float32))
-    given = Context("match"), LastView(), SegmentHistograms(features[1]), map, Candidates(np.array([0, 2]), np.ones(2))
+    given = Context("match"), SegmentHistograms(features[1]), map, Candidates(np.array([0, 2]), np.ones(2))
     plain = HistogramIntersection().step(*given).similarities.values
     both = HistogramIntersection(word_power=0.5).step(*given, words).similarities.values
     assert both == pytest.approx(plain * [[1.0], [0.2]])

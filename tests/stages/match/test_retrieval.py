@@ -59,11 +59,7 @@ def test_all_segments_scales_and_turns_are_as_in_plain_numpy(segments: int, scal
 
 def test_of_whole_histograms_it_is_the_plain_intersection() -> None:
     references, view = histograms(15, 12, 20), histograms(12, 20, seed=2)
-    values = (
-        Retrieval(headings=12)
-        .step(Context("match"), LastView(), SegmentHistograms(view), a_map(references))
-        .similarities
-    )
+    values = Retrieval(headings=12).step(Context("match"), SegmentHistograms(view), a_map(references)).similarities
     expected = similarities(references, view, 12, True, False)
     assert np.allclose(values.values, expected, atol=1e-6)
 
@@ -71,7 +67,7 @@ def test_of_whole_histograms_it_is_the_plain_intersection() -> None:
 def test_the_place_and_the_turn_are_found_and_answered_first() -> None:
     map = a_map(histograms(40, 8, 64))
     seen = SegmentHistograms(np.roll(map.features[7], 3, axis=0))
-    out = Retrieval(headings=8).step(Context("match"), LastView(), seen, map)
+    out = Retrieval(headings=8).step(Context("match"), seen, map)
     assert out.answers is not None
     assert len(out.answers.references) == 9
     assert out.answers.references[0] == 7
@@ -89,7 +85,7 @@ def test_equal_answers_come_in_the_order_of_the_map_and_name_its_references() ->
 
 def test_a_single_picture_has_one_heading() -> None:
     map = a_map(histograms(5, 1, 64))
-    out = Retrieval().step(Context("match"), LastView(), SegmentHistograms(map.features[2], np.zeros(1)), map)
+    out = Retrieval().step(Context("match"), SegmentHistograms(map.features[2], np.zeros(1)), map)
     assert out.similarities.values.shape == (5, 1)
     assert out.similarities.values[2, 0] == pytest.approx(1.0)
 
@@ -103,9 +99,7 @@ def test_each_window_looks_where_the_reference_does_if_the_robot_is_turned() -> 
     map = a_map(histograms(6, 1, 64))
     view = histograms(4, 64, seed=3)
     view[1] = map.features[5, 0]
-    values = (
-        Retrieval().step(Context("match"), LastView(), SegmentHistograms(view, directions), map).similarities.values
-    )
+    values = Retrieval().step(Context("match"), SegmentHistograms(view, directions), map).similarities.values
     assert np.unravel_index(int(np.argmax(values)), values.shape) == (5, 3)
 
 
@@ -118,24 +112,22 @@ def test_windows_that_do_not_go_around_the_robot_are_refused() -> None:
 def test_a_query_that_holds_nothing_is_like_nothing() -> None:
     map = a_map(histograms(4, 2, 16))
     nothing = SegmentHistograms(np.zeros((2, 16), np.float32))
-    assert (Retrieval(headings=4).step(Context("match"), LastView(), nothing, map).similarities.values == 0).all()
+    assert (Retrieval(headings=4).step(Context("match"), nothing, map).similarities.values == 0).all()
 
 
 def test_a_map_of_other_features_is_refused() -> None:
     map = a_map(histograms(4, 8, 64))
     with pytest.raises(BadInput, match=r"8 segments x 64 bins, the current one is histograms of 8 x 32"):
-        Retrieval().step(Context("match"), LastView(), SegmentHistograms(histograms(8, 32)), map)
+        Retrieval().step(Context("match"), SegmentHistograms(histograms(8, 32)), map)
     with pytest.raises(BadInput, match=r"8 segments x 64 bins, the current one is histograms of 1 x 64"):
-        Retrieval().step(
-            Context("match"), LastView(), SegmentHistograms(histograms(2, 64), np.array([0.0, math.pi])), map
-        )
+        Retrieval().step(Context("match"), SegmentHistograms(histograms(2, 64), np.array([0.0, math.pi])), map)
     colours = ReferenceGraph(np.zeros((1, 3)), np.zeros((1, 8, 3), np.float32), "colours", np.zeros((0, 2)), "truth")
     with pytest.raises(BadInput, match="colours"):
-        Retrieval().step(Context("match"), LastView(), SegmentHistograms(np.full((8, 3), 0.2, np.float32)), colours)
+        Retrieval().step(Context("match"), SegmentHistograms(np.full((8, 3), 0.2, np.float32)), colours)
 
 
 def test_an_empty_map_has_no_answers() -> None:
-    out = Retrieval().step(Context("match"), LastView(), SegmentHistograms(histograms(8, 64)), ReferenceGraph.empty())
+    out = Retrieval().step(Context("match"), SegmentHistograms(histograms(8, 64)), ReferenceGraph.empty())
     assert out.similarities.values.shape == (0, 36)
     assert out.answers is None
 
@@ -143,7 +135,7 @@ def test_an_empty_map_has_no_answers() -> None:
 def test_the_same_view_gives_the_same_bytes() -> None:
     map = a_map(histograms(9, 8, 64))
     seen = SegmentHistograms(map.features[3])
-    one, other = (Retrieval().step(Context("match"), LastView(), seen, map).similarities.values for _ in range(2))
+    one, other = (Retrieval().step(Context("match"), seen, map).similarities.values for _ in range(2))
     assert one.tobytes() == other.tobytes()
     assert one.dtype == np.float32
 
@@ -154,7 +146,7 @@ def test_a_view_is_compared_with_the_one_before() -> None:
     said = []
     for index, view in ((0, views[0]), (1, np.roll(views[0], 1, axis=0)), (2, views[9]), (3, views[9]), (5, views[9])):
         ctx.tick = Tick(index, index, first_of_log=index in (0, 3))
-        said.append(stage.step(ctx, last, SegmentHistograms(view), a_map(views)).similarities.last_view)
+        said.append(stage.step(ctx, SegmentHistograms(view), a_map(views), last=last).similarities.last_view)
     assert (said[0], said[3], said[4]) == (None, None, None)  # the first, of another log, and after a lost image
     assert said[1] == pytest.approx(1.0, abs=1e-6)  # turned on the spot
     assert said[2] == pytest.approx(float(normalised_intersections(views[:1], turned_views(views[9], 36)).max()))
@@ -166,4 +158,4 @@ def test_a_window_is_not_compared_with_the_one_before_for_a_robot_may_have_turne
     for index in range(2):
         ctx.tick = Tick(index, index)
         seen = SegmentHistograms(map.features[2], np.zeros(1))
-        assert stage.step(ctx, last, seen, map).similarities.last_view is None
+        assert stage.step(ctx, seen, map, last=last).similarities.last_view is None

@@ -34,7 +34,7 @@ def a_map(number: int = 30) -> ReferenceGraph:
 
 def matched(stage: CosineMatch | WhitenedMatch, view: np.ndarray, map: ReferenceGraph, **more: Any) -> Similarities:
     stage.setup(Context("match"))
-    return stage.step(Context("match"), LastView(), SegmentDescriptors.of(view), map, **more).similarities
+    return stage.step(Context("match"), SegmentDescriptors.of(view), map, **more).similarities
 
 
 def test_whitened_vectors_have_equal_variances_and_no_mean():
@@ -59,7 +59,7 @@ def test_the_view_before_is_compared_as_a_reference_is(stage: CosineMatch | Whit
     stage.setup(ctx)
     for index, view in enumerate((map.features[4], np.roll(map.features[7], 5, axis=0))):
         ctx.tick = Tick(index, index)
-        found = stage.step(ctx, last, SegmentDescriptors.of(view), map).similarities
+        found = stage.step(ctx, SegmentDescriptors.of(view), map, last=last).similarities
     assert found.last_view == pytest.approx(float(found.best[4]), abs=1e-5)
 
 
@@ -75,7 +75,7 @@ def test_a_map_that_has_grown_is_learned_again():
     before = matched(stage, late, map).values
     for view in views(5, seed=3):
         map.insert(Pose(0.0, 0.0, 0.0), view, "descriptors")
-    after = stage.step(Context("match"), LastView(), SegmentDescriptors.of(late), map).similarities.values
+    after = stage.step(Context("match"), SegmentDescriptors.of(late), map).similarities.values
     assert after.shape == (9, 36)
     assert int(after.argmax()) // 36 == 8
     assert not np.allclose(after[:4], before)
@@ -90,4 +90,4 @@ def test_an_empty_map_has_no_similarities():
 def test_other_features_than_the_maps_are_refused():
     colours = SegmentColours(np.zeros((SEGMENTS, 3), np.float32))
     with pytest.raises(BadInput, match="its views are descriptors"):
-        WhitenedMatch().step(Context("match"), LastView(), colours, a_map())
+        WhitenedMatch().step(Context("match"), colours, a_map())

@@ -10,7 +10,6 @@ from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import contrast_power
 from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.l2 import L2Match
-from omninav.stages.match.last_view import LastView
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
 from omninav.stages.sensor.near_references import NearReferences
@@ -71,7 +70,7 @@ def test_the_particle_where_the_view_was_taken_wins() -> None:
 def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L2Match) -> None:
     colours = (RNG.random((40, 9, 3)) * 60).astype(np.float32)
     map, seen = ReferenceGraph(REFERENCES, colours, "colours", np.zeros((0, 2), np.int64), "truth"), colours[4] + 5
-    alike = match.step(Context("match"), LastView(), SegmentColours(seen), map).similarities
+    alike = match.step(Context("match"), SegmentColours(seen), map).similarities
     stage, ctx = ExpectedObservation(power=5.0), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     belief = Particles(REFERENCES, np.full(40, 1 / 40))
@@ -124,7 +123,7 @@ def test_whatever_compares_otherwise_is_refused() -> None:
     stage, ctx = ExpectedObservation(), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     seen, belief = SegmentHistograms(FEATURES[4]), Particles(REFERENCES, np.full(40, 1 / 40))
-    alike = CosineMatch().step(Context("match"), LastView(), seen, map).similarities
+    alike = CosineMatch().step(Context("match"), seen, map).similarities
     with pytest.raises(BadInput, match="use match=selective"):
         stage.step(ctx, alike, seen, belief, map)
 
