@@ -21,8 +21,8 @@ OUTLIERS = 0.1
 CARRIED = 1e-4
 """Probability that a robot is carried between two images."""
 BROKEN = 0.002
-"""Share of images that do not look like the one before although the robot was not carried: none of 3000 in twelve
-offices, two of 900 on recordings."""
+"""Share of images that do not look like the one before although the robot was not carried: two of 1800 in seven
+offices, three of 600 on recordings."""
 
 
 def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibration) -> npt.NDArray[np.float32]:
