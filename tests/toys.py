@@ -218,14 +218,30 @@ class Fail(Stage):
     """Raises at a tick."""
 
     at: int = 3
+    early: bool = False
+    """Whether it raises before the first tick."""
 
     class Out(Outputs):
         number: Number
+
+    def setup(self, ctx: Context) -> None:
+        if self.early:
+            raise RuntimeError("there is no wheel")
 
     def step(self, ctx: Context, number: Number) -> Out:
         if ctx.tick.index == self.at:
             raise RuntimeError("the wheel fell off")
         return self.Out(number=number)
+
+
+class Misgive(Stage):
+    """Gives a mapping in place of its outputs."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return {"number": number}  # type: ignore[return-value]
 
 
 class Latest(Stage):

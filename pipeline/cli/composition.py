@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from hydra.core.config_store import ConfigStore
 from hydra.errors import HydraException
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from omninav.pipeline.graph.ports import convert_fields
@@ -24,7 +24,7 @@ from omninav.pipeline.run.inputs import not_taken, read_inputs
 
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
 from .composition_cache import compose
-from .config_groups import listed_groups, replaced, settings_left_open
+from .config_groups import config_file, listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .stand_ins import contradictions, take_stand_ins
@@ -34,6 +34,8 @@ OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """Keys that a variant's file sets; everything else in a configuration is a setting."""
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
+OF_OTHERS = ("experiment", "hydra")
+"""Blocks that are read before the graph is made."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 
@@ -87,13 +89,14 @@ def complete(config: Any) -> dict[str, Any]:
     An artifact's graph is its variant's, under this run's settings but for those that the artifact sets, and with the
     nodes that it inherits. Settings that nothing reads are left out.
     """
+    _refuse_no_mappings(config)
     try:
         _name_past_links(config)
         take_stand_ins(config)
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
         problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
-        problems += contradictions(config)
+        problems += [*contradictions(config), *_unknown_settings(config, plain)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
             if spec.variant is not None:
@@ -124,6 +127,24 @@ def complete(config: Any) -> dict[str, Any]:
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
     read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
     return _without_unset({name: value for name, value in plain.items() if name in read})
+
+
+def _refuse_no_mappings(config: Any) -> None:
+    """Raise `ProblemsFound` where a part of the graph is no mapping of names."""
+    parts = {part: config.get(part) for part in ("nodes", "wires", "artifacts")}
+    wrong = [part for part, given in parts.items() if not isinstance(given, DictConfig | None)]
+    if wrong:
+        hint = "write names and what each is below it"
+        raise ProblemsFound([Problem(part, f"expected a mapping, found {parts[part]!r:.60}", hint) for part in wrong])
+
+
+def _unknown_settings(config: Any, plain: Mapping[str, Any]) -> Iterator[Problem]:
+    """A problem for each setting of a variant's file, or that was typed, which neither omninav nor the graph has."""
+    groups = {item for entry in config_file()["defaults"] if isinstance(entry, Mapping) for item in entry}
+    known = {*config_file(), *groups, *OF_OTHERS, *OF_THE_VARIANT, *read_inputs(plain), *settings_read(config)}
+    for name in config:
+        if name not in known:
+            yield Problem(str(name), "there is no such setting", suggest(str(name), known, "settings"))
 
 
 def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:

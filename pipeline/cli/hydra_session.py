@@ -5,6 +5,7 @@ import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from omegaconf import MISSING, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from hydra_plugins.omninav_launcher import OmninavLauncher
-from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
 from omninav.pipeline.graph.registry import Entry, plugins
 
 from .artifact_graph import learned, words_of_artifact, words_of_variant
@@ -71,6 +72,7 @@ def _finding_own(offered: tuple[Entry, ...]) -> Any:
 
 
 def _finding_in(folders: Sequence[str]) -> Any:
+    _refuse_hidden(folders)
     for plugin in (OwnFiles, CheckedFolder, _SearchPath, OmninavLauncher):
         Plugins.instance().register(plugin)
     _SearchPath.folders = [str(Path(folder).absolute()) for folder in folders]
@@ -81,6 +83,16 @@ def _finding_in(folders: Sequence[str]) -> Any:
     started: Any = GlobalHydra.instance().hydra
     started.config_loader = CheckedLoader(started.config_loader)
     return started
+
+
+def _refuse_hidden(folders: Sequence[str]) -> None:
+    """Raise `BadInput` for an option in `folders` that omninav has too, whose file Hydra would read in its place."""
+    own = Path(str(files(CONF)))
+    for option in sorted(own.glob("*/**/*.yaml")) if folders else ():
+        for folder in folders:
+            file = Path(folder) / option.relative_to(own)
+            if file.is_file() and not file.samefile(option):
+                raise BadInput(f"{file}: omninav has a file of this name, and would read its own; rename yours")
 
 
 class _SearchPath(SearchPathPlugin):

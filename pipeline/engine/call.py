@@ -10,7 +10,7 @@ from omninav.pipeline.files import DISK
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.graph import Node, Wire
 from omninav.pipeline.graph.problems import BadInput, one_line
-from omninav.pipeline.graph.stage import Context, State
+from omninav.pipeline.graph.stage import Context, Outputs, State
 
 from .channel import channel_key, held_key
 
@@ -46,6 +46,15 @@ class Call:
             self.inputs.append((wire.to_port, key, instead, port.optional))
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
+    def set_up(self) -> None:
+        """Set up the stage. Raises `StageFailed` with its name for whatever it raises, but `BadInput`."""
+        try:
+            self.node.stage.setup(self.ctx)
+        except BadInput:
+            raise
+        except Exception as error:
+            raise self._failed(error) from error
+
     def run(self, values: dict[str, Any]) -> bool:
         """Run the stage on the values of this tick and put its outputs there. False where a source has ended."""
         given = dict(self.fixed)
@@ -67,10 +76,10 @@ class Call:
         except BadInput:
             raise
         except Exception as error:
-            if isinstance(error, OSError) and error.errno in DISK:
-                raise BadInput(f"{self._message(error)}; free some of it") from error
-            raise StageFailed(self._message(error)) from error
+            raise self._failed(error) from error
         self.times.append(time.perf_counter() - start)
+        if self.outputs and out is not None and not isinstance(out, Outputs):
+            raise StageFailed(f"{self._place()}: step gave a value of type {type(out).__name__}, expected its Out")
         for name, origin in self.outputs:
             values[origin] = getattr(out, name) if out is not None else None
         if self.to_check > 0 and out is not None:
@@ -85,8 +94,12 @@ class Call:
             if wrong is not None:
                 raise StageFailed(one_line(f"{self._place()}: its output '{name}' {wrong}"))
 
-    def _message(self, error: Exception) -> str:
-        return f"{self._place()}: {type(error).__name__}: {error}"
+    def _failed(self, error: Exception) -> Exception:
+        """The error that says which stage failed, and when."""
+        message = f"{self._place()}: {type(error).__name__}: {error}"
+        if isinstance(error, OSError) and error.errno in DISK:
+            return BadInput(f"{message}; free some of it")
+        return StageFailed(message)
 
     def _place(self) -> str:
         tick = self.ctx.tick

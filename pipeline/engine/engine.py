@@ -152,7 +152,7 @@ class Engine:
         replayed = self.replay.nodes if self.replay is not None else frozenset()
         for name, call in self.calls.items():
             if name not in replayed:
-                call.node.stage.setup(call.ctx)
+                call.set_up()
         for node in self.graph.of_lifetime("before"):
             if node.name not in replayed and node.name not in self._given:
                 self.calls[node.name].run(self.values)
@@ -177,7 +177,7 @@ class Engine:
         """Set up the source alone: what it says of its inputs and of who reads them, it says now. Raises `BadInput`."""
         source = self.source
         if source is not None and isinstance(source.stage, Source) and source.stage.repeatable:
-            source.stage.setup(self.calls[source.name].ctx)
+            self.calls[source.name].set_up()
 
     def tick(self) -> bool:
         """One turn of the loop. False where there is none: the source has ended."""

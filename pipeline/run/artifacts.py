@@ -168,7 +168,8 @@ def _make(
         keep_prefix(engine, prefix, execution.cache)
     if not isinstance(values[artifact.origin], Value):
         raise BadInput(
-            f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
+            f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log, "
+            "and does the step of each stage of yours return its outputs?"
         )
     for each in wanted:
         value = values[each.origin]

@@ -38,7 +38,11 @@ def open_recording(
     formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):
-        return _with_whole_camera(meant.open(log, options))
+        recording = _with_whole_camera(meant.open(log, options))
+        if len(recording.stamps) and recording.stamps[0] < 0:
+            first = f"its first image is of {recording.stamps[0] / 1e9:.3f} s"
+            raise UnreadableRecording(f"{log}: {first}, expected times from 0 on; add a constant to all")
+        return recording
     kinds = "; ".join(one.names for one in formats)
     if path.is_dir():
         hints = "; ".join(filter(None, (one.hint(log, options) for one in formats)))

@@ -234,20 +234,20 @@ def text_lines(path: Path, newline: str | None = None) -> Iterator[str]:
 
 
 def _csv_rows(path: Path, delimiter: Delimiter) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a CSV file, and the line on which each ends; a row may be of several lines, if not of many."""
-    read = 0
+    """The rows of a CSV file, and their lines. Raises `BadInput` where a stray quote makes one row of several lines."""
+    inside = False
 
     def lines() -> Iterator[str]:
-        nonlocal read
-        for line in text_lines(path, newline=""):
-            read += len(line)
-            if read > MAX_ROW:
-                raise UnreadableRecording(f"{path}, line {reader.line_num + 1}: {_TOO_LONG}")
+        nonlocal inside
+        for number, line in enumerate(text_lines(path, newline=""), 1):
+            if inside:
+                raise UnreadableRecording(f"{path}, line {number - 1}: a quote is opened and not closed on this line")
+            inside = True
             yield line
 
     reader = csv.reader(lines(), delimiter=delimiter, skipinitialspace=True)
     for row in reader:
-        read = 0
+        inside = False
         yield reader.line_num, row
 
 

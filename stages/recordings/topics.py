@@ -1,7 +1,6 @@
 """A recording out of ROS topics, whatever file they came from: frames, odometry and truth at the frames' stamps."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -90,10 +89,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         return lambda: pixels_of(message)
 
     def size() -> tuple[int, int]:
-        for frame in range(len(frames)):
-            with suppress(Undecodable, BadMessage):
-                return (pixels := fetch_image(frame)()).shape[1], pixels.shape[0]
-        raise UnreadableRecording(f"{name}: not one of its {len(frames)} images can be decoded")
+        return _first_size(name, len(frames), fetch_image)
 
     view, camera_files = find_camera(name, feed, options.camera, size, files, infos)
     recording = TopicRecording(
@@ -258,16 +254,23 @@ def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDA
 
 def _check_size(recording: TopicRecording, fetch_image: Callable[[int], Callable[[], Pixels]]) -> None:
     """Refuse a camera that does not belong to the images, by the first image that can be decoded."""
-    for frame in range(len(recording.stamps)):
+    width, height = _first_size(recording.name, len(recording.stamps), fetch_image)
+    camera = recording.camera
+    if (height, width) != (camera.height_px, camera.width):
+        raise UnreadableRecording(
+            f"{recording.name}: its images are {width} x {height}, but its camera says "
+            f"{camera.width} x {camera.height_px}; give camera=PATH/camera.yaml"
+        )
+
+
+def _first_size(name: str, number: int, fetch_image: Callable[[int], Callable[[], Pixels]]) -> tuple[int, int]:
+    """Width and height of the first of a log's images that can be decoded. Raises `UnreadableRecording`."""
+    reason = ""
+    for frame in range(number):
         try:
             height, width = fetch_image(frame)().shape[:2]
-        except (BadMessage, Undecodable):
-            continue
-        camera = recording.camera
-        if (height, width) != (camera.height_px, camera.width):
-            raise UnreadableRecording(
-                f"{recording.name}: its images are {width} x {height}, but its camera says "
-                f"{camera.width} x {camera.height_px}; give camera=PATH/camera.yaml"
-            )
-        return
-    raise UnreadableRecording(f"{recording.name}: not one of its {len(recording.stamps)} images can be decoded")
+        except (BadMessage, Undecodable) as error:
+            reason = reason or f": {error}"
+        else:
+            return width, height
+    raise UnreadableRecording(f"{name}: not one of its {number} images can be decoded{reason}")

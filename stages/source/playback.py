@@ -186,9 +186,11 @@ class Playback(Source, ABC):
     @property
     def _truth_file(self) -> Path | None:
         """The file of true poses; None where they come from a topic."""
-        if self.truth is None or (self.truth.startswith("/") and not Path(self.truth).exists()):
+        if self.truth is None:
             return None
-        return user_path(self.truth)
+        path = Path(self.truth)
+        topic = self.truth.startswith("/") and not path.suffix and not path.exists()
+        return None if topic else user_path(self.truth)
 
     def _guesses(self) -> bool:
         """Tells that motion is guessed where none is measured, though positions may be known."""

@@ -200,6 +200,8 @@ def _writer(out: Path, rate: float, size: tuple[int, int]) -> Iterator[cv2.Video
             raise BadInput(f"out: {out} cannot be written; may you write to its folder, or type out=video.mp4")
         yield writer
         writer.release()
+        if not cv2.VideoCapture(str(part)).isOpened():  # OpenCV's writer says nothing of a full disk
+            raise BadInput(f"out: {out} could not be written whole; is there space left?")
         os.replace(part, out)
     finally:
         writer.release()

@@ -46,6 +46,8 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["cammera", "look"], "did you mean 'omninav camera'?"),
         (["log=a.mcap", "log=b.mcap"], "log: a.mcap and b.mcap are typed; leave one of them out (both, where it takes"),
         (["variant=omninav", "variant=wander"], "variant: omninav and wander are typed; leave one of them out"),
+        (["check", "+seeed=0"], "seeed: there is no such setting\n      did you mean 'seed'?"),
+        (["check", "nodes=abc"], "nodes: expected a mapping, found 'abc'"),
         (["check", "seed=0,1"], "type 'seed=[0,1]' for a list, or omninav -m seed=0,1 … for a run with each"),
         (["check", "seed=range(3)"], "seed: 'range(3)' are several values\n      type omninav -m seed=range(3) …"),
         (["log=nothere.mcap"], "  nothere.mcap: no such file"),
@@ -114,6 +116,12 @@ def test_config_dir_stands_before_or_behind_every_command(folder: str, capsys: p
     listed = capsys.readouterr().out
     assert "\nmine " in listed
     assert "\nomniview_mcl " in listed
+
+
+def test_ones_own_file_with_the_name_of_a_built_in_one_is_refused(folder: str, capsys) -> None:
+    own = Path(folder) / "variant" / "omniview_mcl.yaml"
+    own.write_text("# @package _global_\ndefaults: [plain_matching, _self_]\nvariant: omniview_mcl\n")
+    assert f"{own}: omninav has a file of this name" in said(capsys, "check", f"--config-dir={folder}", "variant=mine")
 
 
 @pytest.mark.parametrize(

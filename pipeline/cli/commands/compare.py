@@ -1,6 +1,5 @@
 """`omninav compare`: several runs side by side."""
 
-import json
 from pathlib import Path
 
 from omninav.pipeline.cli.terminal import show
@@ -19,7 +18,7 @@ def command(arguments: list[str]) -> int:
         folder = Path(word)
         metrics = read_metrics(folder)
         config = read_yaml(folder / "config.yaml")
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        manifest = read_yaml(folder / "manifest.json")
         runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
     show(compare_table(runs))
     return 0

@@ -21,7 +21,8 @@ def command(arguments: list[str]) -> int:
     flags = read_flags(arguments)
     arguments, own = flags.overrides, Path(flags.config_dir) if flags.config_dir else None
     found = [*group_files("variant"), *(sorted((own / "variant").glob("*.yaml")) if own else ())]
-    summaries = {file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in found}
+    texts = {file.name.removesuffix(".yaml"): file.read_bytes().decode("utf-8", "replace") for file in found}
+    summaries = {name: _summary(text) for name, text in texts.items()}
     for word in arguments:
         if word not in summaries:
             raise BadInput(

@@ -143,6 +143,19 @@ def test_a_failing_stage_is_named_with_the_tick(tmp_path: Path):
         numbers(graph, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("stage", "said"),
+    [
+        ({"_target_": "Fail", "early": True}, r"\(toys.Fail\) failed at tick 0 .*: RuntimeError: there is no wheel"),
+        ("Misgive", r"\(toys.Misgive\) failed at tick 0 .*: step gave a value of type dict, expected its Out"),
+    ],
+)
+def test_a_stage_that_cannot_be_set_up_or_gives_something_else_is_named(tmp_path: Path, stage, said: str):
+    graph = graph_of({**SUM, "sum": stage}, {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]})
+    with pytest.raises(StageFailed, match=f"stage 'sum' {said}"):
+        numbers(graph, tmp_path)
+
+
 FULL = {
     "source": {"_target_": "Count", "length_": 40, "gap": 7},
     "start": {"_target_": "Constant", "value": 5.0},

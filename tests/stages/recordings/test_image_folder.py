@@ -71,6 +71,20 @@ def test_columns_units_clock_and_heading_conventions_are_configuration(tmp_path:
     assert recording.image(0).shape == (4, 16, 3)
 
 
+def test_a_quote_that_is_not_closed_is_refused_with_its_line(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("p2.png, 200", 'p2.png, 200, "'))
+    with pytest.raises(UnreadableRecording, match=r"frames\.csv, line 4: a quote is opened and not closed"):
+        open_recording(str(path))
+
+
+def test_times_before_zero_are_refused(tmp_path: Path) -> None:
+    path = folder(tmp_path, DESCRIPTION.replace("clock_offset: 10.0", "clock_offset: 10.5"))
+    (path / "frames.csv").write_text("\n".join(["File,Clock", *(f"p{n}.png,{100 * n - 500}" for n in range(6))]))
+    with pytest.raises(UnreadableRecording, match=r"its first image is of -0\.\d+ s, expected times from 0 on"):
+        open_recording(str(path))
+
+
 def test_a_position_that_no_robot_reaches_is_dropped_and_counted(tmp_path: Path) -> None:
     path = folder(tmp_path)
     (path / "track.csv").write_text((path / "track.csv").read_text().replace("10.25;2;", "10.25;900;"))
