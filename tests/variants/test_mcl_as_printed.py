@@ -40,7 +40,7 @@ def test_gross_and_koenig(printed):
     assert type(match) is SelectiveMatch
     assert (match.penalty, HUE_BINS, stages["features"].value_bins) == ("sqrt", 16, 4)
     # The weight is a fixed power of S: no contrast of the image's own, no fade with distance, no floor.
-    assert (sensor.power, sensor.fade_distance, sensor.background_quantile) == (4.0, None, None)
+    assert (sensor.power, sensor.fade_distance, sensor.background_quantile) == (8.0, None, None)
     # Each image is evidence.
     assert sensor.independence_distance == 0.0
     # Sampling, importance weights, resampling at each image; no particle comes from anywhere else.
