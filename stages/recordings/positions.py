@@ -52,14 +52,16 @@ def frame_poses(
         track_times = own.nanoseconds(positions.time)
     known = np.flatnonzero((track_times != NO_TIME) & np.isfinite(x + y))
     rows = known[ascending_rows(track_times[known])]
-    stamps = track_times[rows]
+    stamps, ascending = track_times[rows], len(rows)
     likely = np.arange(len(rows))
     if own is not None or description.frames.time is not None:  # else nothing says how fast the robot was
         likely = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits).rows
     said = [f"{table.path.name}: row {row}: no robot gets to its position" for row in np.delete(rows, likely)]
     rows, stamps = rows[likely], stamps[likely]
     if len(rows) < 2:
-        raise UnreadableRecording(f"{table.path}: fewer than two rows with a position")
+        why = f"{np.sum(track_times == NO_TIME)} have no time, {np.sum(~np.isfinite(x + y))} no number for x or y"
+        why += f", {len(known) - ascending} a time that is not above the one before"
+        raise UnreadableRecording(f"{table.path}: fewer than two of its {len(x)} rows have a position: {why}")
     track = np.column_stack([x[rows], y[rows], headings(description, table, rows, stamps, x[rows], y[rows])])
     poses = np.full((len(times), 3), np.nan)
     if own is None:

@@ -127,6 +127,9 @@ class CsvTable:
         if column not in self.names:
             near = nearest(column, self.names)
             hint = f"did you mean '{near:.60}'? " if near else ""
+            between = next((sign for sign in ";\t|" if len(self.names) == 1 and sign in self.names[0]), None)
+            if between is not None:
+                hint = f"write delimiter: {json.dumps(between)} beside csv: if that divides them; "
             known = ", ".join(f"{name:.60}" for name in self.names)
             raise UnreadableRecording(f"{self.path}: no column '{column:.60}'; {hint}columns: {known:.300}")
         return self.names.index(column)

@@ -78,6 +78,20 @@ def test_a_quote_that_is_not_closed_is_refused_with_its_line(tmp_path: Path) -> 
         open_recording(str(path))
 
 
+def test_a_delimiter_that_is_not_stated_is_suggested(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace(" , ", ";").replace(", ", ";"))
+    with pytest.raises(UnreadableRecording, match=r"no column 'File'; write delimiter: \";\" beside csv:"):
+        open_recording(str(path))
+
+
+def test_why_no_row_has_a_position_is_counted(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "track.csv").write_text("10;1;1;0\n10;2;1;0\nnoon;3;1;0\n11;north;1;0")
+    with pytest.raises(UnreadableRecording, match=r"its 4 rows have a position: 1 have no time, 1 no number .*, 1 a"):
+        open_recording(str(path))
+
+
 def test_times_before_zero_are_refused(tmp_path: Path) -> None:
     path = folder(tmp_path, DESCRIPTION.replace("clock_offset: 10.0", "clock_offset: 10.5"))
     (path / "frames.csv").write_text("\n".join(["File,Clock", *(f"p{n}.png,{100 * n - 500}" for n in range(6))]))
