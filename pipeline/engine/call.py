@@ -53,7 +53,7 @@ class Call:
         except BadInput:
             raise
         except Exception as error:
-            raise self._failed(error) from error
+            raise self._failed(error, f"stage '{self.node.name}' ({self.node.target}) failed in setup") from error
 
     def run(self, values: dict[str, Any]) -> bool:
         """Run the stage on the values of this tick and put its outputs there. False where a source has ended."""
@@ -76,7 +76,7 @@ class Call:
         except BadInput:
             raise
         except Exception as error:
-            raise self._failed(error) from error
+            raise self._failed(error, self._place()) from error
         self.times.append(time.perf_counter() - start)
         if self.outputs and out is not None and not isinstance(out, Outputs):
             raise StageFailed(f"{self._place()}: step gave a value of type {type(out).__name__}, expected its Out")
@@ -94,9 +94,9 @@ class Call:
             if wrong is not None:
                 raise StageFailed(one_line(f"{self._place()}: its output '{name}' {wrong}"))
 
-    def _failed(self, error: Exception) -> Exception:
+    def _failed(self, error: Exception, place: str) -> Exception:
         """The error that says which stage failed, and when."""
-        message = f"{self._place()}: {type(error).__name__}: {error}"
+        message = f"{place}: {type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno in DISK:
             return BadInput(f"{message}; free some of it")
         return StageFailed(message)

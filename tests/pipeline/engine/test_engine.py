@@ -146,7 +146,7 @@ def test_a_failing_stage_is_named_with_the_tick(tmp_path: Path):
 @pytest.mark.parametrize(
     ("stage", "said"),
     [
-        ({"_target_": "Fail", "early": True}, r"\(toys.Fail\) failed at tick 0 .*: RuntimeError: there is no wheel"),
+        ({"_target_": "Fail", "early": True}, r"\(toys.Fail\) failed in setup: RuntimeError: there is no wheel"),
         ("Misgive", r"\(toys.Misgive\) failed at tick 0 .*: step gave a value of type dict, expected its Out"),
     ],
 )
