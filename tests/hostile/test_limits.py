@@ -178,7 +178,7 @@ TABLES: dict[str, tuple[Callable[[], str], str]] = {
     "too many rows": (lambda: "1\n" * 10_000_000, "more than 1,000,000 lines"),
     "too many rows of an old Mac": (lambda: "1\r" * 10_000_000, "more than 1,000,000 lines"),
     "a row of commas": (lambda: "," * 60_000_000, "line 2: a row of more than 100,000 characters"),
-    "a row of lines": (lambda: '"\n",' * 900_000, "line [0-9]+: a row of more than 100,000 characters"),
+    "a row of lines": (lambda: '"\n",' * 900_000, "line 2: a quote is opened and not closed"),
     "a column for each byte": (lambda: "t,x,y" * 12_000_000, "line 1: a row of more than 100,000 characters"),
 }
 
