@@ -219,7 +219,7 @@ class Fail(Stage):
 
     at: int = 3
     early: bool = False
-    """Whether it raises before the first tick."""
+    """It raises in `setup`, before the first tick."""
 
     class Out(Outputs):
         number: Number
@@ -232,16 +232,6 @@ class Fail(Stage):
         if ctx.tick.index == self.at:
             raise RuntimeError("the wheel fell off")
         return self.Out(number=number)
-
-
-class Misgive(Stage):
-    """Gives a mapping in place of its outputs."""
-
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number) -> Out:
-        return {"number": number}  # type: ignore[return-value]
 
 
 class Latest(Stage):

@@ -4,7 +4,7 @@ import copy
 import functools
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,8 +95,9 @@ def complete(config: Any) -> dict[str, Any]:
         take_stand_ins(config)
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
+        read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
         problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
-        problems += [*contradictions(config), *_unknown_settings(config, plain)]
+        problems += [*contradictions(config), *_unknown_settings(config, read)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
             if spec.variant is not None:
@@ -125,7 +126,6 @@ def complete(config: Any) -> dict[str, Any]:
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
-    read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
     return _without_unset({name: value for name, value in plain.items() if name in read})
 
 
@@ -138,10 +138,13 @@ def _refuse_no_mappings(config: Any) -> None:
         raise ProblemsFound([Problem(part, f"expected a mapping, found {parts[part]!r:.60}", hint) for part in wrong])
 
 
-def _unknown_settings(config: Any, plain: Mapping[str, Any]) -> Iterator[Problem]:
-    """A problem for each setting of a variant's file, or that was typed, which neither omninav nor the graph has."""
+def _unknown_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
+    """A problem for each setting that config.yaml does not have and the graph does not read.
+
+    `read`: the settings that the graph and the run read.
+    """
     groups = {item for entry in config_file()["defaults"] if isinstance(entry, Mapping) for item in entry}
-    known = {*config_file(), *groups, *OF_OTHERS, *OF_THE_VARIANT, *read_inputs(plain), *settings_read(config)}
+    known = {*config_file(), *groups, *OF_OTHERS, *read}
     for name in config:
         if name not in known:
             yield Problem(str(name), "there is no such setting", suggest(str(name), known, "settings"))

@@ -60,7 +60,7 @@ def frame_poses(
     rows, stamps = rows[likely], stamps[likely]
     if len(rows) < 2:
         why = f"{np.sum(track_times == NO_TIME)} have no time, {np.sum(~np.isfinite(x + y))} no number for x or y"
-        why += f", {len(known) - ascending} a time that is not above the one before"
+        why += f", {len(known) - ascending} a time that is not later than the one before"
         raise UnreadableRecording(f"{table.path}: fewer than two of its {len(x)} rows have a position: {why}")
     track = np.column_stack([x[rows], y[rows], headings(description, table, rows, stamps, x[rows], y[rows])])
     poses = np.full((len(times), 3), np.nan)

@@ -129,7 +129,7 @@ class CsvTable:
             hint = f"did you mean '{near:.60}'? " if near else ""
             between = next((sign for sign in ";\t|" if len(self.names) == 1 and sign in self.names[0]), None)
             if between is not None:
-                hint = f"write delimiter: {json.dumps(between)} beside csv: if that divides them; "
+                hint = f"write delimiter: {json.dumps(between)} beside csv: if it divides the columns; "
             known = ", ".join(f"{name:.60}" for name in self.names)
             raise UnreadableRecording(f"{self.path}: no column '{column:.60}'; {hint}columns: {known:.300}")
         return self.names.index(column)
@@ -242,9 +242,10 @@ def _csv_rows(path: Path, delimiter: Delimiter) -> Iterator[tuple[int, list[str]
 
     def lines() -> Iterator[str]:
         nonlocal inside
-        for number, line in enumerate(text_lines(path, newline=""), 1):
+        for line in text_lines(path, newline=""):
             if inside:
-                raise UnreadableRecording(f"{path}, line {number - 1}: a quote is opened and not closed on this line")
+                where = f"{path}, line {reader.line_num}"
+                raise UnreadableRecording(f"{where}: a quote is opened and not closed on this line")
             inside = True
             yield line
 

@@ -31,9 +31,9 @@ class ExplainRun(Tool):
                 f"{self.run_folder}: {ended.manifest.get('variant')} estimates no pose, so there is nothing to explain;"
                 " `omninav variants` shows what localises"
             )
-        status, error = ended.manifest.get("status"), ended.manifest.get("error", "it did not end")
-        if status != "complete":
-            print(f"the run is {status} ({error:.300}); this is of its first {len(columns['estimate_x'])} images")
+        if ended.status != "complete":
+            error = ended.manifest.get("error", "it did not end")
+            print(f"the run is {ended.status} ({error:.300}); this is of its first {len(columns['estimate_x'])} images")
         found, logs = stretches(columns, lost_m), logs_of(columns)
         print("\n".join(summaries(logs)))
         for stretch in found:
