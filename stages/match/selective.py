@@ -27,7 +27,7 @@ class SelectiveMatch(ReferenceMatch, Stage):
     `three_quarters` (k^-3/4 n^-1/4, wants fewer), or `none` (the mean of all)."""
     colour_scale: Annotated[float, Bounds(gt=0)] = MAX_COLOUR_DISTANCE
     """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
-    possible, sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale)."""
+    possible, sqrt(3) 255, which leaves no segment out (docs/experiments/omniview_mcl_segments.md)."""
 
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
