@@ -24,6 +24,7 @@ from omninav.stages.values.confidence import (
 )
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
+from omninav.stages.values.evidence import MatchLeads
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.local_features import LocalFeatures
@@ -161,9 +162,10 @@ class ConfidenceMonitor(Stage):
     """Factor of the confidence while inputs mislead that do not fit each other: images then agree on what is wrong."""
 
     class Out(Outputs):
-        """The probability that the estimate is right."""
+        """The probability that the estimate is right; `leads` of an image that was compared with the map."""
 
         confidence: PoseConfidence
+        leads: MatchLeads | None = None
 
     def step(
         self,
@@ -194,14 +196,15 @@ class ConfidenceMonitor(Stage):
             recent.forget()
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
+        leads = None
         if similarities is not None and similarities.values.size:
             novelty = 1.0 if likelihood is None else likelihood.novelty
-            distinct = share_counted(lead_of_best(similarities, map, ELSEWHERE * gate))
-            against = share_counted(lead_over_pose(similarities, map, pose, ELSEWHERE * gate))
+            leads = leads_of_best(similarities, map, pose, ELSEWHERE * gate)
+            distinct, against = share_counted(leads.over_elsewhere), share_counted(leads.over_estimate)
             repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
             new = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
-            recent.add(best_place(similarities, map), pose, new, novelty * distinct, new * against)
+            recent.add(leads.place, pose, new, novelty * distinct, new * against)
         elif motion is not None and (blind := math.hypot(motion.x, motion.y) / length_scale.metres) > 0.0:
             new = min(1.0, blind)
             recent.add(pose, pose, new, 0.0, 0.0)
@@ -230,7 +233,7 @@ class ConfidenceMonitor(Stage):
             probability *= self.right_in_conflict
         seen = similarities is not None and (features is None or len(features) >= MIN_SEEN)
         recent.empty = 0 if seen else recent.empty + 1
-        return self.Out(confidence=PoseConfidence(probability, recent.told(probability)))
+        return self.Out(confidence=PoseConfidence(probability, recent.told(probability)), leads=leads)
 
 
 def by_landmarks(
@@ -290,37 +293,22 @@ def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
     return place
 
 
-def lead_of_best(similarities: Similarities, map: ReferenceGraph, elsewhere_m: float) -> float:
-    """The lead of the most similar reference over the best one elsewhere, in standard deviations of the similarity over
-    all that were compared. Elsewhere: beyond so many metres, or seen from another heading; 0 where all show one place.
-    """
-    best, places = similarities.best, _compared(similarities, map)
+def leads_of_best(similarities: Similarities, map: ReferenceGraph, pose: Array, elsewhere_m: float) -> MatchLeads:
+    """The leads of the most similar reference, beside a pose (3,). Elsewhere: beyond so many metres, or seen from
+    another heading; near the pose: within as many, seen from any."""
+    best, compared = similarities.best, similarities.candidates
+    places = map.poses if compared is None else map.poses[compared]
     turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / similarities.values.shape[1])
     row = int(best.argmax())
-    away = places - places[row]
+    away, from_pose = places - places[row], places - pose
     far = np.hypot(away[:, 0], away[:, 1]) > elsewhere_m
-    return _lead_over(far | (np.abs(wrap(turned - turned[row])) > TURNED), similarities)
-
-
-def lead_over_pose(similarities: Similarities, map: ReferenceGraph, pose: Array, near_m: float) -> float:
-    """The lead of the most similar reference over the best one near a pose (3,), seen from any heading, in the same
-    unit; 0 where no compared reference lies within so many metres: images say nothing of a place the map does not show.
-    """
-    away = _compared(similarities, map) - pose
-    return _lead_over(np.hypot(away[:, 0], away[:, 1]) <= near_m, similarities)
-
-
-def _lead_over(rows: npt.NDArray[np.bool_], similarities: Similarities) -> float:
-    others = similarities.best[rows]
-    if not len(others):
-        return 0.0
-    lead = float(np.maximum.reduce(similarities.best)) - float(np.maximum.reduce(others))
-    return lead / max(similarities.spread, 1e-9)
-
-
-def _compared(similarities: Similarities, map: ReferenceGraph) -> Array:
-    """Poses (N, 3) of the references that were compared."""
-    return map.poses if similarities.candidates is None else map.poses[similarities.candidates]
+    far |= np.abs(wrap(turned - turned[row])) > TURNED
+    near = np.hypot(from_pose[:, 0], from_pose[:, 1]) <= elsewhere_m
+    unit = max(similarities.spread, 1e-9)
+    over_elsewhere, over_estimate = (
+        (float(best[row]) - float(best[rows].max())) / unit if rows.any() else 0.0 for rows in (far, near)
+    )
+    return MatchLeads(best_place(similarities, map), over_elsewhere, over_estimate)
 
 
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:

@@ -2,25 +2,21 @@
 
 import math
 from dataclasses import field
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
-from omninav.stages.values.evidence import ImageEvidence
+from omninav.stages.values.evidence import ImageEvidence, MatchLeads
 from omninav.stages.values.image import Strip
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
-
-from .confidence_monitor import ELSEWHERE, best_place, lead_of_best, lead_over_pose
 
 WHITE = 255.0
 """Grey of a white pixel."""
@@ -38,9 +34,6 @@ class MeasureEvidence(Stage):
     Best matches and leads are those of `ConfidenceMonitor`, landmarks those of `LandmarkPose`.
     """
 
-    within_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Distance (m) by which an estimate may be off: `ConfidenceMonitor`'s."""
-
     class Out(Outputs):
         """The evidence of one image."""
 
@@ -53,7 +46,7 @@ class MeasureEvidence(Stage):
         estimate: PoseEstimate,
         map: ReferenceGraph,
         length_scale: LengthScale,
-        similarities: Similarities | None = None,
+        leads: MatchLeads | None = None,
         strip: Strip | None = None,
         conflicts: Conflicts | None = None,
         fix: LandmarkFix | None = None,
@@ -65,11 +58,10 @@ class MeasureEvidence(Stage):
         if len(map):
             found["nearest_m"] = float(np.hypot(*(map.poses[:, :2] - pose[:2]).T).min())
             found["nearest_scales"] = found["nearest_m"] / length_scale.metres
-        if similarities is not None and similarities.values.size:
-            gate = ELSEWHERE * max(self.within_m, length_scale.metres)
-            found["match_away_m"] = math.dist(best_place(similarities, map)[:2], pose[:2])
-            found["match_lead"] = lead_of_best(similarities, map, gate)
-            found["lead_against"] = max(0.0, lead_over_pose(similarities, map, pose, gate))
+        if leads is not None:
+            found["match_away_m"] = math.dist(leads.place[:2], pose[:2])
+            found["match_lead"] = leads.over_elsewhere
+            found["lead_against"] = leads.over_estimate
         if strip is not None:
             pixels = strip.pixels[None]
             found["brightness"] = min(1.0, float(pixels.mean()) / WHITE)

@@ -14,6 +14,7 @@ from omninav.stages.monitor.confidence_monitor import (
     ConfidenceMonitorState,
     best_place,
     by_landmarks,
+    leads_of_best,
     mass_within,
     share_found,
 )
@@ -257,6 +258,21 @@ def test_the_best_place_is_the_most_similar_references_turned_as_the_view_is(col
     assert math.remainder(place[2] - 2.0 - math.radians(10 * column), math.tau) == pytest.approx(0.0, abs=1e-6)
     one = Similarities(np.array([[0.9], [0.1]], np.float32))  # one heading says no turn
     assert best_place(one, map) == pytest.approx(poses[0])
+
+
+def test_the_best_match_leads_matches_elsewhere_and_those_near_the_estimate():
+    values = np.full((40, 36), 0.2, np.float32)
+    values[4, 0], values[5, 0], values[30, 0], values[20, 0] = 0.8, 0.7, 0.5, 0.4  # row 5 lies near the best
+    unit = values.max(axis=1).std()
+    leads = leads_of_best(Similarities(values), LINE, np.array([20.0, 1.0, 2.0]), 1.5)
+    assert leads.place == pytest.approx((4.0, 0.0, 0.0))
+    assert leads.over_elsewhere * unit == pytest.approx(0.3, rel=1e-5)
+    assert leads.over_estimate * unit == pytest.approx(0.4, rel=1e-5)
+    assert leads_of_best(Similarities(values), LINE, np.array([20.0, 9.0, 2.0]), 1.5).over_estimate == 0.0
+    values[5, 9] = 0.75  # seen from another heading it is elsewhere
+    assert leads_of_best(Similarities(values), LINE, np.zeros(3), 1.5).over_elsewhere * unit == pytest.approx(
+        0.05, rel=0.1
+    )
 
 
 def test_the_mass_within_a_tolerance_counts_position_and_heading_by_weight():

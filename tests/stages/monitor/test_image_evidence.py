@@ -5,12 +5,12 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.monitor.image_evidence import MeasureEvidence, MeasureEvidenceState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
+from omninav.stages.values.evidence import MatchLeads
 from omninav.stages.values.image import Strip
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.similarity import Similarities
 
 POSE = Pose(10.0, 2.0, 0.0)
 MAP = ReferenceGraph(
@@ -30,14 +30,12 @@ def measured(state, tick=1, **inputs):
 
 
 def test_an_image_is_measured_beside_the_estimate():
-    values = np.full((41, 36), 0.2, np.float32)
-    values[4, 0], values[40, 0] = 0.8, 0.5  # the best match at x = -8, and one below the estimate
     fix = LandmarkFix(np.array([[10.0, 2.3, 0.0]]), np.eye(3)[None], np.array([40]), np.array([0.9]), 50)
-    found = measured(MeasureEvidenceState(), similarities=Similarities(values), fix=fix)
+    found = measured(MeasureEvidenceState(), leads=MatchLeads(np.array([-8.0, 0.0, 0.0]), 3.0, 1.5), fix=fix)
     assert found.nearest_m == pytest.approx(2.0)
     assert found.nearest_scales == pytest.approx(4.0)
     assert found.match_away_m == pytest.approx(np.hypot(18.0, 2.0))
-    assert found.match_lead == pytest.approx(0.3 / values.max(axis=1).std(), rel=1e-5)
+    assert (found.match_lead, found.lead_against) == (3.0, 1.5)
     assert (found.landmarks, found.landmarks_away_m) == (40, pytest.approx(0.3))
     assert (found.features, found.brightness, found.conflict) == (None, None, "")
 
