@@ -14,7 +14,7 @@ from typing import Any
 
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, ValueType
+from hydra.core.override_parser.types import ChoiceSweep, Glob, Override, RangeSweep, ValueType
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
@@ -137,6 +137,20 @@ def _number_of_values(word: Override) -> int:
     return int(number)
 
 
+def _refuse_no_values(word: Override, folders: Sequence[str]) -> None:
+    """Raise `BadInput` where a word stands for no value, so that its sweep has no job."""
+    value, name = word.value(), word.key_or_group
+    if isinstance(value, Glob):
+        options = _options(name, folders)
+        listed = f"its options are {', '.join(options)}" if options else "options of groups alone are found by glob"
+        empty, hint = not value.filter(options), listed
+    else:
+        empty = isinstance(value, RangeSweep) and next(word.sweep_iterator(), None) is None
+        hint = "write range(first, beyond the last, step)"
+    if empty:
+        raise BadInput(f"{name}: {shown(word.input_line)} stands for no value; {hint}")
+
+
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
     """The configuration with these options alone, the first of each that is swept; {} where there is none."""
     try:
@@ -162,6 +176,7 @@ def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[s
             continue
         jobs *= _number_of_values(parsed)
         texts = _texts(parsed)
+        _refuse_no_values(parsed, folders)
         choices.append(texts if parsed.key_or_group in groups else texts[:1])
     if jobs > MAX_JOBS and not any(word.startswith("hydra/sweeper=") for word in words):
         raise BadInput(f"-m: a sweep of {jobs:,} jobs, expected at most {MAX_JOBS:,}; leave some values out")

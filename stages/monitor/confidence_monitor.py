@@ -304,11 +304,15 @@ def leads_of_best(similarities: Similarities, map: ReferenceGraph, pose: Array, 
     far = np.hypot(away[:, 0], away[:, 1]) > elsewhere_m
     far |= np.abs(wrap(turned - turned[row])) > TURNED
     near = np.hypot(from_pose[:, 0], from_pose[:, 1]) <= elsewhere_m
-    unit = max(similarities.spread, 1e-9)
-    over_elsewhere, over_estimate = (
-        (float(best[row]) - float(best[rows].max())) / unit if rows.any() else 0.0 for rows in (far, near)
-    )
-    return MatchLeads(best_place(similarities, map), over_elsewhere, over_estimate)
+    return MatchLeads(best_place(similarities, map), _lead_over(far, similarities), _lead_over(near, similarities))
+
+
+def _lead_over(rows: npt.NDArray[np.bool_], similarities: Similarities) -> float:
+    others = similarities.best[rows]
+    if not len(others):
+        return 0.0
+    lead = float(np.maximum.reduce(similarities.best)) - float(np.maximum.reduce(others))
+    return lead / max(similarities.spread, 1e-9)
 
 
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:

@@ -6,6 +6,7 @@ import pytest
 
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.graph.problems import BadInput
 
 
 @pytest.fixture(autouse=True)
@@ -51,6 +52,20 @@ def test_what_the_report_now_shows_frame_by_frame_is_said_where_it_is_left_out(w
 def test_a_sweep_is_tried_by_its_first_choices_and_each_other_option_of_a_group():
     jobs = list(jobs_to_try(["match=selective,l2", "seed=0,1", "day=2"], ()))
     assert jobs == [["match=selective", "seed=0", "day=2"], ["match=l2", "seed=0", "day=2"]]
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("source=glob(zz*)", "its options are closed_loop, "),
+        ("day=glob(*)", "options of groups"),
+        ("day=range(5,1)", "range("),
+    ],
+)
+def test_a_sweep_of_no_value_is_refused(word: str, hint: str):
+    with pytest.raises(BadInput, match="stands for no value") as refused:
+        list(jobs_to_try([word], ()))
+    assert hint in str(refused.value)
 
 
 def test_a_parameter_that_the_configuration_does_not_list_is_added_and_a_misspelled_one_is_not():

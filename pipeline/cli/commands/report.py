@@ -27,6 +27,8 @@ def command(arguments: list[str]) -> int:
     if not (folder / "report.html").is_file():
         if not folder.is_dir():
             raise BadInput(f"{folder}: there is no such folder; `ls runs` shows what there is")
+        if not (folder / "manifest.json").is_file():
+            raise BadInput(f"{folder}: there is no run in it; `ls runs` shows what there is")
         raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
     show(results_table(read_metrics(folder)))
     print(f"report: {shown(folder / 'report.html')}")
