@@ -156,18 +156,21 @@ def similarity_field(similarities: Similarities, floor: float, top: float, power
     headings, flat = values.shape[1], values.ravel()
     above = (flat > floor).nonzero()[0]
     rows = above // headings
-    heights = (flat[above].astype(np.float64) / top) ** power
+    heights, low = (flat[above].astype(np.float64) / top) ** power, (floor / top) ** power
+    excess = np.maximum(heights - low, 0.0)
     at_floor = (headings - np.bincount(rows, minlength=len(values))).astype(np.float64)
     if each is None:
         size, counted = headings * float(len(values)), float(len(above))
     else:
         size, counted = headings * float(each.cumsum()[-1]), float(np.add.reduce(each[rows]))
-        heights, at_floor = each[rows] * heights, each * at_floor
+        heights, excess, at_floor = each[rows] * heights, each[rows] * excess, each * at_floor
     weights, floor_cells = heights.cumsum(), at_floor.cumsum()
     peaks = float(weights[-1]) if len(above) else 0.0
-    floor_weight = max(size - counted, 0.0) * (floor / top) ** power
+    floor_weight = max(size - counted, 0.0) * low
     mean = (peaks + floor_weight) / size
-    return SimilarityField(values, similarities.candidates, floor, above, weights, floor_cells, floor_weight, mean)
+    return SimilarityField(
+        values, similarities.candidates, floor, above, weights, excess.cumsum(), floor_cells, floor_weight, mean
+    )
 
 
 class NearReferences(Stage):

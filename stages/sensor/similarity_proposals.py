@@ -15,6 +15,8 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 NUMBER = 100
 """Poses proposed at each image."""
+SHARE_BY_EXCESS = 0.5
+"""Share of the poses that is drawn by what a cell weighs above the floor."""
 SPREAD = 0.4
 """Standard deviation of the positions around a reference, in appearance length scales."""
 
@@ -22,7 +24,9 @@ SPREAD = 0.4
 class SimilarityProposals(Stage):
     """Draws poses from the similarity field, by weight, and spreads them around their references.
 
-    All poses have equal weights. Headings are uniform within the step between compared headings.
+    In a large map nearly all weight is that of the many cells at the floor. So half of the poses are drawn by what a
+    cell weighs above the floor, and weighted by how much more often than by weight they come (importance sampling from
+    a mixture). Headings are uniform within the step between compared headings.
     """
 
     class Out(Outputs):
@@ -43,24 +47,37 @@ class SimilarityProposals(Stage):
             return self.Out()
         unit = metres_of(length_scale)
         headings = field.values.shape[1]
-        rows, turns = np.divmod(draw_cells(field, ctx.rng, NUMBER), headings)
+        cells, weights = draw_cells(field, ctx.rng, NUMBER)
+        rows, turns = np.divmod(cells, headings)
         references = rows if field.candidates is None else field.candidates[rows]
         poses = map.poses[references].copy()
         poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(NUMBER) - 0.5) / headings
         poses[:, :2] += SPREAD * unit * ctx.rng.standard_normal((NUMBER, 2))
         poses[:, 2] = wrap(poses[:, 2])
-        return self.Out(proposals=Particles(poses, np.full(NUMBER, 1.0 / NUMBER)))
+        return self.Out(proposals=Particles(poses, weights))
 
 
-def draw_cells(field: SimilarityField, rng: np.random.Generator, number: int) -> Ints:
-    """Cells drawn by weight: (number,) flat indices into the field. Cells at the floor are drawn evenly."""
-    peaks = float(field.weights[-1]) if len(field.above) else 0.0
-    quantile = rng.random(number) * (peaks + field.floor_weight)
+def draw_cells(field: SimilarityField, rng: np.random.Generator, number: int) -> tuple[Ints, Array]:
+    """Cells of a field, (number,) flat indices, and weights (number,) with which they stand for draws by weight.
+
+    Cells at the floor are drawn evenly.
+    """
     at_floor = _draw_at_floor(field, rng, number)
     if not len(field.above):
-        return at_floor
-    drawn: Ints = np.where(quantile < peaks, field.above[_search(field.weights, quantile)], at_floor)
-    return drawn
+        return at_floor, np.full(number, 1.0 / number)
+    peaks, excess = float(field.weights[-1]), float(field.excess[-1])
+    quantile = rng.random(number) * (peaks + field.floor_weight)
+    drawn, is_above = _search(field.weights, quantile), quantile < peaks
+    sharp = int(SHARE_BY_EXCESS * number) if excess > 0.0 else 0
+    drawn[:sharp], is_above[:sharp] = _search(field.excess, rng.random(sharp) * excess), True
+    by_weight = _steps(field.weights, drawn) / (peaks + field.floor_weight)
+    by_excess = is_above * _steps(field.excess, drawn) / max(excess, 1e-300)
+    weights = 1.0 / (1.0 + sharp / number * (by_excess / by_weight - 1.0))
+    return np.where(is_above, field.above[drawn], at_floor), weights / np.add.reduce(weights)
+
+
+def _steps(cumulative: Array, at: Ints) -> Array:
+    return cumulative[at] - np.where(at > 0, cumulative[at - 1], 0.0)
 
 
 def _draw_at_floor(field: SimilarityField, rng: np.random.Generator, number: int) -> Ints:

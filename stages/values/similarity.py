@@ -60,9 +60,9 @@ class SimilarityField(Value):
     """Weights (max(S, floor) / top)^power over the compared references and headings, prepared for drawing.
 
     `values`, `candidates`: as in `Similarities`. `floor`: the similarity below which all cells weigh the same. `above`
-    (A,): flat indices of the cells above it, `weights` (A,): their cumulative weights. `floor_cells` (references,):
-    cumulative number of cells at the floor, by sampling weight; `floor_weight`: what they weigh in all. `mean`: mean
-    weight over the map.
+    (A,): flat indices of the cells above it, `weights` (A,): their cumulative weights, and `excess` (A,): the same of
+    what each weighs more than one at the floor. `floor_cells` (references,): cumulative number of cells at the floor,
+    by sampling weight; `floor_weight`: what they weigh in all. `mean`: mean weight over the map.
     """
 
     values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
@@ -70,6 +70,7 @@ class SimilarityField(Value):
     floor: Annotated[float, Bounds(ge=0)]
     above: Annotated[npt.NDArray[np.int64], Shape("A"), Bounds(ge=0)]
     weights: Annotated[npt.NDArray[np.float64], Shape("A"), Bounds(ge=0)]
+    excess: Annotated[npt.NDArray[np.float64], Shape("A"), Bounds(ge=0)]
     floor_cells: Annotated[npt.NDArray[np.float64], Shape("references"), Bounds(ge=0)]
     floor_weight: Annotated[float, Bounds(ge=0)]
     mean: Annotated[float, Bounds(ge=0)]

@@ -19,20 +19,23 @@ def test_cells_are_drawn_by_weight_and_sampling_weight() -> None:
     field[0, 1] = field[2, 3] = 1.0
     each = np.array([1.0, 5.0, 3.0])
     weighted = similarity_field(Similarities(field, sampling_weight=each), 0.5, 1.0, 2.0)
-    drawn = draw_cells(weighted, np.random.default_rng(0), 40_000)
+    drawn, drawn_weights = draw_cells(weighted, np.random.default_rng(0), 40_000)
     # By hand: each cell weighs its value, or the floor, squared, as often as its reference counts.
     weights = (np.maximum(field, 0.5) ** 2 * each[:, None]).ravel()
-    shares = np.bincount(drawn, minlength=12) / 40_000
+    shares = np.bincount(drawn, drawn_weights, minlength=12)
     assert shares == pytest.approx(weights / weights.sum(), abs=0.01)
     assert shares[1] == pytest.approx(1 / 12, abs=0.004)
+    # Half of the draws are by what is above the floor: 0.75 at one cell, three times as much at the other.
+    assert np.bincount(drawn, minlength=12)[1] / 40_000 == pytest.approx(0.5 / 12 + 0.5 / 4, abs=0.01)
 
 
 @pytest.mark.parametrize("floor", [0.0, 2.0])
 def test_where_all_or_nothing_rises_above_the_floor_cells_are_drawn_by_weight_too(floor: float) -> None:
     field = np.array([[0.2, 0.4], [0.8, 0.6]], np.float32)
-    drawn = draw_cells(similarity_field(Similarities(field), floor, 1.0, 1.0), np.random.default_rng(0), 40_000)
+    similarities = similarity_field(Similarities(field), floor, 1.0, 1.0)
+    drawn, drawn_weights = draw_cells(similarities, np.random.default_rng(0), 40_000)
     weights = np.maximum(field, floor).ravel()
-    assert np.bincount(drawn, minlength=4) / 40_000 == pytest.approx(weights / weights.sum(), abs=0.01)
+    assert np.bincount(drawn, drawn_weights, minlength=4) == pytest.approx(weights / weights.sum(), abs=0.01)
 
 
 @pytest.mark.parametrize("candidates", [None, np.arange(2, 20)], ids=["all compared", "some compared"])
