@@ -294,8 +294,10 @@ def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
 
 
 def leads_of_best(similarities: Similarities, map: ReferenceGraph, pose: Array, elsewhere_m: float) -> MatchLeads:
-    """The leads of the most similar reference, beside a pose (3,). Elsewhere: beyond so many metres, or seen from
-    another heading; near the pose: within as many, seen from any."""
+    """The leads of the most similar reference over others, and over those near an estimated pose (3,).
+
+    Elsewhere: beyond so many metres, or seen from another heading. Near the pose: within as many, seen from any.
+    """
     best, compared = similarities.best, similarities.candidates
     places = map.poses if compared is None else map.poses[compared]
     turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / similarities.values.shape[1])

@@ -25,7 +25,7 @@ class SimilarityProposals(Stage):
     """Draws poses from the similarity field, by weight, and spreads them around their references.
 
     In a large map nearly all weight is that of the many cells at the floor. So half of the poses are drawn by what a
-    cell weighs above the floor, and weighted by how much more often than by weight they come (importance sampling from
+    cell weighs above the floor, and count as much less as they come more often than by weight (importance sampling from
     a mixture). Headings are uniform within the step between compared headings.
     """
 
@@ -70,7 +70,7 @@ def draw_cells(field: SimilarityField, rng: np.random.Generator, number: int) ->
     drawn, is_above = _search(field.weights, quantile), quantile < peaks
     sharp = int(SHARE_BY_EXCESS * number) if excess > 0.0 else 0
     drawn[:sharp], is_above[:sharp] = _search(field.excess, rng.random(sharp) * excess), True
-    by_weight = _steps(field.weights, drawn) / (peaks + field.floor_weight)
+    by_weight = np.maximum(_steps(field.weights, drawn) / (peaks + field.floor_weight), 1e-300)  # small ones round to 0
     by_excess = is_above * _steps(field.excess, drawn) / max(excess, 1e-300)
     weights = 1.0 / (1.0 + sharp / number * (by_excess / by_weight - 1.0))
     return np.where(is_above, field.above[drawn], at_floor), weights / np.add.reduce(weights)
