@@ -3,17 +3,14 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, ViewFeatures
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .local_features import GlobalDescriptor, LocalFeatures, view_features
 from .pose import PoseSource
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 class ComparedViews(Value):

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Bytes
+
 MAX_PIXELS = 1 << 25
 """Largest decoded image, pixels: an equirectangular image of 8000 x 4000 fits."""
 MAX_FILE_BYTES = 100_000_000
@@ -35,9 +37,7 @@ class Undecodable(ValueError):
     """Bytes that are no image; the message says what is wrong with them."""
 
 
-def decode_image(
-    data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS, upright: bool = False
-) -> npt.NDArray[np.uint8]:
+def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS, upright: bool = False) -> Bytes:
     """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
 
     `upright`: a JPEG is turned as its EXIF orientation says, as of a camera that was held on its side.

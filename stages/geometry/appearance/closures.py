@@ -1,14 +1,12 @@
 """Pairs of views that look alike although the robot drove on between them."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.drive_graph import Closures
 
-from .segments import EXPONENTS, Floats, similarities
+from .segments import EXPONENTS, similarities
 from .visual_compass import angle_of_peak
-
-Array = npt.NDArray[np.float64]
 
 
 def closures_by_appearance(

@@ -9,13 +9,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Bytes, Floats, Ints
 
 
 class Taps(NamedTuple):
@@ -123,7 +119,7 @@ def _means_at(
             out[n, c] = total * share
 
 
-def padded(pixels: npt.NDArray[np.uint8], by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
+def padded(pixels: Bytes, by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
     """An image in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
     scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
     rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))

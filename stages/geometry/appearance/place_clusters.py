@@ -11,9 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import squareform
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 def renumbered(labels: npt.ArrayLike) -> Ints:

@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Array, Floats
 
 
-def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
+def all_distances(turned: Floats, kept: Floats) -> Array:
     """Euclidean distances of each row of `turned` (H, D) to each kept vector (R, D): (R, H)."""
     here, there = turned.astype(np.float64), kept.astype(np.float64)
     squares = (there**2).sum(axis=1)[:, None] + (here**2).sum(axis=1) - 2.0 * (there @ here.T)
@@ -17,7 +15,7 @@ def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
     return distances
 
 
-def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
+def turned_distances(turned: Floats, kept: Floats) -> Array:
     """Distance to each kept vector (R, D) at the best heading: (R,).
 
     The best row is found in single precision, which does for ordering; the distance to it is exact, 0 for equals. With
@@ -39,7 +37,7 @@ def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
     return distances
 
 
-def turns_of_nearest(turned: FloatArray, kept: FloatArray) -> Array:
+def turns_of_nearest(turned: Floats, kept: Floats) -> Array:
     """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot

@@ -5,18 +5,16 @@ import math
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.stored_rows import StoredRows
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 from .best_segments import UNROLLED, selective_sum
 from .sorting_network import sorting_network
 
-Floats = npt.NDArray[np.float32]
 Rows = Floats | StoredRows[np.float32]
 """Views of a map, in memory or in its file."""
-Ints = npt.NDArray[np.int64]
 
 BLOCK = 96
 """References that are compared at once: few enough for what belongs to a segment to stay in the fastest cache, and no
@@ -267,9 +265,7 @@ def turned_view(view: Floats, turn: float) -> Floats:
     return turned
 
 
-def similarity_at(
-    references: Floats, view: Floats, turns: npt.NDArray[np.float64], kind: FeatureKind, exponent: float = 0.5
-) -> Floats:
+def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureKind, exponent: float = 0.5) -> Floats:
     """Selective similarity of a view to each reference at one heading each: (N, segments, bins), (N,) turns -> (N,).
 
     `turns`: the robot's heading less the reference's own (radians).

@@ -3,28 +3,24 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
-Complex = npt.NDArray[np.complex128]
+from omninav.stages.geometry.arrays import Array, Complex, Floats
 
 
-def packed(spectrum: Complex) -> FloatArray:
+def packed(spectrum: Complex) -> Floats:
     """A spectrum (channels, frequencies) as one vector: all real parts, then all imaginary ones."""
     return np.concatenate([spectrum.real.ravel(), spectrum.imag.ravel()]).astype(np.float32)
 
 
-def unpacked(vectors: FloatArray, channels: int) -> Complex:
+def unpacked(vectors: Floats, channels: int) -> Complex:
     """Inverse of `packed`: vectors (..., D) to spectra (..., channels, frequencies)."""
     half = vectors.shape[-1] // 2
     values = vectors[..., :half].astype(np.float64) + 1j * vectors[..., half:].astype(np.float64)
     return values.reshape(*vectors.shape[:-1], channels, half // channels)
 
 
-def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segments: int) -> Array:
+def spectral_distances(values: Floats, kept: Floats, channels: int, segments: int) -> Array:
     """Euclidean distance between the magnitudes of two spectra's coefficients, (D,) and (R, D): (R,).
 
     In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
@@ -37,7 +33,7 @@ def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segm
 
 
 @compiled(nogil=True, fastmath={"reassoc"})
-def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> Array:
+def _size_distances(values: Floats, kept: Floats, share: Floats) -> Array:
     # One pass in single precision: five times as fast as arrays of complex numbers over a whole map.
     half = len(share)
     here = np.sqrt(values[:half] ** 2 + values[half:] ** 2)
@@ -53,7 +49,7 @@ def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> 
     return distances
 
 
-def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:
+def best_turns(values: Floats, kept: Floats, channels: int, segments: int, steps: int = 360) -> Array:
     """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     The greatest circular cross-correlation of the two signals, over all channels, at `steps` turns; between them by the

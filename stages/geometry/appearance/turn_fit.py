@@ -4,9 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 MAX_TURN = math.radians(60.0)
 """Turns count up to this: one wrong turn must not outweigh the others."""

@@ -6,12 +6,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, tree_matches
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
 PatchDistance = Literal["euclidean", "mahalanobis"]

@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
@@ -15,11 +15,6 @@ from .adjustment import adjusted
 from .bearing_pose import TOLERANCE, matched, pose_of_bearings
 from .floor import lowest_plane
 from .map_making import LocalViews, fitting_matches, mean_descriptors, pair_matches, tracks_of, triangulated
-
-Array = npt.NDArray[np.float64]
-Bytes = npt.NDArray[np.uint8]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 KEYFRAMES = 6
 """Images that are kept, and adjusted together when one is added."""

@@ -4,14 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 from .pose_graph import optimised_poses
 from .se2 import between, compose, wrap
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 SIGMAS_PER_METRE = (0.02, 0.02, 0.02)
 """Standard deviation of odometry per metre (m, m, rad)."""

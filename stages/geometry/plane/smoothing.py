@@ -3,14 +3,12 @@
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 from .pose_errors import heading_errors_deg, position_errors
 from .pose_graph import optimised_poses
 from .se2 import between, chain, compose
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MIN_SIGMAS = np.array([0.001, 0.001, np.radians(0.02)])
 """Smallest standard deviation of an estimate (m, m, rad)."""
@@ -61,7 +59,7 @@ def smoothed_with_lag(
     A run could say as much `lag` frames late. NaN where none of these frames has an estimate.
     """
     found = np.full_like(estimates, np.nan)
-    there: Flags = np.asarray(np.isfinite(estimates).all(axis=1))
+    there: Bools = np.asarray(np.isfinite(estimates).all(axis=1))
     for frame in range(len(estimates)):
         part = slice(max(0, frame - window), frame + lag + 1)
         if there[part].any():
@@ -106,7 +104,7 @@ def odometry_sigma(estimates: Array, trust: Array, motions: Array) -> float:
     return 2.0 * off if off > OFF_SCALE else ODOMETRY_SIGMA
 
 
-def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
+def contradicted(estimates: Array, trust: Array, motions: Array) -> Bools:
     """Which motions (N - 1, 3) lie between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
     path = chain(np.concatenate([np.zeros((1, 3)), motions]))
     moved = compose(estimates[:-1], motions)
@@ -123,13 +121,13 @@ def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
     return doubtful
 
 
-def _carried(estimates: Array, path: Array, rows: npt.NDArray[np.int64], there: Array) -> Array:
+def _carried(estimates: Array, path: Array, rows: Ints, there: Array) -> Array:
     """Median pose to which odometry leads from estimates: (3,)."""
     poses = compose(estimates[rows], between(path[rows], there))
     heading = np.arctan2(np.median(np.sin(poses[:, 2])), np.median(np.cos(poses[:, 2])))
     return np.array([*np.median(poses[:, :2], axis=0), heading])
 
 
-def _disagree(poses: Array, others: Array) -> Flags:
-    far: Flags = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
+def _disagree(poses: Array, others: Array) -> Bools:
+    far: Bools = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
     return far

@@ -3,13 +3,10 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 MIN_NOVELTY = 0.05
 """Smallest novelty of an image: that of one taken where the robot stands."""
 MIN_SPREAD = 1e-6

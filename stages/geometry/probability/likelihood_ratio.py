@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 
 from .evidence import best_headings
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
 
 RIDGE = 1e-3
 """Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
@@ -44,7 +42,7 @@ def _centre_and_spread(logarithms: Floats, sampling_weight: Array | None) -> tup
     return centre, max(spread, 1e-6)
 
 
-def logistic_fit(scores: Array, weights: Array, right: npt.NDArray[np.bool_]) -> tuple[float, float]:
+def logistic_fit(scores: Array, weights: Array, right: Bools) -> tuple[float, float]:
     """Slope and middle of the log odds of `right` over scores (N,), each counted by its weight (N,).
 
     Where both kinds weigh the same in all, slope (z - middle) is the log of the likelihood ratio. The slope is never
@@ -85,7 +83,7 @@ def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: floa
     return ratios
 
 
-def correlation_length(values: Array, places: Array, compared: npt.NDArray[np.bool_] | None = None) -> float | None:
+def correlation_length(values: Array, places: Array, compared: Bools | None = None) -> float | None:
     """The distance l of exp(-d / l) that fits the products of standardised values (N,) at `places` (N, 2) best.
 
     Of all pairs at different places, or of those `compared` (N, N). None where there are too few, or all values are

@@ -17,11 +17,10 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .triangulation import depths
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Poses = tuple[Array, Array]
 """Rotations (K, 3, 3) and translations (K, 3)."""
 
@@ -167,7 +166,7 @@ def decompose(matrix: Array) -> Poses:
     return np.stack([one, one, other, other], axis=-3), np.stack([along, -along, along, -along], axis=-2)
 
 
-def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> npt.NDArray[np.int64]:
+def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> Ints:
     """For each relative pose how many points lie in front of both cameras: (K,).
 
     In front is a positive depth along both bearings, wherever they look; the sign of z, which is what pinhole code

@@ -12,15 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
 from .refinement import refinement
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
 """Pairs of bearings in a sample."""
