@@ -27,11 +27,6 @@ class Visibility(NamedTuple):
     references: Ints
     starts: Ints
 
-    @property
-    def landmarks(self) -> Ints:
-        """The landmark of each (O,)."""
-        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
-
 
 class Frames(NamedTuple):
     """The references in the map's frame: `positions` (R, 2), `rotations` (R, 3, 3) from their own frames.
