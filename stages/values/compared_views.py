@@ -52,13 +52,5 @@ class ComparedViews(Value):
         return float(apart.std()) if len(apart) else 0.0
 
     def comparison_options(self) -> ComparisonOptions:
-        """Name of the comparison."""
-        ratio, segment_ratio, max_colour_distance, min_matches, min_angle, patch_distance = self.options
-        return ComparisonOptions(
-            ratio,
-            segment_ratio,
-            max_colour_distance,
-            patch_distance=patch_distance,
-            min_matches=min_matches,
-            min_angle=min_angle,
-        )
+        """The options by which the views were compared."""
+        return ComparisonOptions(*self.options)
