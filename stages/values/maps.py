@@ -77,10 +77,6 @@ class ReferenceGraph(GrowableArrays, Value):
             return None
         return f"'landmarks' are of {self.landmarks.references} references, and the map has {len(self)}"
 
-    def take_poses_from(self, source: PoseSource) -> None:
-        """Say where the poses to come are from."""
-        self.put(pose_source=source)
-
 
 class ReferenceEvent(Value):
     """Change of a reference graph in a tick: the index of the reference it added, and why."""

@@ -103,10 +103,6 @@ class ViewMixtures(GrowableArrays, Value):
         fields = {"owner": owners, "means": means, "covariances": covariances, "weights": weights, "counts": counts}
         self.put(**{name: np.concatenate([getattr(self, name), rows]) for name, rows in fields.items()})
 
-    def put_weights(self, weights: Array) -> None:
-        """Replace the weights of all components (C,)."""
-        self.put(weights=weights)
-
     def keep_components(self, kept: Bools) -> None:
         """Drop all other components (C,)."""
         if not kept.all():
@@ -126,10 +122,6 @@ class ViewMixtures(GrowableArrays, Value):
     def step(self) -> None:
         """Count one more view learned from."""
         self.put(steps=self.steps + 1)
-
-    def take_poses_from(self, source: PoseSource) -> None:
-        """Say where the first pose came from."""
-        self.put(pose_source=source)
 
     def forget_all(self) -> None:
         """Drop all views; their ids are not used again."""
