@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Floats
+from omninav.stages.geometry.plane.se2 import wrap
 
 
 def all_distances(turned: Floats, kept: Floats) -> Array:
@@ -43,14 +44,16 @@ def turns_of_nearest(turned: Floats, kept: Floats) -> Array:
     Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot
     stands turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.
     """
-    headings = len(turned)
-    if headings < 3:
+    if len(turned) < 3:
         return np.zeros(len(kept))
-    squares = all_distances(turned, kept) ** 2
-    best = squares.argmin(axis=1)
-    rows = np.arange(len(kept))
-    before, here, after = (squares[rows, (best + step) % headings] for step in (-1, 0, 1))
-    bend = before + after - 2.0 * here
+    return wrap(-angles_of_least(all_distances(turned, kept) ** 2))
+
+
+def angles_of_least(values: Array) -> Array:
+    """Angles (R,) at which values around the full circle (R, N) are least, between samples by a parabola: rad."""
+    rows, best, number = np.arange(len(values)), values.argmin(axis=1), values.shape[1]
+    before, least, after = (values[rows, (best + step) % number] for step in (-1, 0, 1))
+    bend = before + after - 2.0 * least
     part = np.where(bend > 0.0, 0.5 * (before - after) / np.where(bend > 0.0, bend, 1.0), 0.0)
-    turns: Array = -(best + part) * (2.0 * math.pi / headings)
-    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
+    angles: Array = (best + part) * (2.0 * math.pi / number)
+    return angles

@@ -48,10 +48,19 @@ def turned_views(view: Floats, headings: int) -> Floats:
     segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that histograms still sum to
     1.
     """
+    return _shifted(view, np.arange(headings) * len(view) / headings)
+
+
+def turned_view(view: Floats, turn: float) -> Floats:
+    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
+    turned: Floats = _shifted(view, np.array([-turn * len(view) / (2 * np.pi)]))[0]
+    return turned
+
+
+def _shifted(view: Floats, shifts: Array) -> Floats:
     segments = len(view)
-    shift = np.arange(headings) * segments / headings
-    whole = np.floor(shift).astype(np.int64)
-    part = (shift - whole).astype(np.float32)[:, None, None]
+    whole = np.floor(shifts).astype(np.int64)
+    part = (shifts - whole).astype(np.float32)[:, None, None]
     first = (np.arange(segments) + whole[:, None]) % segments
     turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
     return turned
@@ -252,17 +261,6 @@ def cosine_similarities(references: Rows, view: Floats, headings: int, chosen: I
     lengths = np.linalg.norm(flat, axis=1)[:, None] * np.linalg.norm(query, axis=1)
     alike: Floats = ((flat @ query.T) / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
-
-
-def turned_view(view: Floats, turn: float) -> Floats:
-    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
-    segments = len(view)
-    shift = -turn * segments / (2 * np.pi)
-    whole = int(np.floor(shift))
-    part = np.float32(shift - whole)
-    first = (np.arange(segments) + whole) % segments
-    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
-    return turned
 
 
 def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureKind, exponent: float = 0.5) -> Floats:

@@ -6,6 +6,9 @@ import numpy as np
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Complex, Floats
+from omninav.stages.geometry.plane.se2 import wrap
+
+from .rotated_distances import angles_of_least
 
 
 def packed(spectrum: Complex) -> Floats:
@@ -63,13 +66,7 @@ def best_turns(values: Floats, kept: Floats, channels: int, segments: int, steps
     angles = 2.0 * math.pi * np.arange(steps) / steps
     waves = np.exp(1j * np.outer(np.arange(frequencies), angles))
     correlation = (cross @ waves).real
-    best = correlation.argmax(axis=-1)
-    rows = np.arange(len(correlation))
-    before, top, after = (correlation[rows, (best + step) % steps] for step in (-1, 0, 1))
-    bend = before + after - 2.0 * top
-    part = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
-    turns: Array = (best + part) * (2.0 * math.pi / steps)
-    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
+    return wrap(angles_of_least(-correlation))
 
 
 def _share(frequencies: int, segments: int) -> Array:
