@@ -1,15 +1,12 @@
 """Similarities of the current view to the views of the map."""
 
-import math
 from functools import cached_property
 from typing import Annotated
-
-import numpy as np
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.arrays import Array, Floats, Ints
-from omninav.stages.geometry.probability.evidence import average, best_headings
+from omninav.stages.geometry.probability.evidence import best_headings, centre_and_spread
 
 
 class Similarities(Value):
@@ -48,8 +45,7 @@ class Similarities(Value):
     @cached_property
     def spread(self) -> float:
         """Standard deviation of `best` over the map."""
-        best, weights = self.best.astype(np.float64), self.sampling_weight
-        return math.sqrt(average(np.square(best - average(best, weights)), weights))
+        return centre_and_spread(self.best, self.sampling_weight)[1]
 
     @cached_property
     def _at_best_headings(self) -> tuple[Floats, Ints]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools, Floats
 
-from .evidence import best_headings
+from .evidence import MIN_SPREAD, best_headings, centre_and_spread
 
 RIDGE = 1e-3
 """Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
@@ -24,22 +24,15 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
     `sampling_weight` (R,): how many references of the map each represents; None: one each.
     """
     logarithms = np.log(np.maximum(similarity, np.float32(MIN_SIMILARITY)))
-    centre, spread = _centre_and_spread(best_headings(logarithms)[0], sampling_weight)
-    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / spread)
+    centre, spread = centre_and_spread(best_headings(logarithms)[0], sampling_weight)
+    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, MIN_SPREAD))
     return scores
 
 
 def standard_score(similarity: float, best: Floats, sampling_weight: Array | None = None) -> float:
     """Standardises one more similarity as `standard_scores` does, given the references' at their best headings (R,)."""
-    centre, spread = _centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
-    return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / spread
-
-
-def _centre_and_spread(logarithms: Floats, sampling_weight: Array | None) -> tuple[float, float]:
-    best = logarithms.astype(np.float64)
-    centre = float(np.average(best, weights=sampling_weight))
-    spread = math.sqrt(float(np.average(np.square(best - centre), weights=sampling_weight)))
-    return centre, max(spread, 1e-6)
+    centre, spread = centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
+    return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / max(spread, MIN_SPREAD)
 
 
 def logistic_fit(scores: Array, weights: Array, right: Bools) -> tuple[float, float]:
