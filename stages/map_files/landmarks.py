@@ -55,12 +55,9 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
 
 def _of_all(map: ReferenceGraph, other: Landmarks) -> Landmarks:
     """A map's landmarks with an entry for each of its references; none of a map without."""
-    rows = np.arange(len(map))
-    return (
-        other.of_references(np.full(len(map), other.references))
-        if map.landmarks is None
-        else (map.landmarks.of_references(rows))
-    )
+    if map.landmarks is None:
+        return other.of_references(np.full(len(map), other.references))
+    return map.landmarks.of_references(np.arange(len(map)))
 
 
 def _joined_words(words: Sequence[VisualWords]) -> VisualWords | None:
