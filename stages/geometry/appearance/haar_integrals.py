@@ -14,34 +14,21 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Bytes, Floats, Ints
 
 
-class Taps(NamedTuple):
-    """Positions of a factor of the kernel at each angle: four pixels and their bilinear weights.
+def circle_taps(radius: float, angles: int, turn: float, stride: int, channels: int) -> tuple[Ints, Floats]:
+    """Positions of a factor of the kernel at `angles` equal steps around a circle of `radius` pixels.
 
-    `rows`, `columns` (angles, 4): offsets from the pixel that the kernel turns around. `weights` (angles, 4).
-    """
-
-    rows: Ints
-    columns: Ints
-    weights: Floats
-
-
-def circle_taps(radius: float, angles: int, turn: float = 0.0) -> Taps:
-    """The taps at `angles` equal steps around a circle of `radius` pixels; the first lies at `turn` radians.
-
-    Angles run from the direction of growing columns to that of growing rows.
+    At each four pixels, as offsets from the one that the kernel turns around in an image with `stride` values in a row,
+    and their bilinear weights: (angles, 4) each. The first lies at `turn` radians; angles run from the direction of
+    growing columns to that of growing rows.
     """
     angle = 2.0 * math.pi * np.arange(angles) / angles + turn
     # Rounded, so that a neighbour on the very pixel is not read from the one before with a weight of 1e-16.
     x, y = np.round(radius * np.cos(angle), 9), np.round(radius * np.sin(angle), 9)
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     right, down = x - column, y - row
-    return Taps(
-        np.stack([row, row, row + 1, row + 1], axis=1),
-        np.stack([column, column + 1, column, column + 1], axis=1),
-        np.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down], axis=1).astype(
-            np.float32
-        ),
-    )
+    at = row * stride + column * channels
+    weights = np.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down], axis=1)
+    return at[:, None] + np.array([0, channels, stride, stride + channels]), weights.astype(np.float32)
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -144,14 +131,8 @@ class Kernel(NamedTuple):
         return math.ceil(max(self.radii))
 
     def _taps(self, stride: int, channels: int) -> tuple[Ints, Floats, Ints, Floats]:
-        first = circle_taps(self.radii[0], self.angles)
-        second = circle_taps(self.radii[1], self.angles, math.pi / 2)
-        return (
-            first.rows * stride + first.columns * channels,
-            first.weights,
-            second.rows * stride + second.columns * channels,
-            second.weights,
-        )
+        first = circle_taps(self.radii[0], self.angles, 0.0, stride, channels)
+        return *first, *circle_taps(self.radii[1], self.angles, math.pi / 2, stride, channels)
 
     def means(self, padded: Floats) -> Floats:
         """The integral at each pixel of an image: (rows, columns, channels), of values in [0, 1] in [0, 1].
