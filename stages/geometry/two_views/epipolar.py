@@ -25,15 +25,10 @@ Poses = tuple[Array, Array]
 """Rotations (K, 3, 3) and translations (K, 3)."""
 
 
-def cross_matrix(vector: npt.ArrayLike) -> Array:
-    """[v]x (3, 3), so that [v]x w = v x w."""
-    x, y, z = np.asarray(vector, dtype=np.float64)
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def essential(rotation: Array, translation: npt.ArrayLike) -> Array:
-    """E = [t]x R (3, 3)."""
-    product: Array = cross_matrix(translation) @ rotation
+    """E = [t]x R (3, 3), with [t]x w = t x w."""
+    x, y, z = np.asarray(translation, dtype=np.float64)
+    product: Array = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ rotation
     return product
 
 
