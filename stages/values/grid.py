@@ -34,14 +34,6 @@ class OccupancyGrid(Value):
         """Row and column of the cells in which points (N, >= 2) lie: (N, 2), also of cells that are not there."""
         return cells_of(points, self.origin, self.resolution)
 
-    def states_at(self, points: Array) -> Cells:
-        """States of the cells in which points (N, >= 2) lie: (N,), unknown outside the grid."""
-        row, column = self.cells_of(points).T
-        inside = (row >= 0) & (row < self.cells.shape[0]) & (column >= 0) & (column < self.cells.shape[1])
-        states = np.full(len(row), UNKNOWN, np.uint8)
-        states[inside] = self.cells[row[inside], column[inside]]
-        return states
-
     def centres(self, rows: Ints, columns: Ints) -> Array:
         """Centres (m) of cells: (N, 2)."""
         centres: Array = np.array(self.origin) + self.resolution * (np.column_stack([columns, rows]) + 0.5)
