@@ -13,6 +13,9 @@ import numpy as np
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Bytes, Floats, Ints
 
+Taps = tuple[Ints, Floats, Ints, Floats]
+"""Offsets and weights (angles, 4), as `circle_taps` gives them, of both factors of a kernel."""
+
 
 def circle_taps(radius: float, angles: int, turn: float, stride: int, channels: int) -> tuple[Ints, Floats]:
     """Positions of a factor of the kernel at `angles` equal steps around a circle of `radius` pixels.
@@ -42,18 +45,9 @@ def _row_of_taps(flat: Floats, at: int, offsets: Ints, weights: Floats, out: Flo
 
 
 @compiled(nogil=True, error_model="numpy")
-def _means(
-    flat: Floats,
-    stride: int,
-    start: int,
-    first: Ints,
-    first_weights: Floats,
-    second: Ints,
-    second_weights: Floats,
-    root: bool,
-    out: Floats,
-) -> None:
+def _means(flat: Floats, stride: int, start: int, taps: Taps, root: bool, out: Floats) -> None:
     # One row of all channels at a time, angle by angle: the inner loops are whole vector instructions.
+    first, first_weights, second, second_weights = taps
     angles, (rows, length) = len(first), out.shape
     share = np.float32(1.0 / angles)
     # A neighbour at distance 0 is the pixel itself, whatever the angle: it is read once.
@@ -77,16 +71,8 @@ def _means(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _means_at(
-    flat: Floats,
-    starts: Ints,
-    first: Ints,
-    first_weights: Floats,
-    second: Ints,
-    second_weights: Floats,
-    root: bool,
-    out: Floats,
-) -> None:
+def _means_at(flat: Floats, starts: Ints, taps: Taps, root: bool, out: Floats) -> None:
+    first, first_weights, second, second_weights = taps
     angles, channels = len(first), out.shape[1]
     share = np.float32(1.0 / angles)
     one, other = np.empty((angles, channels), np.float32), np.empty((angles, channels), np.float32)
@@ -130,7 +116,7 @@ class Kernel(NamedTuple):
         """Number of pixels around one that it reads."""
         return math.ceil(max(self.radii))
 
-    def _taps(self, stride: int, channels: int) -> tuple[Ints, Floats, Ints, Floats]:
+    def _taps(self, stride: int, channels: int) -> Taps:
         first = circle_taps(self.radii[0], self.angles, 0.0, stride, channels)
         return *first, *circle_taps(self.radii[1], self.angles, math.pi / 2, stride, channels)
 
@@ -142,8 +128,7 @@ class Kernel(NamedTuple):
         m, (rows, columns, channels) = self.margin + 1, padded.shape
         stride = columns * channels
         out = np.empty((rows - 2 * m, (columns - 2 * m) * channels), np.float32)
-        taps = self._taps(stride, channels)
-        _means(padded.ravel(), stride, m * stride + m * channels, *taps, self.root, out)
+        _means(padded.ravel(), stride, m * stride + m * channels, self._taps(stride, channels), self.root, out)
         return out.reshape(rows - 2 * m, columns - 2 * m, channels)
 
     def means_at(self, padded: Floats, rows: Ints, columns: Ints) -> Floats:
@@ -152,5 +137,5 @@ class Kernel(NamedTuple):
         stride = wide * channels
         out = np.empty((len(rows), channels), np.float32)
         starts = (rows + m) * stride + (columns + m) * channels
-        _means_at(padded.ravel(), starts, *self._taps(stride, channels), self.root, out)
+        _means_at(padded.ravel(), starts, self._taps(stride, channels), self.root, out)
         return out
