@@ -37,16 +37,6 @@ def solve(matrix: Array, right: Array) -> Array:
 
 
 @compiled(nogil=True)
-def cross(one: Array, two: Array) -> Array:
-    """The vector product of two vectors (3,)."""
-    out = np.empty(3)
-    out[0] = one[1] * two[2] - one[2] * two[1]
-    out[1] = one[2] * two[0] - one[0] * two[2]
-    out[2] = one[0] * two[1] - one[1] * two[0]
-    return out
-
-
-@compiled(nogil=True)
 def unit(vector: Array) -> Array:
     """A vector (3,) at length 1."""
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
