@@ -48,21 +48,22 @@ def turned_views(view: Floats, headings: int) -> Floats:
     segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that histograms still sum to
     1.
     """
-    return _shifted(view, np.arange(headings) * len(view) / headings)
+    return _shifted(view[None], np.arange(headings) * len(view) / headings)
 
 
 def turned_view(view: Floats, turn: float) -> Floats:
     """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
-    turned: Floats = _shifted(view, np.array([-turn * len(view) / (2 * np.pi)]))[0]
+    turned: Floats = _shifted(view[None], np.array([-turn * len(view) / (2 * np.pi)]))[0]
     return turned
 
 
-def _shifted(view: Floats, shifts: Array) -> Floats:
-    segments = len(view)
+def _shifted(views: Floats, shifts: Array) -> Floats:
+    # Segment j of each view (N or 1, segments, bins) from where segment j + shift was, by each of the shifts (N,).
+    segments, rows = views.shape[1], np.arange(len(views))[:, None]
     whole = np.floor(shifts).astype(np.int64)
     part = (shifts - whole).astype(np.float32)[:, None, None]
     first = (np.arange(segments) + whole[:, None]) % segments
-    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
+    turned: Floats = views[rows, first] * (1 - part) + views[rows, (first + 1) % segments] * part
     return turned
 
 
@@ -269,13 +270,10 @@ def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureK
     `turns`: the robot's heading less the reference's own (radians).
     """
     segments = len(view)
-    out = np.empty(len(references), np.float32)
-    for n, turn in enumerate(turns):
-        expected = turned_view(references[n], float(turn))
-        if kind == "histograms":
-            alike = np.minimum(expected, view).sum(axis=1)
-        else:
-            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / MAX_DISTANCES[kind]
-        best = np.cumsum(np.sort(alike)[::-1]) * penalties(segments, exponent)
-        out[n] = best.max()
-    return out
+    expected = _shifted(references, -turns * segments / (2 * np.pi))
+    if kind == "histograms":
+        alike = np.minimum(expected, view).sum(axis=2)
+    else:
+        alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=2)) / MAX_DISTANCES[kind]
+    best = np.cumsum(np.sort(alike, axis=1)[:, ::-1], axis=1) * penalties(segments, exponent)
+    return np.asarray(best.max(axis=1), np.float32)
