@@ -61,12 +61,11 @@ def best_turns(values: Floats, kept: Floats, channels: int, segments: int, steps
     """
     here, there = unpacked(values, channels), unpacked(kept, channels)
     frequencies = here.shape[-1]
-    cross = (_share(frequencies, segments) * np.conj(there) * here).sum(axis=-2)
-    # A signal delayed by t has its coefficient k turned by exp(-i k t): the correlation at t is sum Re(cross e^{ikt}).
+    against = -(_share(frequencies, segments) * np.conj(there) * here).sum(axis=-2)
+    # A signal delayed by t has coefficient k turned by exp(-i k t): the correlation at t is -sum Re(against e^{ikt}).
     angles = 2.0 * math.pi * np.arange(steps) / steps
     waves = np.exp(1j * np.outer(np.arange(frequencies), angles))
-    correlation = (cross @ waves).real
-    return wrap(angles_of_least(-correlation))
+    return wrap(angles_of_least((against @ waves).real))
 
 
 def _share(frequencies: int, segments: int) -> Array:
