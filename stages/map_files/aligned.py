@@ -4,25 +4,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from omninav.stages.geometry.appearance.closures import closures_by_appearance
+from omninav.stages.geometry.appearance.closures import MIN_GAP, closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
-Array = npt.NDArray[np.float64]
-
-HEADINGS = 36
-"""Headings at which references are compared."""
-MIN_EXCESS = 0.7
-"""Share of the similarity above the background that two references keep where they close a loop."""
-MIN_GAP = 5.0
-"""Way along a drive, in length scales, after which they may."""
-SAMPLES = 1000
-"""References that look for a partner."""
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
 
@@ -56,10 +45,7 @@ def aligned(maps: Sequence[ReferenceGraph]) -> Alignment | None:
     steps[np.diff(drives) > 0] = [1e9, 0.0, 0.0]  # no way leads from one map to the next
     driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     features = np.concatenate([map.features[:] for map in maps])
-    closures = closures_by_appearance(
-        features, driven, maps[0].kind == "histograms", MAX_DISTANCES[maps[0].kind], HEADINGS, MIN_EXCESS,
-        MIN_GAP * unit, SAMPLES,
-    )  # fmt: skip
+    closures = closures_by_appearance(features, maps[0].kind, driven, unit)
     if not len(closures.pairs):
         return None
     poses, joined = placed_drives(own, drives, closures, MIN_GAP * unit)

@@ -4,18 +4,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.landmarks import Landmarks, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 
 from .aligned import Alignment
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 MAX_COMPARED = 8_000
 """Landmarks of a map that are compared, evenly spaced: of more, enough are the same among these."""

@@ -9,12 +9,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.appearance.visual_words import learned_words
+from omninav.stages.geometry.arrays import Bytes, Ints
 from omninav.stages.values.landmarks import Landmarks, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords, words_of_roots
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 DESCRIPTORS_PER_WORD = 16
 """Landmarks' descriptors that a vocabulary is learned from, for each word."""
@@ -57,12 +55,9 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
 
 def _of_all(map: ReferenceGraph, other: Landmarks) -> Landmarks:
     """A map's landmarks with an entry for each of its references; none of a map without."""
-    rows = np.arange(len(map))
-    return (
-        other.of_references(np.full(len(map), other.references))
-        if map.landmarks is None
-        else (map.landmarks.of_references(rows))
-    )
+    if map.landmarks is None:
+        return other.of_references(np.full(len(map), other.references))
+    return map.landmarks.of_references(np.arange(len(map)))
 
 
 def _joined_words(words: Sequence[VisualWords]) -> VisualWords | None:
@@ -81,7 +76,7 @@ def _joined_words(words: Sequence[VisualWords]) -> VisualWords | None:
 
 
 def _words_of_landmarks(
-    given: Sequence[Landmarks], descriptors: npt.NDArray[np.uint8], starts: Ints, seen: npt.NDArray[np.int32]
+    given: Sequence[Landmarks], descriptors: Bytes, starts: Ints, seen: npt.NDArray[np.int32]
 ) -> VisualWords:
     number = max(len(each.words.centres) for each in given)
     values = restored_descriptors(descriptors)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
+from omninav.stages.geometry.arrays import Bools, Ints
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import StoredViews, TopologicalMap
-
-Ints = npt.NDArray[np.int64]
 
 
 def joined_places(maps: Sequence[TopologicalMap], pose_source: PoseSource) -> TopologicalMap:
@@ -60,13 +58,13 @@ def thinned_places(map: TopologicalMap, spacing_m: float) -> TopologicalMap:
     return _chosen(map, np.ones(len(map), bool), np.arange(len(map.links)), ways)
 
 
-def cut_places(map: TopologicalMap, inside: npt.NDArray[np.bool_]) -> TopologicalMap:
+def cut_places(map: TopologicalMap, inside: Bools) -> TopologicalMap:
     """The places of a mask (P,), and the links between them with all their path images."""
     links = np.flatnonzero(inside[map.links].all(axis=1))
     return _chosen(map, inside, links, [map.path_of(link) for link in links.tolist()])
 
 
-def _chosen(map: TopologicalMap, places: npt.NDArray[np.bool_], links: Ints, ways: Sequence[Ints]) -> TopologicalMap:
+def _chosen(map: TopologicalMap, places: Bools, links: Ints, ways: Sequence[Ints]) -> TopologicalMap:
     """The places of a mask and some links, each with its path images; strays go to the link's first place."""
     used = np.unique(np.concatenate([map.places[places], *ways]))
     place, owner = np.cumsum(places) - 1, map.owner.copy()

@@ -1,10 +1,9 @@
 """Points as a file that other programs open."""
 
-import numpy as np
-import numpy.typing as npt
+from omninav.stages.geometry.arrays import Floats
 
 
-def ply(points: npt.NDArray[np.float32]) -> bytes:
+def ply(points: Floats) -> bytes:
     """Points (N, 3) as a binary PLY file (Turk 1994) of vertices alone."""
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"

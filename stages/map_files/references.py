@@ -5,19 +5,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.pipeline.graph.stored_rows import GatheredRows, StoredRows
 from omninav.stages.geometry.appearance.segments import Rows
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 
 from .landmarks import joined_landmarks
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 OTHER_VIEW = math.radians(30.0)
 """Difference in direction (rad) from which views in one direction only show something else."""
@@ -76,7 +73,7 @@ def keepers(poses: Array, spacing_m: float, turn: float) -> Ints:
     return keeper
 
 
-def cut_references(map: ReferenceGraph, inside: npt.NDArray[np.bool_]) -> ReferenceGraph:
+def cut_references(map: ReferenceGraph, inside: Bools) -> ReferenceGraph:
     """The references of a mask (R,), and the edges between them."""
     kept = np.flatnonzero(inside)
     row = np.cumsum(inside) - 1

@@ -171,7 +171,7 @@ class AdaptiveViews(Stage):
             weights,
         )
         touched: Ints = map.ids[np.unique(map.owner[weights != map.weights])]
-        map.put_weights(weights)
+        map.put(weights=weights)
         map.keep_components(map.weights >= self.min_weight)
         map.keep_views(np.bincount(map.owner, minlength=len(map)) > 0)
         return touched

@@ -58,10 +58,10 @@ class LoopClosure(Stage):
         subcluster = subclusters_of(cluster, views)
         number = int(subcluster.max()) + 1
         medoids = place_clusters.medoids(distances, subcluster)
-        found = place_clusters.hypotheses(cluster, subcluster, medoids)
+        pairs = place_clusters.hypotheses(cluster, subcluster)
         known = owners[medoids]
-        open_ = (known[found.pairs] < 0).any(axis=1)  # two places of a known map are not questioned again
-        pairs, ends = found.pairs[open_], found.medoids[open_]
+        pairs = pairs[(known[pairs] < 0).any(axis=1)]  # two places of a known map are not questioned again
+        ends = medoids[pairs]
         if self.between == "nearest":
             ends = place_clusters.nearest_views(distances, subcluster, pairs)
         visual_distances = distances[ends[:, 0], ends[:, 1]]

@@ -32,7 +32,7 @@ def pose_of_view(
                 "mapping: the tour has no ground truth for its first image; "
                 "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
             )
-        map.take_poses_from(source)
+        map.put(pose_source=source)
         ctx.fact("map_poses", source)
     pose = truth if map.pose_source == "truth" else odometry
     if pose is None:

@@ -7,7 +7,6 @@ import numpy as np
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
 from omninav.stages.geometry.plane.drive_graph import closure_sigmas, straightened_drives
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
@@ -18,15 +17,6 @@ QUANTITIES = {
     "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
     "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
 }
-
-MIN_EXCESS = 0.7
-"""Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
-HEADINGS = 36
-"""Headings at which references are compared."""
-SAMPLES = 1000
-"""References that look for another, evenly spaced over a map of more."""
-MIN_GAP = 5.0
-"""Way along the drive, in length scales, after which two references may close a loop."""
 
 
 class StraightenMap(Stage):
@@ -57,10 +47,7 @@ class StraightenMap(Stage):
             return self.Out(map=map)
         steps = between(map.poses[:-1], map.poses[1:])
         driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-        closures = closures_by_appearance(
-            map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], HEADINGS,
-            MIN_EXCESS, MIN_GAP * unit, SAMPLES,
-        )  # fmt: skip
+        closures = closures_by_appearance(map.features[:], map.kind, driven, unit)
         if not len(closures.pairs):
             ctx.fact(
                 "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"

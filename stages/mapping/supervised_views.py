@@ -40,7 +40,7 @@ class SupervisedViews(Stage):
     ) -> Out:
         """Make the map of a whole tour."""
         map = ViewMixtures.empty()
-        map.take_poses_from("truth")
+        map.put(pose_source="truth")
         covariance = np.diag([SIGMA_M**2, SIGMA_M**2, math.radians(SIGMA_DEG) ** 2])
         for view, pose in zip(views, truth, strict=True):
             if view is None or pose is None:

@@ -109,14 +109,7 @@ class ViewComparison(Stage):
                 owners=np.array([view.owner for view in views], np.int64),
                 distances=distances,
                 shares=shares,
-                options=(
-                    options.ratio,
-                    options.segment_ratio,
-                    options.max_colour_distance,
-                    options.min_matches,
-                    options.min_angle,
-                    options.patch_distance,
-                ),
+                options=options[:-1],  # how they were searched does not matter
             )
         )
 

@@ -5,15 +5,14 @@ from abc import abstractmethod
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Covariances, Shape, Shares
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import mode_and_mean, weighted_mean
 
 from .pose import Pose
 
-Array = npt.NDArray[np.float64]
 MODE_RADIUS = (1.0, math.radians(30.0))
 """Radius of a mode of particles, m and rad: those within it of the mode's mean belong to it."""
 

@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 class Candidates(Value):
@@ -16,5 +14,5 @@ class Candidates(Value):
     where the others are only sampled. Sums weighted by it are unbiased estimates for the whole map.
     """
 
-    references: Annotated[npt.NDArray[np.int64] | None, Shape("N"), Bounds(ge=0)] = None
-    sampling_weight: Annotated[npt.NDArray[np.float64] | None, Shape("N"), Bounds(gt=0)] = None
+    references: Annotated[Ints | None, Shape("N"), Bounds(ge=0)] = None
+    sampling_weight: Annotated[Array | None, Shape("N"), Bounds(gt=0)] = None

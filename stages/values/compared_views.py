@@ -3,17 +3,14 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, ViewFeatures
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .local_features import GlobalDescriptor, LocalFeatures, view_features
 from .pose import PoseSource
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 class ComparedViews(Value):
@@ -55,13 +52,5 @@ class ComparedViews(Value):
         return float(apart.std()) if len(apart) else 0.0
 
     def comparison_options(self) -> ComparisonOptions:
-        """Name of the comparison."""
-        ratio, segment_ratio, max_colour_distance, min_matches, min_angle, patch_distance = self.options
-        return ComparisonOptions(
-            ratio,
-            segment_ratio,
-            max_colour_distance,
-            patch_distance=patch_distance,
-            min_matches=min_matches,
-            min_angle=min_angle,
-        )
+        """The options by which the views were compared."""
+        return ComparisonOptions(*self.options)

@@ -2,11 +2,9 @@
 
 from typing import Annotated, ClassVar, Literal, get_args
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Ints
 
 Probability = Annotated[float, Bounds(ge=0, le=1)]
 
@@ -49,8 +47,8 @@ class ConfidenceReliability(Value):
     that were within the tolerance (`within_m`, `within_deg`), and `counts` (B,), how many frames there are.
     """
 
-    stated: Annotated[npt.NDArray[np.float64], Shape("B"), Bounds(ge=0, le=1)]
-    observed: Annotated[npt.NDArray[np.float64], Shape("B"), Bounds(ge=0, le=1)]
-    counts: Annotated[npt.NDArray[np.int64], Shape("B"), Bounds(ge=1)]
+    stated: Annotated[Array, Shape("B"), Bounds(ge=0, le=1)]
+    observed: Annotated[Array, Shape("B"), Bounds(ge=0, le=1)]
+    counts: Annotated[Ints, Shape("B"), Bounds(ge=1)]
     within_m: Annotated[float, Bounds(gt=0)]
     within_deg: Annotated[float, Bounds(gt=0)]

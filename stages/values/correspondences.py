@@ -2,13 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 class Correspondences(Value):
@@ -21,7 +17,7 @@ class Correspondences(Value):
 
     first: Annotated[Ints, Shape("M"), Bounds(ge=0)]
     second: Annotated[Ints, Shape("M"), Bounds(ge=0)]
-    distance: Annotated[npt.NDArray[np.float64], Shape("M"), Bounds(ge=0)]
+    distance: Annotated[Array, Shape("M"), Bounds(ge=0)]
 
     def __len__(self) -> int:
         return len(self.first)

@@ -2,13 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 
 class Depths(Value):

@@ -4,16 +4,14 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.stages.geometry.arrays import Array as Array  # metrics and plots have it from here
+from omninav.stages.geometry.arrays import Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 from .evidence import ImageEvidence
 from .pose import Pose
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 EVIDENCE = tuple(each.name for each in dataclasses.fields(ImageEvidence) if each.name != "conflict")
 """Columns of a drive's evidence: the numbers of `ImageEvidence`."""
@@ -73,7 +71,7 @@ class Drive(Value):
     def __len__(self) -> int:
         return len(self.row)
 
-    def at(self, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> "Drive":
+    def at(self, rows: Bools | Ints | slice) -> "Drive":
         """Some of the rows."""
         named = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return dataclasses.replace(self, **{name: rowed[rows] for name, rowed in named.items() if name != "conflicts"})
@@ -127,7 +125,7 @@ class Drive(Value):
         return compose(at[anchor], between(path[anchor], path))
 
 
-def known(poses: Array) -> npt.NDArray[np.bool_]:
+def known(poses: Array) -> Bools:
     """Which rows of (N, 3) poses are there: (N,)."""
     return np.asarray(np.isfinite(poses).all(axis=1))
 

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Bytes
+
 MAX_PIXELS = 1 << 25
 """Largest decoded image, pixels: an equirectangular image of 8000 x 4000 fits."""
 MAX_FILE_BYTES = 100_000_000
@@ -35,9 +37,7 @@ class Undecodable(ValueError):
     """Bytes that are no image; the message says what is wrong with them."""
 
 
-def decode_image(
-    data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS, upright: bool = False
-) -> npt.NDArray[np.uint8]:
+def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS, upright: bool = False) -> Bytes:
     """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
 
     `upright`: a JPEG is turned as its EXIF orientation says, as of a camera that was held on its side.
@@ -73,21 +73,11 @@ def orientation_of(data: bytes) -> int:
     try:
         while data.startswith(b"\xff\xd8") and data[at] == 0xFF and data[at + 1] != 0xDA:
             if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
-                return _stated_orientation(data[at + 10 : at + 10 + EXIF_BYTES])
+                entries = _entries(data[at + 10 : at + 10 + EXIF_BYTES], 0x0112)
+                return next((value for _, kind, value in entries if kind == 3), 1)
             at += 2 + struct.unpack_from(">H", data, at + 2)[0]
     except (IndexError, struct.error):
         pass
-    return 1
-
-
-def _stated_orientation(exif: bytes) -> int:
-    order = "<" if exif.startswith(b"II") else ">"
-    (at,) = struct.unpack_from(f"{order}I", exif, 4)
-    (entries,) = struct.unpack_from(f"{order}H", exif, at)
-    for number in range(entries):
-        tag, kind, _, value = struct.unpack_from(f"{order}HHIH", exif, at + 2 + 12 * number)
-        if (tag, kind) == (0x0112, 3):
-            return int(value)
     return 1
 
 
@@ -98,7 +88,7 @@ def size_of(data: bytes) -> tuple[int, int]:
         raise Undecodable(f"{len(data)} bytes that are no JPEG, PNG, BMP, PNM, WebP or TIFF")
     try:
         return read(data)
-    except (struct.error, StopIteration, ValueError):
+    except (struct.error, KeyError, ValueError):
         raise Undecodable(f"{len(data)} bytes of an image that does not say its size") from None
 
 
@@ -119,20 +109,14 @@ def _png_is_whole(data: bytes) -> bool:
 
 
 def _jpeg(data: bytes) -> tuple[int, int]:
-    return next(_jpeg_frames(data))
-
-
-def _jpeg_frames(data: bytes) -> Iterator[tuple[int, int]]:
     at = 2
-    while at + 4 <= len(data):
-        at = data.find(b"\xff", at)  # OpenCV, too, looks for the next marker
-        if not 0 <= at <= len(data) - 4:
-            return
+    while 0 <= (at := data.find(b"\xff", at)) <= len(data) - 4:  # OpenCV, too, looks for the next marker
         marker, (length,) = data[at + 1], struct.unpack_from(">H", data, at + 2)
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack_from(">HH", data, at + 5)
-            yield width, height
+            return width, height
         at += 1 if marker == 0xFF else 2 if marker in (0x00, 0x01, *range(0xD0, 0xD9)) else 2 + max(length, 2)
+    raise ValueError
 
 
 def _bmp(data: bytes) -> tuple[int, int]:
@@ -162,17 +146,19 @@ def _webp(data: bytes) -> tuple[int, int]:
 
 
 def _tiff(data: bytes) -> tuple[int, int]:
+    sizes = {tag: value for tag, _, value in _entries(data, 256, 257)}
+    return sizes[256], sizes[257]
+
+
+def _entries(data: bytes, *tags: int) -> Iterator[tuple[int, int, int]]:
+    """Tag, type and number of those entries in the first directory of a TIFF file, such as EXIF, that have the tags."""
     order = "<" if data.startswith(b"II") else ">"
     (at,) = struct.unpack_from(f"{order}I", data, 4)
-    sizes = {}
     for number in range(min(struct.unpack_from(f"{order}H", data, at)[0], 200)):
         tag, kind = struct.unpack_from(f"{order}HH", data, at + 2 + 12 * number)
-        if tag in (256, 257):
-            form = f"{order}{'H' if kind == 3 else 'I'}"
-            sizes[tag] = struct.unpack_from(form, data, at + 2 + 12 * number + 8)[0]
-    if len(sizes) < 2:
-        raise ValueError
-    return sizes[256], sizes[257]
+        if tag in tags:
+            (value,) = struct.unpack_from(f"{order}{'H' if kind == 3 else 'I'}", data, at + 10 + 12 * number)
+            yield tag, kind, value
 
 
 _KINDS: tuple[tuple[bytes, Callable[[bytes], tuple[int, int]]], ...] = (

@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array
 
 Metres = Annotated[float, Bounds(ge=0)]
 
@@ -15,7 +13,7 @@ class MatchLeads(Value):
     """The best match of an image, and by how much it leads others, in standard deviations of the similarity over the
     compared references."""
 
-    place: Annotated[npt.NDArray[np.float64], Shape(3)]
+    place: Annotated[Array, Shape(3)]
     """Pose of a robot that sees the best match (m, rad)."""
     over_elsewhere: Annotated[float, Bounds(ge=0)]
     """Lead over the best match elsewhere, 0 where all show one place."""

@@ -8,8 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape, UnitRows
 from omninav.stages.geometry.appearance.segments import FeatureKind
-
-FloatArray = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Array, Floats
 
 
 class SegmentFeatures(Value):
@@ -22,7 +21,7 @@ class SegmentFeatures(Value):
 
     kind: ClassVar[FeatureKind]
 
-    values: Annotated[FloatArray, Shape("segments", "bins")]
+    values: Annotated[Floats, Shape("segments", "bins")]
 
 
 class SegmentHistograms(SegmentFeatures):
@@ -37,7 +36,7 @@ class SegmentHistograms(SegmentFeatures):
 
     kind = "histograms"
 
-    directions: Annotated[npt.NDArray[np.float64] | None, Shape("segments")] = None
+    directions: Annotated[Array | None, Shape("segments")] = None
     scales: Annotated[int, Bounds(ge=1)] = 1
 
 
@@ -52,7 +51,7 @@ class SegmentDescriptors(SegmentFeatures):
 
     kind = "descriptors"
 
-    values: Annotated[FloatArray, Shape("segments", "bins"), UnitRows()]
+    values: Annotated[Floats, Shape("segments", "bins"), UnitRows()]
 
     @classmethod
     def of(cls, vectors: npt.NDArray[np.floating]) -> "SegmentDescriptors":

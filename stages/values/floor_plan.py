@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array
 
 
 class FloorPlan(Value):
@@ -16,6 +14,6 @@ class FloorPlan(Value):
     """
 
     is_truth = True
-    outlines: Annotated[npt.NDArray[np.float64], Shape("B", 4, 2)]
+    outlines: Annotated[Array, Shape("B", 4, 2)]
     width: Annotated[float, Bounds(gt=0)]
     depth: Annotated[float, Bounds(gt=0)]

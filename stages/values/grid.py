@@ -7,9 +7,8 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Ints
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Cells = npt.NDArray[np.uint8]
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
@@ -34,14 +33,6 @@ class OccupancyGrid(Value):
     def cells_of(self, points: Array) -> Ints:
         """Row and column of the cells in which points (N, >= 2) lie: (N, 2), also of cells that are not there."""
         return cells_of(points, self.origin, self.resolution)
-
-    def states_at(self, points: Array) -> Cells:
-        """States of the cells in which points (N, >= 2) lie: (N,), unknown outside the grid."""
-        row, column = self.cells_of(points).T
-        inside = (row >= 0) & (row < self.cells.shape[0]) & (column >= 0) & (column < self.cells.shape[1])
-        states = np.full(len(row), UNKNOWN, np.uint8)
-        states[inside] = self.cells[row[inside], column[inside]]
-        return states
 
     def centres(self, rows: Ints, columns: Ints) -> Array:
         """Centres (m) of cells: (N, 2)."""

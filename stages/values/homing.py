@@ -5,18 +5,16 @@ from dataclasses import field, replace
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 
 from .local_features import LocalFeatures
 from .pose import Motion
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Finite = Annotated[float, Bounds(ge=-1e15, le=1e15)]
 
 

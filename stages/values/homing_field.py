@@ -1,11 +1,9 @@
 """Homing vectors from many points towards one target."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Value
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 class HomingField(Value):
@@ -20,7 +18,7 @@ class HomingField(Value):
     poses: Array
     directions: Array
     errors: Array
-    inliers: npt.NDArray[np.int64]
+    inliers: Ints
 
     @property
     def metres(self) -> Array:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 
 Pixels = npt.NDArray[np.uint8]
 Elevation = Bounds(ge=-math.pi / 2 - 1e-6, le=math.pi / 2 + 1e-6)
@@ -39,7 +40,7 @@ class Panorama(Value):
 class Strip(Value):
     """A small panorama in grey. `pixels`: (rows, columns) float32, means over equal parts of a `Panorama`."""
 
-    pixels: Annotated[npt.NDArray[np.float32], Shape("rows", "columns")]
+    pixels: Annotated[Floats, Shape("rows", "columns")]
 
 
 class Windows(Value):
@@ -53,12 +54,12 @@ class Windows(Value):
 
     bulky = True
     pixels: Annotated[Pixels, Shape("W", "rows", "columns", 3)]
-    headings: Annotated[npt.NDArray[np.float64], Shape("W")]
+    headings: Annotated[Array, Shape("W")]
     field: Annotated[float, Bounds(gt=0, le=2 * math.pi)]
-    seen: Annotated[npt.NDArray[np.bool_] | None, Shape("W", "rows", "columns")] = None
+    seen: Annotated[Bools | None, Shape("W", "rows", "columns")] = None
 
 
-def column_azimuths(columns: int) -> npt.NDArray[np.float64]:
+def column_azimuths(columns: int) -> Array:
     """Azimuths of the column centres of a panorama: (columns,) radians, counter-clockwise from forward."""
-    azimuths: npt.NDArray[np.float64] = math.pi - 2 * math.pi * (np.arange(columns) + 0.5) / columns
+    azimuths: Array = math.pi - 2 * math.pi * (np.arange(columns) + 0.5) / columns
     return azimuths

@@ -8,13 +8,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape, Starts
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 
 from .visual_words import VisualWords
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Bytes = npt.NDArray[np.uint8]
-Ints = npt.NDArray[np.int64]
 
 DESCRIPTOR_SCALE = 512.0
 """Stored value of a descriptor's 1: of RootSIFT no number is larger than a half in practice."""
@@ -130,7 +126,7 @@ class LandmarkFix(Value):
     def __len__(self) -> int:
         return len(self.poses)
 
-    def without(self, out: npt.NDArray[np.bool_]) -> "LandmarkFix":
+    def without(self, out: Bools) -> "LandmarkFix":
         """The other poses, as probable as without those (K,) that are ruled out."""
         kept = np.flatnonzero(~out)
         numbers = np.full(len(self) + 1, -1, np.int8)  # the last one: none, which stays none

@@ -4,15 +4,11 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import Patches, Segments, ViewFeatures, patches
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Bytes = npt.NDArray[np.uint8]
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 
 
 class VerticalSegments(Value):
@@ -33,7 +29,7 @@ class VerticalSegments(Value):
     def __len__(self) -> int:
         return len(self.azimuths)
 
-    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "VerticalSegments":
+    def chosen(self, rows: Ints | slice) -> "VerticalSegments":
         """Some of them."""
         return VerticalSegments(
             self.azimuths[rows], self.elevations[rows], self.descriptors[rows], self.weights[rows], self.points[rows]
@@ -71,7 +67,7 @@ class LocalFeatures(Value):
     def __len__(self) -> int:
         return len(self.bearings)
 
-    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "LocalFeatures":
+    def chosen(self, rows: Ints | slice) -> "LocalFeatures":
         """Some of the patches, and all columns."""
         return replace(
             self,

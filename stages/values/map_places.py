@@ -1,7 +1,8 @@
 """The poses that a map of any kind holds."""
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array
 
 from .maps import ReferenceGraph
 from .topological_map import TopologicalMap
@@ -11,7 +12,7 @@ AnyMap = ReferenceGraph | ViewMixtures | TopologicalMap
 """Every kind of map that has poses."""
 
 
-def map_poses(map: AnyMap | None) -> npt.NDArray[np.float64]:
+def map_poses(map: AnyMap | None) -> Array:
     """A graph's references, the means of a map of mixtures, or where the pictures of a topological map were taken.
 
     (N, 3) x, y (m), heading (rad); none without a map.

@@ -4,11 +4,11 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import RowsOf, Shape
 from omninav.stages.geometry.appearance.segments import FeatureKind, Rows
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 from .growable_arrays import GrowableArrays
 from .landmarks import Landmarks
@@ -30,10 +30,10 @@ class ReferenceGraph(GrowableArrays, Value):
     in_place = True
     grows = ("poses", "features", "edges")
 
-    poses: Annotated[npt.NDArray[np.float64], Shape("R", 3)]
+    poses: Annotated[Array, Shape("R", 3)]
     features: Annotated[Rows, Shape("R", "segments", "bins")]
     kind: FeatureKind
-    edges: Annotated[npt.NDArray[np.int64], Shape("E", 2), RowsOf("R")]
+    edges: Annotated[Ints, Shape("E", 2), RowsOf("R")]
     pose_source: PoseSource
     landmarks: Landmarks | None = None
 
@@ -46,7 +46,7 @@ class ReferenceGraph(GrowableArrays, Value):
     def __len__(self) -> int:
         return len(self.poses)
 
-    def insert(self, pose: Pose, features: npt.NDArray[np.float32], kind: FeatureKind) -> int:
+    def insert(self, pose: Pose, features: Floats, kind: FeatureKind) -> int:
         """Add a reference and give its index. Raises ValueError where the features are not of the map's shape."""
         if not len(self):
             self.put(kind=kind, features=np.empty((0, *features.shape), np.float32))
@@ -66,7 +66,7 @@ class ReferenceGraph(GrowableArrays, Value):
         self.append("edges", np.array([low, high], np.int64))
         return True
 
-    def moved(self, poses: npt.NDArray[np.float64]) -> "ReferenceGraph":
+    def moved(self, poses: Array) -> "ReferenceGraph":
         """The map with its references at other poses (R, 3), and each landmark moved with those that see it."""
         landmarks = None if self.landmarks is None else self.landmarks.moved(self.poses, poses)
         return replace(self, poses=poses, landmarks=landmarks)
@@ -77,10 +77,6 @@ class ReferenceGraph(GrowableArrays, Value):
             return None
         return f"'landmarks' are of {self.landmarks.references} references, and the map has {len(self)}"
 
-    def take_poses_from(self, source: PoseSource) -> None:
-        """Say where the poses to come are from."""
-        self.put(pose_source=source)
-
 
 class ReferenceEvent(Value):
     """Change of a reference graph in a tick: the index of the reference it added, and why."""
@@ -89,7 +85,7 @@ class ReferenceEvent(Value):
     reason: Literal["first", "far", "unlike"]
 
 
-def within(poses: npt.NDArray[np.float64], x: float, y: float, radius: float) -> npt.NDArray[np.int64]:
+def within(poses: Array, x: float, y: float, radius: float) -> Ints:
     """Indices of the poses within `radius` metres of a point, nearest first."""
     gap = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
     near = np.flatnonzero(gap <= radius)

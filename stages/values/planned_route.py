@@ -2,11 +2,9 @@
 
 from typing import Annotated, Literal
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Ints
 
 from .commands import GoalPoint
 
@@ -19,7 +17,7 @@ class PlannedRoute(Value):
     another way has another, from 0; -1 before the first. `asked`: how many goals the robot was sent to before.
     """
 
-    places: Annotated[npt.NDArray[np.int64], Shape("K"), Bounds(ge=0)]
+    places: Annotated[Ints, Shape("K"), Bounds(ge=0)]
     state: Literal["locating", "under way", "arrived", "gave up"]
     number: Annotated[int, Bounds(ge=-1)]
     why: str = ""

@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Floats
 
 
 class Projection(Value):
@@ -16,5 +14,5 @@ class Projection(Value):
     images' variance along each row.
     """
 
-    components: Annotated[npt.NDArray[np.float32], Shape("D", "P")]
-    explained: Annotated[npt.NDArray[np.float64], Shape("D")]
+    components: Annotated[Floats, Shape("D", "P")]
+    explained: Annotated[Array, Shape("D")]

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import RowsOf, Shape
-
-Floats = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Bytes, Floats
 
 
 class ReferenceIndex(Value):
@@ -48,7 +47,7 @@ class InvertedLists(ReferenceIndex):
     centroids: Annotated[Floats, Shape("L", "d")]
     codebooks: Annotated[Floats, Shape("M", 16, 2)]
     lists: Annotated[npt.NDArray[np.int32], Shape("R"), RowsOf("L")]
-    codes: Annotated[npt.NDArray[np.uint8], Shape("R", "bytes")]
+    codes: Annotated[Bytes, Shape("R", "bytes")]
 
     def __len__(self) -> int:
         return len(self.lists)

@@ -3,10 +3,10 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array
 
 
 class Rooms(Value):
@@ -17,7 +17,7 @@ class Rooms(Value):
 
     is_truth = True
     names: Annotated[tuple[str, ...], Shape("R")]
-    corners: Annotated[npt.NDArray[np.float64], Shape("R", 4)]
+    corners: Annotated[Array, Shape("R", 4)]
 
     def at(self, x: float, y: float) -> str:
         """The room at a point, the smallest of several; "" where there is none."""

@@ -3,12 +3,10 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 
 class Scan(Value):

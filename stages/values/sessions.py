@@ -3,19 +3,14 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 from omninav.stages.geometry.plane.se2 import chain, compose
 
 from .growable_arrays import GrowableArrays
 from .views import WholeView
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 
 class Sessions(GrowableArrays, Value):

@@ -1,15 +1,12 @@
 """Similarities of the current view to the views of the map."""
 
-import math
 from functools import cached_property
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-from omninav.stages.geometry.probability.evidence import average, best_headings
+from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.probability.evidence import best_headings, centre_and_spread
 
 
 class Similarities(Value):
@@ -28,31 +25,30 @@ class Similarities(Value):
     `last_view`: similarity to the view before, at the best heading; None at the first, and where nobody asks for it.
     """
 
-    values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
-    candidates: Annotated[npt.NDArray[np.int64] | None, Shape("references"), Bounds(ge=0)] = None
-    sampling_weight: Annotated[npt.NDArray[np.float64] | None, Shape("references"), Bounds(gt=0)] = None
+    values: Annotated[Floats, Shape("references", "headings"), Bounds(ge=0, le=1)]
+    candidates: Annotated[Ints | None, Shape("references"), Bounds(ge=0)] = None
+    sampling_weight: Annotated[Array | None, Shape("references"), Bounds(gt=0)] = None
     exponent: float | None = None
     colour_scale: float | None = None
     last_view: Annotated[float | None, Bounds(ge=0, le=1)] = None
 
     @cached_property
-    def best(self) -> npt.NDArray[np.float32]:
+    def best(self) -> Floats:
         """Each reference's similarity at its best heading: (references,). Not to be changed: others read it too."""
         return self._at_best_headings[0]
 
     @cached_property
-    def best_heading(self) -> npt.NDArray[np.int64]:
+    def best_heading(self) -> Ints:
         """The column of each reference's best heading, of equal ones the first: (references,)."""
         return self._at_best_headings[1]
 
     @cached_property
     def spread(self) -> float:
         """Standard deviation of `best` over the map."""
-        best, weights = self.best.astype(np.float64), self.sampling_weight
-        return math.sqrt(average(np.square(best - average(best, weights)), weights))
+        return centre_and_spread(self.best, self.sampling_weight)[1]
 
     @cached_property
-    def _at_best_headings(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]:
+    def _at_best_headings(self) -> tuple[Floats, Ints]:
         return best_headings(self.values)
 
 
@@ -65,13 +61,13 @@ class SimilarityField(Value):
     by sampling weight; `floor_weight`: what they weigh in all. `mean`: mean weight over the map.
     """
 
-    values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
-    candidates: Annotated[npt.NDArray[np.int64] | None, Shape("references"), Bounds(ge=0)]
+    values: Annotated[Floats, Shape("references", "headings"), Bounds(ge=0, le=1)]
+    candidates: Annotated[Ints | None, Shape("references"), Bounds(ge=0)]
     floor: Annotated[float, Bounds(ge=0)]
-    above: Annotated[npt.NDArray[np.int64], Shape("A"), Bounds(ge=0)]
-    weights: Annotated[npt.NDArray[np.float64], Shape("A"), Bounds(ge=0)]
-    excess: Annotated[npt.NDArray[np.float64], Shape("A"), Bounds(ge=0)]
-    floor_cells: Annotated[npt.NDArray[np.float64], Shape("references"), Bounds(ge=0)]
+    above: Annotated[Ints, Shape("A"), Bounds(ge=0)]
+    weights: Annotated[Array, Shape("A"), Bounds(ge=0)]
+    excess: Annotated[Array, Shape("A"), Bounds(ge=0)]
+    floor_cells: Annotated[Array, Shape("references"), Bounds(ge=0)]
     floor_weight: Annotated[float, Bounds(ge=0)]
     mean: Annotated[float, Bounds(ge=0)]
 
@@ -83,9 +79,9 @@ class Answers(Value):
     heading, and how far the robot is then turned from the reference's own (radians, counter-clockwise).
     """
 
-    references: Annotated[npt.NDArray[np.int64], Shape("k"), Bounds(ge=0)]
-    similarities: Annotated[npt.NDArray[np.float32], Shape("k"), Bounds(ge=0, le=1)]
-    turns: Annotated[npt.NDArray[np.float64], Shape("k")]
+    references: Annotated[Ints, Shape("k"), Bounds(ge=0)]
+    similarities: Annotated[Floats, Shape("k"), Bounds(ge=0, le=1)]
+    turns: Annotated[Array, Shape("k")]
 
 
 class BestMatch(Value):

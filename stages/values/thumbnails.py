@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape, Starts
+from omninav.stages.geometry.arrays import Bytes, Ints
 
 from .encoded_image import decode_image
 from .image import Pixels
@@ -18,8 +16,8 @@ class Thumbnails(Value):
     `jpegs`: their JPEG bytes one after the other; image n lies from `ends[n]` to `ends[n + 1]`; empty: missing.
     """
 
-    jpegs: Annotated[npt.NDArray[np.uint8], Shape("bytes")]
-    ends: Annotated[npt.NDArray[np.int64], Shape("N+1"), Starts("bytes")]
+    jpegs: Annotated[Bytes, Shape("bytes")]
+    ends: Annotated[Ints, Shape("N+1"), Starts("bytes")]
 
     def __len__(self) -> int:
         return len(self.ends) - 1
@@ -29,6 +27,6 @@ class Thumbnails(Value):
         return decoded(self.jpegs[self.ends[reference] : self.ends[reference + 1]])
 
 
-def decoded(jpeg: bytes | npt.NDArray[np.uint8]) -> Pixels:
+def decoded(jpeg: bytes | Bytes) -> Pixels:
     """Decode an image from JPEG bytes that were encoded here: (rows, columns, 3), blue-green-red."""
     return decode_image(bytes(jpeg))

@@ -10,15 +10,12 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 
 from .local_features import NO_SEGMENTS, GlobalDescriptor, LocalFeatures, VerticalSegments
 from .pose import PoseSource
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 Small = npt.NDArray[np.int16]
-Bytes = npt.NDArray[np.uint8]
 
 ANGLE = math.pi / 32768.0
 """Radians that one step of a stored angle stands for: 0.0055 degrees."""
@@ -198,5 +195,5 @@ class LoopHypotheses(Value):
     distances: Array
     initial: Array
     masses: Array
-    accepted: npt.NDArray[np.bool_]
+    accepted: Bools
     pose_source: PoseSource

@@ -2,13 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array, Bools
 
 
 class BearingPairs(Value):
@@ -29,5 +25,5 @@ class RelativeView(Value):
 
     rotation: Annotated[Array, Shape(3, 3)]
     translation: Annotated[Array, Shape(3)]
-    inliers: Annotated[npt.NDArray[np.bool_], Shape("N")]
+    inliers: Annotated[Bools, Shape("N")]
     samples: Annotated[int, Bounds(ge=0)] = 0

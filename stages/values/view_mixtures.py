@@ -3,19 +3,15 @@
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Value
 from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 
 from .growable_arrays import GrowableArrays
 from .pose import PoseSource
 from .sessions import Sessions
 from .views import NoveltyThreshold, WholeView
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 
 class ViewMixtures(GrowableArrays, Value):
@@ -34,7 +30,7 @@ class ViewMixtures(GrowableArrays, Value):
 
     in_place = True
 
-    views: Annotated[npt.NDArray[np.float32], Shape("R", "D")]
+    views: Annotated[Floats, Shape("R", "D")]
     kind: str
     ids: Annotated[Ints, Shape("R"), Bounds(ge=0)]
     born: Annotated[Ints, Shape("R"), Bounds(ge=0)]
@@ -80,7 +76,7 @@ class ViewMixtures(GrowableArrays, Value):
                 f"{size}; use the features it was learned with, or learn a new one"
             )
 
-    def add_view(self, values: npt.NDArray[np.float32], kind: str) -> int:
+    def add_view(self, values: Floats, kind: str) -> int:
         """Keep a view, with no place yet; gives its row. Raises ValueError where it is not of the map's kind."""
         if not len(self) and not self.next_id:
             self.put(views=np.empty((0, len(values)), np.float32), kind=kind)
@@ -107,17 +103,13 @@ class ViewMixtures(GrowableArrays, Value):
         fields = {"owner": owners, "means": means, "covariances": covariances, "weights": weights, "counts": counts}
         self.put(**{name: np.concatenate([getattr(self, name), rows]) for name, rows in fields.items()})
 
-    def put_weights(self, weights: Array) -> None:
-        """Replace the weights of all components (C,)."""
-        self.put(weights=weights)
-
-    def keep_components(self, kept: Mask) -> None:
+    def keep_components(self, kept: Bools) -> None:
         """Drop all other components (C,)."""
         if not kept.all():
             for name in ("owner", "means", "covariances", "weights", "counts"):
                 self.put(**{name: getattr(self, name)[kept]})
 
-    def keep_views(self, kept: Mask) -> None:
+    def keep_views(self, kept: Bools) -> None:
         """Drop all other views (R,) and their components. The order of the rest stays."""
         if kept.all():
             return
@@ -130,10 +122,6 @@ class ViewMixtures(GrowableArrays, Value):
     def step(self) -> None:
         """Count one more view learned from."""
         self.put(steps=self.steps + 1)
-
-    def take_poses_from(self, source: PoseSource) -> None:
-        """Say where the first pose came from."""
-        self.put(pose_source=source)
 
     def forget_all(self) -> None:
         """Drop all views; their ids are not used again."""
@@ -169,6 +157,6 @@ class ViewEvent(Value):
 class MixturesNow(Value):
     """Components of some views after a tick: `ids` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
 
-    ids: Annotated[npt.NDArray[np.int64], Shape("C")]
-    means: Annotated[npt.NDArray[np.float32], Shape("C", 3)]
-    weights: Annotated[npt.NDArray[np.float32], Shape("C"), Bounds(ge=0)]
+    ids: Annotated[Ints, Shape("C")]
+    means: Annotated[Floats, Shape("C", 3)]
+    weights: Annotated[Floats, Shape("C"), Bounds(ge=0)]

@@ -4,16 +4,11 @@ from abc import abstractmethod
 from dataclasses import replace
 from typing import Annotated, Self
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.rotated_distances import turned_distances, turns_of_nearest
 from omninav.stages.geometry.appearance.spectra import best_turns, spectral_distances
-
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 
 class WholeView(Value):
@@ -23,23 +18,23 @@ class WholeView(Value):
     stages need not know what the vector means.
     """
 
-    values: Annotated[FloatArray, Shape("D")]
+    values: Annotated[Floats, Shape("D")]
 
     @abstractmethod
-    def distances(self, kept: FloatArray) -> Array:
+    def distances(self, kept: Floats) -> Array:
         """Distances to kept views (R, D) of the same kind: (R,), 0 for equal views, whatever the robot's heading."""
 
     @property
-    def rows(self) -> FloatArray:
+    def rows(self) -> Floats:
         """All that is needed to compare the view with kept ones: (H, D), of which the first row is `values`."""
         return self.values[None]
 
-    def like(self, rows: FloatArray) -> Self:
+    def like(self, rows: Floats) -> Self:
         """A view of the same kind with these `rows`."""
         return replace(self, values=rows[0])
 
     @abstractmethod
-    def turns(self, kept: FloatArray) -> Array:
+    def turns(self, kept: Floats) -> Array:
         """Turn of the robot, counter-clockwise, against its heading in each kept view (R, D): (R,) rad."""
 
 
@@ -50,19 +45,19 @@ class Coefficients(WholeView):
     row compares views as they are, at one heading only, and all turns are 0.
     """
 
-    turned: Annotated[FloatArray, Shape("H", "D")]
+    turned: Annotated[Floats, Shape("H", "D")]
 
     @property
-    def rows(self) -> FloatArray:
+    def rows(self) -> Floats:
         return self.turned
 
-    def like(self, rows: FloatArray) -> Self:
+    def like(self, rows: Floats) -> Self:
         return replace(self, values=rows[0], turned=rows)
 
-    def distances(self, kept: FloatArray) -> Array:
+    def distances(self, kept: Floats) -> Array:
         return turned_distances(self.turned, kept)
 
-    def turns(self, kept: FloatArray) -> Array:
+    def turns(self, kept: Floats) -> Array:
         return turns_of_nearest(self.turned, kept)
 
 
@@ -77,10 +72,10 @@ class Spectrum(WholeView):
     channels: Annotated[int, Bounds(ge=1)]
     segments: Annotated[int, Bounds(ge=1)]
 
-    def distances(self, kept: FloatArray) -> Array:
+    def distances(self, kept: Floats) -> Array:
         return spectral_distances(self.values, kept, self.channels, self.segments)
 
-    def turns(self, kept: FloatArray) -> Array:
+    def turns(self, kept: Floats) -> Array:
         return best_turns(self.values, kept, self.channels, self.segments)
 
 
@@ -104,7 +99,7 @@ class Neighbours(Value):
     its heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
     """
 
-    rows: Annotated[npt.NDArray[np.int64], Shape("J"), Bounds(ge=0)]
+    rows: Annotated[Ints, Shape("J"), Bounds(ge=0)]
     distances: Annotated[Array, Shape("J"), Bounds(ge=0)]
     similarities: Annotated[Array, Shape("J"), Bounds(ge=0, le=1)]
     turns: Annotated[Array, Shape("J")]

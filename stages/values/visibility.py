@@ -7,9 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape, Starts
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int32]
+from omninav.stages.geometry.arrays import Array, Bools
 
 
 class VisibilityAreas(Value):
@@ -23,9 +21,9 @@ class VisibilityAreas(Value):
     """
 
     axes: Annotated[Array, Shape("S")]
-    target: Annotated[Ints, Shape("R", "S"), Bounds(ge=-1)]
+    target: Annotated[npt.NDArray[np.int32], Shape("R", "S"), Bounds(ge=-1)]
     points: Annotated[Array, Shape("T", 2)]
-    starts: Annotated[Ints, Shape("T+1"), Starts("N")]
+    starts: Annotated[npt.NDArray[np.int32], Shape("T+1"), Starts("N")]
     runs: Annotated[npt.NDArray[np.uint16], Shape("N", 3)]
     shape: tuple[int, int]
     resolution: Annotated[float, Bounds(gt=0)]
@@ -36,7 +34,7 @@ class VisibilityAreas(Value):
         """Bytes of its arrays as stored."""
         return sum(a.nbytes for a in (self.axes, self.target, self.points, self.starts, self.runs))
 
-    def mask(self, point: int) -> npt.NDArray[np.bool_]:
+    def mask(self, point: int) -> Bools:
         """The cells from which a point is visible: (rows, columns)."""
         seen = np.zeros(self.shape, np.bool_)
         for row, first, behind in self.runs[self.starts[point] : self.starts[point + 1]]:

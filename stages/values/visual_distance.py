@@ -2,11 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 class VisualDistances(Value):
@@ -16,6 +14,6 @@ class VisualDistances(Value):
     clockwise, against the medoid's heading (rad); 0 where the distance is inf. `matches` (P,): features that matched.
     """
 
-    distances: Annotated[npt.NDArray[np.float64], Shape("P", finite=False), Bounds(ge=0)]
-    turns: Annotated[npt.NDArray[np.float64], Shape("P")]
-    matches: Annotated[npt.NDArray[np.int64], Shape("P"), Bounds(ge=0)]
+    distances: Annotated[Array, Shape("P", finite=False), Bounds(ge=0)]
+    turns: Annotated[Array, Shape("P")]
+    matches: Annotated[Ints, Shape("P"), Bounds(ge=0)]

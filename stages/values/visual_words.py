@@ -11,11 +11,9 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
 from omninav.stages.geometry.appearance import visual_words
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 
 from .pose import PoseSource
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 MIN_SIMILARITY = 0.01
 """Similarity assigned to references without a common word, above 0 so that they stay candidates."""
@@ -40,7 +38,7 @@ class VisualWords(Value):
     def __len__(self) -> int:
         return len(self.starts) - 1
 
-    def similarities(self, descriptors: npt.NDArray[np.uint8]) -> Floats:
+    def similarities(self, descriptors: Bytes) -> Floats:
         """The cosine (V,) in [0, 1] of the angle between a view's words and those of each view of the map.
 
         `descriptors` (N, D): of the view's local features. 0 for all where it has none.
@@ -65,7 +63,7 @@ class VisualWords(Value):
         return replace(self, starts=starts, words=self.words[taken], weights=self.weights[taken])
 
 
-def words_of(views: Sequence[npt.NDArray[np.uint8]], centres: Floats) -> VisualWords:
+def words_of(views: Sequence[Bytes], centres: Floats) -> VisualWords:
     """The words of a map's views, each given by its descriptors (N, D), with a vocabulary that was learned."""
     return words_of_roots((visual_words.root_descriptors(each) for each in views), centres)
 
@@ -113,7 +111,7 @@ class PlaceWords(Value):
 
     words: Annotated[VisualWords, Shape("V")]
     owner: Annotated[Ints, Shape("V"), Bounds(ge=0)]
-    poses: Annotated[npt.NDArray[np.float64], Shape("V", 3)]
+    poses: Annotated[Array, Shape("V", 3)]
     pose_source: PoseSource
 
     def __len__(self) -> int:

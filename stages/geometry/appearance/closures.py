@@ -1,37 +1,39 @@
 """Pairs of views that look alike although the robot drove on between them."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.drive_graph import Closures
 
-from .segments import EXPONENTS, Floats, similarities
+from .segments import EXPONENTS, HEADINGS, MAX_DISTANCES, FeatureKind, similarities
 from .visual_compass import angle_of_peak
 
-Array = npt.NDArray[np.float64]
+MIN_EXCESS = 0.7
+"""Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
+SAMPLES = 1000
+"""References that look for another, evenly spaced over a map of more."""
+MIN_GAP = 5.0
+"""Way along the drive, in length scales, after which two references may close a loop."""
 
 
-def closures_by_appearance(
-    features: Floats, driven: Array, histograms: bool, scale: float, headings: int, min_excess: float, min_gap: float,
-    samples: int,
-) -> Closures:  # fmt: skip
-    """The most similar reference of each, among those at least `min_gap` metres before or behind along the drive.
+def closures_by_appearance(features: Floats, kind: FeatureKind, driven: Array, length_scale_m: float) -> Closures:
+    """The most similar reference of each, among those at least `MIN_GAP` before or behind along the drive.
 
-    `features` (R, segments, bins); `driven` (R,): metres from the start to each. A pair counts where its similarity
-    keeps `min_excess` of what exceeds the background, the median over the map: (S - median) / (1 - median). Of more
-    than `samples` references so many, evenly spaced, look for a partner.
+    `features` (R, segments, bins) of a `kind`; `driven` (R,): metres from the start to each. A pair counts where its
+    similarity keeps `MIN_EXCESS` of what exceeds the background, the median over the map: (S - median) / (1 - median).
     """
     found: dict[tuple[int, int], float] = {}
-    queries = np.unique(np.linspace(0, len(features) - 1, min(samples, len(features))).astype(np.int64))
+    histograms, scale = kind == "histograms", MAX_DISTANCES[kind]
+    queries = np.unique(np.linspace(0, len(features) - 1, min(SAMPLES, len(features))).astype(np.int64))
     for one in queries.tolist():
-        apart = np.flatnonzero(np.abs(driven - driven[one]) >= min_gap)
+        apart = np.flatnonzero(np.abs(driven - driven[one]) >= MIN_GAP * length_scale_m)
         if not len(apart):
             continue
-        values = similarities(features, features[one], headings, histograms, True, EXPONENTS["sqrt"], None, scale)
+        values = similarities(features, features[one], HEADINGS, histograms, True, EXPONENTS["sqrt"], None, scale)
         best = values.max(axis=1)
         background = float(np.median(best))
         other = int(apart[best[apart].argmax()])
-        if best[other] - background < min_excess * (1.0 - background):
+        if best[other] - background < MIN_EXCESS * (1.0 - background):
             continue
         turn = angle_of_peak(values[other])  # of the robot at `one`, seen from `other`
         pair = (other, one) if other < one else (one, other)

@@ -6,10 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float32]
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 
 
 class Pairs(NamedTuple):
@@ -24,7 +21,7 @@ class Pairs(NamedTuple):
     distance: Array
     ratio: Array
 
-    def chosen(self, kept: npt.NDArray[np.bool_] | Ints) -> "Pairs":
+    def chosen(self, kept: Bools | Ints) -> "Pairs":
         """Some of them."""
         return Pairs(self.first[kept], self.second[kept], self.distance[kept], self.ratio[kept])
 

@@ -9,43 +9,29 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Bytes, Floats, Ints
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
-
-
-class Taps(NamedTuple):
-    """Positions of a factor of the kernel at each angle: four pixels and their bilinear weights.
-
-    `rows`, `columns` (angles, 4): offsets from the pixel that the kernel turns around. `weights` (angles, 4).
-    """
-
-    rows: Ints
-    columns: Ints
-    weights: Floats
+Taps = tuple[Ints, Floats, Ints, Floats]
+"""Offsets and weights (angles, 4), as `circle_taps` gives them, of both factors of a kernel."""
 
 
-def circle_taps(radius: float, angles: int, turn: float = 0.0) -> Taps:
-    """The taps at `angles` equal steps around a circle of `radius` pixels; the first lies at `turn` radians.
+def circle_taps(radius: float, angles: int, turn: float, stride: int, channels: int) -> tuple[Ints, Floats]:
+    """Positions of a factor of the kernel at `angles` equal steps around a circle of `radius` pixels.
 
-    Angles run from the direction of growing columns to that of growing rows.
+    At each four pixels, as offsets from the one that the kernel turns around in an image with `stride` values in a row,
+    and their bilinear weights: (angles, 4) each. The first lies at `turn` radians; angles run from the direction of
+    growing columns to that of growing rows.
     """
     angle = 2.0 * math.pi * np.arange(angles) / angles + turn
     # Rounded, so that a neighbour on the very pixel is not read from the one before with a weight of 1e-16.
     x, y = np.round(radius * np.cos(angle), 9), np.round(radius * np.sin(angle), 9)
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     right, down = x - column, y - row
-    return Taps(
-        np.stack([row, row, row + 1, row + 1], axis=1),
-        np.stack([column, column + 1, column, column + 1], axis=1),
-        np.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down], axis=1).astype(
-            np.float32
-        ),
-    )
+    at = row * stride + column * channels
+    weights = np.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down], axis=1)
+    return at[:, None] + np.array([0, channels, stride, stride + channels]), weights.astype(np.float32)
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -59,18 +45,9 @@ def _row_of_taps(flat: Floats, at: int, offsets: Ints, weights: Floats, out: Flo
 
 
 @compiled(nogil=True, error_model="numpy")
-def _means(
-    flat: Floats,
-    stride: int,
-    start: int,
-    first: Ints,
-    first_weights: Floats,
-    second: Ints,
-    second_weights: Floats,
-    root: bool,
-    out: Floats,
-) -> None:
+def _means(flat: Floats, stride: int, start: int, taps: Taps, root: bool, out: Floats) -> None:
     # One row of all channels at a time, angle by angle: the inner loops are whole vector instructions.
+    first, first_weights, second, second_weights = taps
     angles, (rows, length) = len(first), out.shape
     share = np.float32(1.0 / angles)
     # A neighbour at distance 0 is the pixel itself, whatever the angle: it is read once.
@@ -94,16 +71,8 @@ def _means(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _means_at(
-    flat: Floats,
-    starts: Ints,
-    first: Ints,
-    first_weights: Floats,
-    second: Ints,
-    second_weights: Floats,
-    root: bool,
-    out: Floats,
-) -> None:
+def _means_at(flat: Floats, starts: Ints, taps: Taps, root: bool, out: Floats) -> None:
+    first, first_weights, second, second_weights = taps
     angles, channels = len(first), out.shape[1]
     share = np.float32(1.0 / angles)
     one, other = np.empty((angles, channels), np.float32), np.empty((angles, channels), np.float32)
@@ -123,7 +92,7 @@ def _means_at(
             out[n, c] = total * share
 
 
-def padded(pixels: npt.NDArray[np.uint8], by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
+def padded(pixels: Bytes, by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
     """An image in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
     scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
     rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
@@ -147,15 +116,9 @@ class Kernel(NamedTuple):
         """Number of pixels around one that it reads."""
         return math.ceil(max(self.radii))
 
-    def _taps(self, stride: int, channels: int) -> tuple[Ints, Floats, Ints, Floats]:
-        first = circle_taps(self.radii[0], self.angles)
-        second = circle_taps(self.radii[1], self.angles, math.pi / 2)
-        return (
-            first.rows * stride + first.columns * channels,
-            first.weights,
-            second.rows * stride + second.columns * channels,
-            second.weights,
-        )
+    def _taps(self, stride: int, channels: int) -> Taps:
+        first = circle_taps(self.radii[0], self.angles, 0.0, stride, channels)
+        return *first, *circle_taps(self.radii[1], self.angles, math.pi / 2, stride, channels)
 
     def means(self, padded: Floats) -> Floats:
         """The integral at each pixel of an image: (rows, columns, channels), of values in [0, 1] in [0, 1].
@@ -165,8 +128,7 @@ class Kernel(NamedTuple):
         m, (rows, columns, channels) = self.margin + 1, padded.shape
         stride = columns * channels
         out = np.empty((rows - 2 * m, (columns - 2 * m) * channels), np.float32)
-        taps = self._taps(stride, channels)
-        _means(padded.ravel(), stride, m * stride + m * channels, *taps, self.root, out)
+        _means(padded.ravel(), stride, m * stride + m * channels, self._taps(stride, channels), self.root, out)
         return out.reshape(rows - 2 * m, columns - 2 * m, channels)
 
     def means_at(self, padded: Floats, rows: Ints, columns: Ints) -> Floats:
@@ -175,5 +137,5 @@ class Kernel(NamedTuple):
         stride = wide * channels
         out = np.empty((len(rows), channels), np.float32)
         starts = (rows + m) * stride + (columns + m) * channels
-        _means_at(padded.ravel(), starts, *self._taps(stride, channels), self.root, out)
+        _means_at(padded.ravel(), starts, self._taps(stride, channels), self.root, out)
         return out

@@ -4,13 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .segments import HEADINGS, MAX_DISTANCES, FeatureKind, Rows, similarities
-
-Array = npt.NDArray[np.float64]
 
 MAX_COMPARED, NEAREST_COMPARED = 10_000, 1000
 """References with which a sample is compared, and how many of them, in a larger map, are those nearest to it."""
@@ -46,7 +44,7 @@ def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> t
     return np.sqrt(edges[:-1] * edges[1:])[full], sums[full] / counts[full]
 
 
-def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[np.int64] | None:
+def compared_with(poses: Array, samples: Ints) -> Ints | None:
     """References with which each of the samples (S,) of a large map is compared: (S, C). None: with all of them.
 
     Those nearest to it, for the similarity over short distances, and more of them evenly over the map, for the

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .feature_matching import mutual_nearest_of_each
 from .visual_distance import Comparison, ComparisonOptions, Patches, ViewFeatures, compare, compared
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 ROWS = 2048
 """Patches that are compared at once, and those of the view that goes beyond: their distances stay in the cache."""
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import squareform
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 def renumbered(labels: npt.ArrayLike) -> Ints:
@@ -83,22 +81,10 @@ def rms_within(distances: Array, labels: Ints) -> float:
     return spread if spread > 0.0 else 1.0
 
 
-class Hypotheses(NamedTuple):
-    """Pairs of subclusters of one cluster that may be one place: `pairs` (H, 2) subclusters, `medoids` (H, 2) views."""
-
-    pairs: Ints
-    medoids: Ints
-
-
-def hypotheses(cluster: Ints, subcluster: Ints, medoids: Ints) -> Hypotheses:
-    """Every pair of subclusters of one cluster (section 4.4.2). `medoids`: the view of each subcluster."""
-    pairs = []
-    of = np.array([cluster[np.flatnonzero(subcluster == number)[0]] for number in range(len(medoids))])
-    for number in range(len(medoids)):
-        later = np.flatnonzero((of == of[number]) & (np.arange(len(medoids)) > number))
-        pairs += [(number, int(other)) for other in later]
-    found = np.array(pairs, np.int64).reshape(-1, 2)
-    return Hypotheses(found, medoids[found])
+def hypotheses(cluster: Ints, subcluster: Ints) -> Ints:
+    """Every pair (H, 2) of subclusters of one cluster, which may be one place (section 4.4.2)."""
+    of = cluster[np.unique(subcluster, return_index=True)[1]]
+    return np.argwhere(np.triu(of[:, None] == of, 1))
 
 
 def between_hypotheses(medoids: Ints, frames: Ints) -> Array:

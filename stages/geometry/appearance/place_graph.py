@@ -1,11 +1,9 @@
 """Distances over a graph of places, in links."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse.csgraph import shortest_path
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 def links_between(links: Ints, places: int) -> Array:

@@ -1,14 +1,12 @@
 """Places that stand side by side become one: distances along the drive and across its loops."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .place_clusters import medoids, renumbered
+from omninav.stages.geometry.arrays import Array, Ints
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from .place_clusters import medoids, renumbered
 
 MIN_GAP = 10
 """Views along the drive between two that are on different passes."""

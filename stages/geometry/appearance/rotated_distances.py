@@ -3,13 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Array, Floats
+from omninav.stages.geometry.plane.se2 import wrap
 
 
-def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
+def all_distances(turned: Floats, kept: Floats) -> Array:
     """Euclidean distances of each row of `turned` (H, D) to each kept vector (R, D): (R, H)."""
     here, there = turned.astype(np.float64), kept.astype(np.float64)
     squares = (there**2).sum(axis=1)[:, None] + (here**2).sum(axis=1) - 2.0 * (there @ here.T)
@@ -17,7 +16,7 @@ def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
     return distances
 
 
-def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
+def turned_distances(turned: Floats, kept: Floats) -> Array:
     """Distance to each kept vector (R, D) at the best heading: (R,).
 
     The best row is found in single precision, which does for ordering; the distance to it is exact, 0 for equals. With
@@ -39,20 +38,22 @@ def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
     return distances
 
 
-def turns_of_nearest(turned: FloatArray, kept: FloatArray) -> Array:
+def turns_of_nearest(turned: Floats, kept: Floats) -> Array:
     """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot
     stands turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.
     """
-    headings = len(turned)
-    if headings < 3:
+    if len(turned) < 3:
         return np.zeros(len(kept))
-    squares = all_distances(turned, kept) ** 2
-    best = squares.argmin(axis=1)
-    rows = np.arange(len(kept))
-    before, here, after = (squares[rows, (best + step) % headings] for step in (-1, 0, 1))
-    bend = before + after - 2.0 * here
+    return wrap(-angles_of_least(all_distances(turned, kept) ** 2))
+
+
+def angles_of_least(values: Array) -> Array:
+    """Angles (R,) at which values around the full circle (R, N) are least, between samples by a parabola: rad."""
+    rows, best, number = np.arange(len(values)), values.argmin(axis=1), values.shape[1]
+    before, least, after = (values[rows, (best + step) % number] for step in (-1, 0, 1))
+    bend = before + after - 2.0 * least
     part = np.where(bend > 0.0, 0.5 * (before - after) / np.where(bend > 0.0, bend, 1.0), 0.0)
-    turns: Array = -(best + part) * (2.0 * math.pi / headings)
-    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
+    angles: Array = (best + part) * (2.0 * math.pi / number)
+    return angles

@@ -5,18 +5,16 @@ import math
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.stored_rows import StoredRows
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 from .best_segments import UNROLLED, selective_sum
 from .sorting_network import sorting_network
 
-Floats = npt.NDArray[np.float32]
 Rows = Floats | StoredRows[np.float32]
 """Views of a map, in memory or in its file."""
-Ints = npt.NDArray[np.int64]
 
 BLOCK = 96
 """References that are compared at once: few enough for what belongs to a segment to stay in the fastest cache, and no
@@ -50,12 +48,22 @@ def turned_views(view: Floats, headings: int) -> Floats:
     segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that histograms still sum to
     1.
     """
-    segments = len(view)
-    shift = np.arange(headings) * segments / headings
-    whole = np.floor(shift).astype(np.int64)
-    part = (shift - whole).astype(np.float32)[:, None, None]
+    return _shifted(view[None], np.arange(headings) * len(view) / headings)
+
+
+def turned_view(view: Floats, turn: float) -> Floats:
+    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
+    turned: Floats = _shifted(view[None], np.array([-turn * len(view) / (2 * np.pi)]))[0]
+    return turned
+
+
+def _shifted(views: Floats, shifts: Array) -> Floats:
+    # Segment j of each view (N or 1, segments, bins) from where segment j + shift was, by each of the shifts (N,).
+    segments, rows = views.shape[1], np.arange(len(views))[:, None]
+    whole = np.floor(shifts).astype(np.int64)
+    part = (shifts - whole).astype(np.float32)[:, None, None]
     first = (np.arange(segments) + whole[:, None]) % segments
-    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
+    turned: Floats = views[rows, first] * (1 - part) + views[rows, (first + 1) % segments] * part
     return turned
 
 
@@ -256,32 +264,16 @@ def cosine_similarities(references: Rows, view: Floats, headings: int, chosen: I
     return np.clip(alike, 0.0, 1.0)
 
 
-def turned_view(view: Floats, turn: float) -> Floats:
-    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
-    segments = len(view)
-    shift = -turn * segments / (2 * np.pi)
-    whole = int(np.floor(shift))
-    part = np.float32(shift - whole)
-    first = (np.arange(segments) + whole) % segments
-    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
-    return turned
-
-
-def similarity_at(
-    references: Floats, view: Floats, turns: npt.NDArray[np.float64], kind: FeatureKind, exponent: float = 0.5
-) -> Floats:
+def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureKind, exponent: float = 0.5) -> Floats:
     """Selective similarity of a view to each reference at one heading each: (N, segments, bins), (N,) turns -> (N,).
 
     `turns`: the robot's heading less the reference's own (radians).
     """
     segments = len(view)
-    out = np.empty(len(references), np.float32)
-    for n, turn in enumerate(turns):
-        expected = turned_view(references[n], float(turn))
-        if kind == "histograms":
-            alike = np.minimum(expected, view).sum(axis=1)
-        else:
-            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / MAX_DISTANCES[kind]
-        best = np.cumsum(np.sort(alike)[::-1]) * penalties(segments, exponent)
-        out[n] = best.max()
-    return out
+    expected = _shifted(references, -turns * segments / (2 * np.pi))
+    if kind == "histograms":
+        alike = np.minimum(expected, view).sum(axis=2)
+    else:
+        alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=2)) / MAX_DISTANCES[kind]
+    best = np.cumsum(np.sort(alike, axis=1)[:, ::-1], axis=1) * penalties(segments, exponent)
+    return np.asarray(best.max(axis=1), np.float32)

@@ -3,9 +3,8 @@
 import functools
 
 import numpy as np
-import numpy.typing as npt
 
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Ints
 
 
 @functools.cache

@@ -3,28 +3,27 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Complex, Floats
+from omninav.stages.geometry.plane.se2 import wrap
 
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
-Complex = npt.NDArray[np.complex128]
+from .rotated_distances import angles_of_least
 
 
-def packed(spectrum: Complex) -> FloatArray:
+def packed(spectrum: Complex) -> Floats:
     """A spectrum (channels, frequencies) as one vector: all real parts, then all imaginary ones."""
     return np.concatenate([spectrum.real.ravel(), spectrum.imag.ravel()]).astype(np.float32)
 
 
-def unpacked(vectors: FloatArray, channels: int) -> Complex:
+def unpacked(vectors: Floats, channels: int) -> Complex:
     """Inverse of `packed`: vectors (..., D) to spectra (..., channels, frequencies)."""
     half = vectors.shape[-1] // 2
     values = vectors[..., :half].astype(np.float64) + 1j * vectors[..., half:].astype(np.float64)
     return values.reshape(*vectors.shape[:-1], channels, half // channels)
 
 
-def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segments: int) -> Array:
+def spectral_distances(values: Floats, kept: Floats, channels: int, segments: int) -> Array:
     """Euclidean distance between the magnitudes of two spectra's coefficients, (D,) and (R, D): (R,).
 
     In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
@@ -37,7 +36,7 @@ def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segm
 
 
 @compiled(nogil=True, fastmath={"reassoc"})
-def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> Array:
+def _size_distances(values: Floats, kept: Floats, share: Floats) -> Array:
     # One pass in single precision: five times as fast as arrays of complex numbers over a whole map.
     half = len(share)
     here = np.sqrt(values[:half] ** 2 + values[half:] ** 2)
@@ -53,7 +52,7 @@ def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> 
     return distances
 
 
-def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:
+def best_turns(values: Floats, kept: Floats, channels: int, segments: int, steps: int = 360) -> Array:
     """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     The greatest circular cross-correlation of the two signals, over all channels, at `steps` turns; between them by the
@@ -62,18 +61,11 @@ def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: in
     """
     here, there = unpacked(values, channels), unpacked(kept, channels)
     frequencies = here.shape[-1]
-    cross = (_share(frequencies, segments) * np.conj(there) * here).sum(axis=-2)
-    # A signal delayed by t has its coefficient k turned by exp(-i k t): the correlation at t is sum Re(cross e^{ikt}).
+    against = -(_share(frequencies, segments) * np.conj(there) * here).sum(axis=-2)
+    # A signal delayed by t has coefficient k turned by exp(-i k t): the correlation at t is -sum Re(against e^{ikt}).
     angles = 2.0 * math.pi * np.arange(steps) / steps
     waves = np.exp(1j * np.outer(np.arange(frequencies), angles))
-    correlation = (cross @ waves).real
-    best = correlation.argmax(axis=-1)
-    rows = np.arange(len(correlation))
-    before, top, after = (correlation[rows, (best + step) % steps] for step in (-1, 0, 1))
-    bend = before + after - 2.0 * top
-    part = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
-    turns: Array = (best + part) * (2.0 * math.pi / steps)
-    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
+    return wrap(angles_of_least((against @ waves).real))
 
 
 def _share(frequencies: int, segments: int) -> Array:

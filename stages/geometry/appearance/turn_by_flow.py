@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
+
 Grey = npt.NDArray[np.uint8]
 
 MAX_POINTS, POINT_QUALITY, POINT_DISTANCE_PX = 400, 0.003, 5

@@ -4,9 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 MAX_TURN = math.radians(60.0)
 """Turns count up to this: one wrong turn must not outweigh the others."""
@@ -17,15 +16,13 @@ MAX_DELAY_S, DELAY_STEPS = 4.0, 0.125
 class TurnFit(NamedTuple):
     """Which sign (1, -1) and delay (s, positive: images are late) of measured turns explain most of what is seen.
 
-    `explained`: the share of the seen turning; `as_is`: the same with neither. `factor`: by how much more the images
-    turn than is measured, as is: the weighted median of the ratios.
+    `explained`: the share of the seen turning; `as_is`: the same with neither.
     """
 
     sign: int
     delay_s: float
     explained: float
     as_is: float
-    factor: float
 
 
 def explained(seen: Array, measured: Array) -> Array:
@@ -53,15 +50,4 @@ def turn_fit(times: Array, headings: Array, seen: Array) -> TurnFit:
     there = seen[known]
     both = np.stack([explained(there, turns), explained(there, -turns)])
     sign, at = np.unravel_index(int(both.argmax()), both.shape)
-    as_is = turns[most]
-    return TurnFit(1 - 2 * int(sign), float(delays[at]), float(both.max()), float(both[0, most]), _factor(there, as_is))
-
-
-def _factor(seen: Array, measured: Array) -> float:
-    weights = np.abs(measured)
-    if not weights.sum():
-        return math.inf
-    ratios = seen / np.where(weights > 0.0, measured, 1.0)
-    order = np.argsort(ratios)
-    share = np.cumsum(weights[order])
-    return float(ratios[order][np.searchsorted(share, 0.5 * share[-1])])
+    return TurnFit(1 - 2 * int(sign), float(delays[at]), float(both.max()), float(both[0, most]))

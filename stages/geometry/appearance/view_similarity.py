@@ -3,9 +3,9 @@
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
+
 Shape = Literal["linear", "quadratic", "cosine", "step"]
 
 

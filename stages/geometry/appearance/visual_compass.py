@@ -17,7 +17,7 @@ def turn_between(before: Strip, after: Strip) -> float:
     matter. Zeil, Hofmann & Chahl 2003, "Catchment areas of panoramic snapshots in outdoor scenes", JOSA A 20(3),
     section 3 use the same image difference; for what is far away the turn is exact, whatever the robot drove meanwhile.
     """
-    return angle_of_peak(_likeness(*(view - view.mean(axis=1, keepdims=True) for view in (before, after))))
+    return turns_and_correlations(np.stack([before, after]))[0][0]
 
 
 def turns_and_correlations(strips: Strip) -> tuple[list[float], list[float]]:
@@ -32,11 +32,6 @@ def turns_and_correlations(strips: Strip) -> tuple[list[float], list[float]]:
     most = [math.sqrt(one * other) for one, other in itertools.pairwise(energies)]
     correlations = [float(each.max()) / energy if energy else 0.0 for each, energy in zip(likeness, most, strict=True)]
     return [angle_of_peak(each) for each in likeness], correlations
-
-
-def _likeness(one: Strip, other: Strip) -> npt.NDArray[np.floating]:
-    spectra = [np.fft.rfft(view) for view in (one, other)]
-    return np.fft.irfft((np.conj(spectra[0]) * spectra[1]).sum(axis=0), one.shape[1])
 
 
 def angle_of_peak(values: npt.NDArray[np.floating]) -> float:

@@ -6,12 +6,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, tree_matches
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
 PatchDistance = Literal["euclidean", "mahalanobis"]
@@ -23,19 +22,19 @@ class ComparisonOptions(NamedTuple):
     """Settings of the comparison of two views.
 
     `ratio`, `segment_ratio`: a match's distance over that of the second nearest, of patches and of vertical segments.
-    `max_colour_distance`: of the colours of two matching patches (Euclidean, three correlations). `search`: through all
-    descriptors, or by kd-trees. `patch_distance`: of two patches' descriptors, Euclidean or by equation 2; segments are
-    always compared by equation 2. `min_matches`: with fewer two views have nothing in common. `min_angle` (rad): the
-    smallest mean angle between matches that counts.
+    `max_colour_distance`: of the colours of two matching patches (Euclidean, three correlations). `min_matches`: with
+    fewer two views have nothing in common. `min_angle` (rad): the smallest mean angle between matches that counts.
+    `patch_distance`: of two patches' descriptors, Euclidean or by equation 2; segments are always compared by
+    equation 2. `search`: through all descriptors, or by kd-trees, which find the same.
     """
 
     ratio: float = 0.8
     segment_ratio: float = 0.8
     max_colour_distance: float = 0.5
-    search: Literal["all", "kd_tree"] = "all"
-    patch_distance: PatchDistance = "euclidean"
     min_matches: int = 8
     min_angle: float = math.radians(0.5)
+    patch_distance: PatchDistance = "euclidean"
+    search: Literal["all", "kd_tree"] = "all"
 
 
 class Patches(NamedTuple):

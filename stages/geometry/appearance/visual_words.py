@@ -5,8 +5,7 @@ import warnings
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Floats, Ints
 
 ITERATIONS = 8
 """Iterations of k-means; more change the nearest image by less than a centimetre."""

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Floats
+
 SHRINKAGE = 0.01
 """Share of the mean variance that is added to each, so that directions without any are not blown up."""
 

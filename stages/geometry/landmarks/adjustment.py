@@ -5,16 +5,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.pose_graph import motion_jacobian
 from omninav.stages.geometry.plane.se2 import between, wrap
 
 from .schur_complement import Eliminated, Frames, Visibility, covisibility, eliminate, landmark_steps, residuals
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 EASING = 2.0
 """Factor by which the scale of the loss (in sigmas) shrinks per step."""

@@ -4,17 +4,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.appearance.feature_matching import NOWHERE, Pairs, mutual_nearest_units
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.small_systems import rotated_by, solve
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float32]
 
 FACES = 6
 """Virtual pinhole cameras that share the circle: poselib's solver takes pixels, and a pinhole no full circle."""

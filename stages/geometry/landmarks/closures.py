@@ -5,18 +5,14 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.pose_graph import optimised_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
 from .map_making import LocalViews, pair_matches
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 CANDIDATES, FAR_CANDIDATES = 8, 5
 """References that each is compared with: the most similar of all, and the most similar of those far along the drive."""

@@ -1,10 +1,8 @@
 """The floor among the landmarks: what gives a map that odometry has scaled its true size."""
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 RANGE = 0.25
 """Part of the camera's height by which the floor may seem to lie higher or lower: odometry is off by less."""

@@ -4,17 +4,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .bearing_pose import ELSEWHERE, matched, poses_of
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, MISS, LocalViews, Sightings, in_map_frame, sightings_by_reference
 from .triangulation import triangulated_tracks
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 SAMPLES = 40
 """References that are left out, evenly spaced."""

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, wrap
 
@@ -16,10 +16,6 @@ from .floor import floor_depth, lowest_plane
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
 from .tracks import Tracks, joined_matches
 from .triangulation import triangulated_tracks
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 Seen = Callable[[Ints], Lens]
 """The lens through which features (O,), rows among all, are seen."""

@@ -10,16 +10,12 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 from omninav.stages.geometry.plane.se2 import between
 
 from .pair_check import fit_motion
 from .tracks import Tracks, joined_matches
 from .triangulation import triangulated_tracks
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 NEIGHBOUR_DISTANCES = (0.2, 4.0)
 """Least and largest distance of two references that are matched, in length scales of the map: nearer ones say nothing
@@ -53,7 +49,7 @@ class LocalViews(NamedTuple):
 
     starts: Ints
     bearings: Array
-    descriptors: npt.NDArray[np.uint8]
+    descriptors: Bytes
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -98,7 +94,7 @@ class Sightings(NamedTuple):
     features: Ints
 
 
-def local_views(bearings: Sequence[Array], descriptors: Sequence[npt.NDArray[np.uint8]]) -> LocalViews:
+def local_views(bearings: Sequence[Array], descriptors: Sequence[Bytes]) -> LocalViews:
     """One list of the features of all references, each with bearings (N, 3) and descriptors (N, D)."""
     starts = np.cumsum([0, *(len(each) for each in bearings)], dtype=np.int64)
     rows = [each for each in descriptors if len(each)] or [np.empty((0, 128), np.uint8)]

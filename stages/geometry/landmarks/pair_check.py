@@ -3,12 +3,9 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from omninav.stages.geometry.arrays import Array, Bools
 
 
 def fit_motion(first: Array, second: Array, motion: Array, tolerance: float) -> Bools:

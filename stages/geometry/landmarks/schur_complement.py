@@ -10,12 +10,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 TINY = 1e-12
 """Added to the diagonal of a landmark's block (1/m^2), which is singular where all its bearings are parallel."""
@@ -29,11 +26,6 @@ class Visibility(NamedTuple):
 
     references: Ints
     starts: Ints
-
-    @property
-    def landmarks(self) -> Ints:
-        """The landmark of each (O,)."""
-        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
 
 
 class Frames(NamedTuple):

@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Ints
 
 
 class Tracks(NamedTuple):

@@ -4,14 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import solve
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 ROUNDS = 4
 """Rounds of triangulating and of leaving out the bearings that miss the point by too much."""
@@ -20,12 +16,10 @@ MIN_VIEWS = 2
 
 
 class Triangulated(NamedTuple):
-    """Points of tracks. `points` (T, 3), NaN where there is none; `kept` (O,): which sightings agree with them;
-    `parallax` (T,): the largest angle (rad) between two bearings of a point."""
+    """Points of tracks. `points` (T, 3), NaN where there is none; `kept` (O,): which sightings agree with them."""
 
     points: Array
     kept: Bools
-    parallax: Array
 
 
 def triangulated_tracks(
@@ -39,9 +33,9 @@ def triangulated_tracks(
     `min_parallax` (rad) between them, and lies within `max_distance` (m) of all.
     """
     points = np.full((len(starts) - 1, 3), np.nan)
-    kept, parallax = np.zeros(len(centres), np.bool_), np.zeros(len(starts) - 1)
-    _triangulate(starts, centres, bearings, math.cos(miss), min_parallax, max_distance, points, kept, parallax)
-    return Triangulated(points, kept, parallax)
+    kept = np.zeros(len(centres), np.bool_)
+    _triangulate(starts, centres, bearings, math.cos(miss), min_parallax, max_distance, points, kept)
+    return Triangulated(points, kept)
 
 
 @compiled(nogil=True)
@@ -54,7 +48,6 @@ def _triangulate(
     max_distance: float,
     points: Array,
     kept: Bools,
-    parallax: Array,
 ) -> None:
     weights = np.empty(len(centres))
     for t in range(len(starts) - 1):
@@ -92,8 +85,7 @@ def _triangulate(
                     for i in range(3):
                         cos += bearings[a, i] * bearings[b, i]
                     widest = min(widest, cos)
-        parallax[t] = math.acos(min(1.0, max(-1.0, widest)))
-        if views >= MIN_VIEWS and parallax[t] > min_parallax:
+        if views >= MIN_VIEWS and math.acos(min(1.0, max(-1.0, widest))) > min_parallax:
             points[t] = point
         else:
             kept[low:high] = False

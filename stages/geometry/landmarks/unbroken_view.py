@@ -4,19 +4,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.arrays import Array, Bytes
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 
+from .map_making import RATIO
 from .pair_check import fit_motion
 
-Array = npt.NDArray[np.float64]
-Bytes = npt.NDArray[np.uint8]
-
-RATIO = 0.8
-"""Largest ratio of a match's distance to that of the second nearest."""
 TOLERANCE = math.radians(1.0)
 """Angle of a bearing to the plane of the motion and the other bearing, above which a match does not fit (rad)."""
 TURNS = np.radians(np.arange(-6.0, 7.0))

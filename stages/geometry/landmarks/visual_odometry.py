@@ -4,45 +4,34 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
 from .adjustment import adjusted
 from .bearing_pose import TOLERANCE, matched, pose_of_bearings
+from .closures import MAX_FALSE_ALARMS, MIN_INLIERS
 from .floor import lowest_plane
-from .map_making import LocalViews, fitting_matches, mean_descriptors, pair_matches, tracks_of, triangulated
-
-Array = npt.NDArray[np.float64]
-Bytes = npt.NDArray[np.uint8]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
+from .map_adjustment import SIGMA
+from .map_making import RATIO, LocalViews, fitting_matches, mean_descriptors, pair_matches, tracks_of, triangulated
 
 KEYFRAMES = 6
 """Images that are kept, and adjusted together when one is added."""
-RATIO = 0.8
-"""Largest ratio of a match's distance to that of the second nearest."""
-SIGMA = math.radians(0.1)
-"""Standard deviation of a bearing (rad)."""
 MIN_POINTS, SURE_POINTS = 8, 20
 """Points that must agree on where an image was taken, and number of them below which matches of two images go first."""
 MIN_LENGTHS = 4
 """Points that must agree on how far the camera moved along a direction that matches of two images tell."""
 RELATIVE_SIGMA = 0.1
 """Standard deviation of that length, as a part of it."""
-MIN_MATCHES = 12
-"""Matches of two images that must agree on a motion, where too few points are known."""
 MIN_PARALLAX = math.radians(1.0)
 """Median angle between matched bearings, both turned the same way, from which two images tell a direction (rad)."""
 STILL = math.radians(0.3)
 """The same below which the camera is taken to stand where the keyframe was (rad)."""
 KEYFRAME_PARALLAX = math.radians(3.0)
 """The same from which an image becomes a keyframe (rad)."""
-MAX_FALSE_ALARMS = 1e-6
-"""Expected number of motions that as many matches agree on by chance, at most."""
 
 
 class Keyframes(NamedTuple):
@@ -105,8 +94,8 @@ def _from_last(
     last, rows = keyframes.poses[-1], keyframes.views.rows(len(keyframes.poses) - 1)
     pairs = mutual_nearest_units(keyframes.views.compared(rows), looks, RATIO)
     first, second = keyframes.views.bearings[rows][pairs.first], bearings[pairs.second]
-    pose = relative_pose(first, second, rng, threshold=TOLERANCE) if len(first) >= MIN_MATCHES else None
-    if pose is None or np.count_nonzero(pose.inliers) < MIN_MATCHES:
+    pose = relative_pose(first, second, rng, threshold=TOLERANCE) if len(first) >= MIN_INLIERS else None
+    if pose is None or np.count_nonzero(pose.inliers) < MIN_INLIERS:
         return None
     turn = yaw_of(pose.rotation)
     moved = _parallax(first[pose.inliers], second[pose.inliers], turn)

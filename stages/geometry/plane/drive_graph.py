@@ -4,17 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 from .pose_graph import optimised_poses
 from .se2 import between, compose, wrap
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
-
-SIGMAS_PER_METRE = (0.02, 0.02, 0.02)
-"""Standard deviation of odometry per metre (m, m, rad)."""
+SIGMA_PER_METRE = 0.02
+"""Standard deviation of odometry per metre (m and rad)."""
 TURN_SIGMA = 0.05
 """The same of a turn, per radian."""
 MIN_SIGMAS = (0.005, 0.005, 0.0025)
@@ -35,10 +32,10 @@ class Closures(NamedTuple):
     turns: Array
 
 
-def odometry_sigmas(motions: Array) -> Array:
+def odometry_sigmas(motions: Array, per_metre: float = SIGMA_PER_METRE) -> Array:
     """Standard deviations (E, 3) of motions (E, 3) that odometry measured (m, m, rad)."""
     length = np.hypot(motions[:, 0], motions[:, 1])
-    sigmas: Array = np.asarray(MIN_SIGMAS) + np.asarray(SIGMAS_PER_METRE) * length[:, None]
+    sigmas: Array = np.asarray(MIN_SIGMAS) + per_metre * length[:, None]
     sigmas[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
     return sigmas
 

@@ -7,11 +7,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 CELLS, CELL_M = 120, 0.1
 """Cells along a side of the grid, and their width, metres."""

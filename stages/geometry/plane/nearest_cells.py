@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Ints
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Shorts = npt.NDArray[np.int32]
 
 MAX_CELLS = 1 << 26

@@ -3,13 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 
 from .se2 import compose, wrap, wrap_angle
 
-Array = npt.NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 

@@ -1,13 +1,11 @@
 """Reconstructs a path between two known poses from the odometry, by smoothing from both ends."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 
 from .se2 import chain, compose, wrap
-
-Array = npt.NDArray[np.float64]
 
 
 def reconstruct_path(

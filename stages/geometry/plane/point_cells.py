@@ -7,9 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 CELLS_PER_RADIUS = 4
 ROWS = 1 << 31
@@ -61,22 +59,20 @@ def within(cells: PointCells, places: Array, radius: float) -> Ints:
     reach = CELLS_PER_RADIUS + math.sqrt(0.5)
     centres = (np.column_stack(np.divmod(numbers, height)) + low + 0.5) * cell
     near = _points_around(cells, centres, reach * cell)
-    found: npt.NDArray[np.bool_] = _near_places(cells.points[near, :2] / cell - low - 0.5, numbers, height, reach)
+    found: Bools = _near_places(cells.points[near, :2] / cell - low - 0.5, numbers, height, reach)
     return np.sort(near[found])
 
 
-def have_a_point_within(cells: PointCells, places: Array, radius: float) -> npt.NDArray[np.bool_]:
+def have_a_point_within(cells: PointCells, places: Array, radius: float) -> Bools:
     """Which places (M, >= 2) lie less than `radius` metres, at most the width of a cell, from any point: (M,)."""
     own = _numbers(places, cells.width)
     xy = np.ascontiguousarray(cells.points[cells.order, :2])
-    found: npt.NDArray[np.bool_] = _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)
+    found: Bools = _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)
     return found
 
 
 @compiled(nogil=True)
-def _near_point(
-    places: Array, own: Ints, points: Array, numbers: Ints, starts: Ints, radius: float
-) -> npt.NDArray[np.bool_]:
+def _near_point(places: Array, own: Ints, points: Array, numbers: Ints, starts: Ints, radius: float) -> Bools:
     found = np.zeros(len(places), np.bool_)
     for n in range(len(places)):
         for aside in range(-1, 2):  # the three cells of a column follow each other
@@ -111,7 +107,7 @@ def _points_around(cells: PointCells, centres: Array, radius: float) -> Ints:
 
 
 @compiled(nogil=True)
-def _near_places(points: Array, numbers: Ints, height: int, radius: float) -> npt.NDArray[np.bool_]:
+def _near_places(points: Array, numbers: Ints, height: int, radius: float) -> Bools:
     # In units of cells; cell (i, j) has the number i * height + j, and `numbers` ascend.
     out, columns = np.zeros(len(points), np.bool_), numbers[-1] // height + 1
     for n in range(len(points)):

@@ -1,11 +1,10 @@
 """Errors of poses against true poses: metres and degrees."""
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array
 
 from .se2 import wrap
-
-Array = npt.NDArray[np.float64]
 
 
 def position_errors(poses: Array, truth: Array) -> Array:

@@ -3,12 +3,10 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 from .se2 import between, wrap
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 PRIOR = 1e-9
 """Weight of each pose staying where it is, which keeps parts without a measurement in place."""
@@ -19,7 +17,7 @@ CONVERGED = 1e-6
 
 
 def optimised_poses(
-    poses: Array, edges: Ints, measured: Array, sigmas: Array, doubtful: npt.NDArray[np.bool_], max_steps: int = 100
+    poses: Array, edges: Ints, measured: Array, sigmas: Array, doubtful: Bools, max_steps: int = 100
 ) -> tuple[Array, Array]:
     """The poses (N, 3) that agree best with measured motions, and the weight (E,) that each measurement was left.
 

@@ -3,10 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 class Paths(NamedTuple):

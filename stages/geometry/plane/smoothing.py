@@ -3,14 +3,13 @@
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools, Ints
+
+from .drive_graph import SIGMA_PER_METRE, odometry_sigmas
 from .pose_errors import heading_errors_deg, position_errors
 from .pose_graph import optimised_poses
 from .se2 import between, chain, compose
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MIN_SIGMAS = np.array([0.001, 0.001, np.radians(0.02)])
 """Smallest standard deviation of an estimate (m, m, rad)."""
@@ -19,13 +18,9 @@ MAX_SIGMAS = np.array([1.0, 1.0, np.radians(30.0)])
 tells how wrong it may be. Without one (a trust of 1) the covariance alone does."""
 MIN_TRUST = 0.01
 """Smallest probability at which an estimate still counts."""
-ODOMETRY_SIGMA, TURN_SIGMA = 0.02, 0.05
-"""Standard deviation of odometry per metre (m and rad), and of its heading per radian of a turn."""
 OFF_SCALE, SPAN = 0.08, 10
 """Largest share by which odometry's length may differ from that of trusted estimates so many poses apart, and be
-believed as above: filters that lag behind make up to 0.07 of it."""
-STEP_SIGMAS = np.array([0.005, 0.005, 0.0025])
-"""Standard deviation of odometry where the robot stands (m, m, rad)."""
+believed to `SIGMA_PER_METRE`: filters that lag behind make up to 0.07 of it."""
 JUMP_M, JUMP_DEG = 1.0, 20.0
 """Differences beyond which estimates contradict odometry."""
 STRETCH, WITNESSES = 5, 10
@@ -61,7 +56,7 @@ def smoothed_with_lag(
     A run could say as much `lag` frames late. NaN where none of these frames has an estimate.
     """
     found = np.full_like(estimates, np.nan)
-    there: Flags = np.asarray(np.isfinite(estimates).all(axis=1))
+    there: Bools = np.asarray(np.isfinite(estimates).all(axis=1))
     for frame in range(len(estimates)):
         part = slice(max(0, frame - window), frame + lag + 1)
         if there[part].any():
@@ -77,8 +72,7 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
     variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2))
     largest = np.where(trust[:, None] < 1.0, MAX_SIGMAS, np.inf)
     spread = np.clip(np.sqrt(variances), MIN_SIGMAS, largest) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
-    drift = STEP_SIGMAS + odometry_sigma(estimates, trust, motions) * np.hypot(motions[:, 0], motions[:, 1])[:, None]
-    drift[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
+    drift = odometry_sigmas(motions, odometry_sigma(estimates, trust, motions))
     frames = np.arange(1, number + 1)  # pose 0 is the map's origin, from which estimates are measured
     pairs = np.column_stack([np.zeros_like(frames), frames]), np.column_stack([frames, frames + 1])[:-1]
     poses, _ = optimised_poses(
@@ -101,12 +95,12 @@ def odometry_sigma(estimates: Array, trust: Array, motions: Array) -> float:
     squares = np.square(driven).sum(axis=1)
     asked = (trust[:-SPAN] >= 0.5) & (trust[SPAN:] >= 0.5) & (squares > 0.01)
     if asked.sum() < SPAN:
-        return ODOMETRY_SIGMA
+        return SIGMA_PER_METRE
     off = abs(float(np.median((ways * driven).sum(axis=1)[asked] / squares[asked])) - 1.0)
-    return 2.0 * off if off > OFF_SCALE else ODOMETRY_SIGMA
+    return 2.0 * off if off > OFF_SCALE else SIGMA_PER_METRE
 
 
-def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
+def contradicted(estimates: Array, trust: Array, motions: Array) -> Bools:
     """Which motions (N - 1, 3) lie between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
     path = chain(np.concatenate([np.zeros((1, 3)), motions]))
     moved = compose(estimates[:-1], motions)
@@ -123,13 +117,13 @@ def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
     return doubtful
 
 
-def _carried(estimates: Array, path: Array, rows: npt.NDArray[np.int64], there: Array) -> Array:
+def _carried(estimates: Array, path: Array, rows: Ints, there: Array) -> Array:
     """Median pose to which odometry leads from estimates: (3,)."""
     poses = compose(estimates[rows], between(path[rows], there))
     heading = np.arctan2(np.median(np.sin(poses[:, 2])), np.median(np.cos(poses[:, 2])))
     return np.array([*np.median(poses[:, :2], axis=0), heading])
 
 
-def _disagree(poses: Array, others: Array) -> Flags:
-    far: Flags = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
+def _disagree(poses: Array, others: Array) -> Bools:
+    far: Bools = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
     return far

@@ -4,13 +4,10 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Complex, Ints
 
 from .se2 import between, wrap
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Complex = npt.NDArray[np.complex128]
 
 LAGS = (4, 8, 16, 32)
 """Steps between the two poses of a pair."""
@@ -124,5 +121,5 @@ def _fit(ratios: Complex, mirrored: Literal["", "positions", "poses"]) -> TrackF
     return TrackFit(2.0**octave, angle, mirrored, float(near.mean()), float(as_is.mean()), len(ratios))
 
 
-def _agrees(octaves: Array, angles: Array, octave: float, angle: float) -> npt.NDArray[np.bool_]:
+def _agrees(octaves: Array, angles: Array, octave: float, angle: float) -> Bools:
     return (np.abs(octaves - octave) < NEAR_OCTAVES) & (np.abs(wrap(angles - angle)) < NEAR_RAD)

@@ -4,10 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 ELLIPSE_95 = -2.0 * math.log(0.05)
 """Squared error of a position, in units of its covariance, at the edge of the 95 % ellipse (chi squared, 2 degrees)."""
@@ -21,10 +19,10 @@ class Reliability(NamedTuple):
 
     stated: Array
     observed: Array
-    counts: npt.NDArray[np.int64]
+    counts: Ints
 
 
-def reliability(probabilities: Array, true: Flags, bins: int = 10) -> Reliability:
+def reliability(probabilities: Array, true: Bools, bins: int = 10) -> Reliability:
     """Sorts statements (N,) into bins of probability. DeGroot & Fienberg 1983."""
     which = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     counts = np.bincount(which, minlength=bins)
@@ -38,7 +36,7 @@ def expected_calibration_error(found: Reliability) -> float:
     return float((np.abs(found.stated - found.observed) * found.counts).sum() / found.counts.sum())
 
 
-def area_under_roc(scores: Array, positive: Flags) -> float | None:
+def area_under_roc(scores: Array, positive: Bools) -> float | None:
     """The probability that a positive has a higher score than a negative, equal ones a half; None without one of each.
 
     `scores`, `positive`: (N,). The area under the receiver operating characteristic: Hanley & McNeil 1982.

@@ -3,14 +3,13 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .particles import NEIGHBOUR_STEPS
 
-Array = npt.NDArray[np.float64]
 
-
-def clusters(poses: Array, metres: float, radians: float) -> npt.NDArray[np.int64]:
+def clusters(poses: Array, metres: float, radians: float) -> Ints:
     """The cluster of each pose (N, 3): (N,), numbered in the order of their cells, from left to right.
 
     Cells are `metres` square and about `radians` high in heading, which goes round; cells with a pose that touch, by a
@@ -33,5 +32,5 @@ def clusters(poses: Array, metres: float, radians: float) -> npt.NDArray[np.int6
     pairs = (np.ones(len(one), np.int8), (one, found[one, other]))
     joined: Any = coo_matrix(pairs, shape=(len(cells), len(cells)))
     labels = connected_components(joined, directed=False)[1]
-    label: npt.NDArray[np.int64] = labels[inverse.ravel()].astype(np.int64)
+    label: Ints = labels[inverse.ravel()].astype(np.int64)
     return label

@@ -1,11 +1,9 @@
 """Consistency of an estimate with the places that images look like."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
-
-Array = npt.NDArray[np.float64]
 
 
 def consistency(places: Array, pose: Array, metres: float, radians: float) -> Array:

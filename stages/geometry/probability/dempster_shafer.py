@@ -6,7 +6,7 @@ Masses are arrays (..., 3): m(H), m(not H) and m(H or not H), the ignorance; the
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 SUREST = 0.99
 """The most that evidence may weigh: two certain opposites could not be combined (erratum 29 in docs/papers.md)."""

@@ -3,13 +3,10 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 MIN_NOVELTY = 0.05
 """Smallest novelty of an image: that of one taken where the robot stands."""
 MIN_SPREAD = 1e-6
@@ -46,8 +43,14 @@ def hazen_quantile(values: Floats, quantile: float) -> float:
     return float(after - (after - before) * (1.0 - part) if part >= 0.5 else before + (after - before) * part)
 
 
-def average(values: Array, weights: Array | None) -> float:
-    """The mean of values by their weights; None: all weigh the same."""
+def centre_and_spread(values: Floats, weights: Array | None) -> tuple[float, float]:
+    """Mean and standard deviation of values by their weights; None: all weigh the same."""
+    each = values.astype(np.float64)
+    centre = _average(each, weights)
+    return centre, math.sqrt(_average(np.square(each - centre), weights))
+
+
+def _average(values: Array, weights: Array | None) -> float:
     if weights is None:
         return float(np.add.reduce(values)) / len(values)
     return float(np.add.reduce(values * weights) / np.add.reduce(weights))
@@ -59,9 +62,7 @@ def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None 
     `best` (R,): each reference's similarity at its best heading. `sampling_weight` (R,): how many references of the map
     each represents; None: one each. Where all are alike, as in a map of one, S is taken as it is.
     """
-    logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
-    centre = average(logarithms, sampling_weight)
-    spread = math.sqrt(average(np.square(logarithms - centre), sampling_weight))
+    _, spread = centre_and_spread(np.log(np.maximum(best, 1e-12)), sampling_weight)
     return contrast / spread if spread > MIN_SPREAD else 1.0
 
 

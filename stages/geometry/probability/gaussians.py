@@ -10,10 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 MAX_SQUARED_DISTANCE = 81.0
 """Nine sigma: beyond this a Gaussian's density counts as 0, less than 3e-18 of its peak."""
@@ -221,7 +219,7 @@ def farther_apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limi
 
 
 @compiled(nogil=True, error_model="numpy")
-def _nearest(i: int, means: Array, covariances: Array, alive: npt.NDArray[np.bool_], limit: float) -> tuple[int, float]:
+def _nearest(i: int, means: Array, covariances: Array, alive: Bools, limit: float) -> tuple[int, float]:
     best, closest = -1, limit
     for j in range(i + 1, len(means)):
         if alive[j] and not farther_apart(means[i], covariances[i], means[j], covariances[j], closest):

@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from .evidence import best_headings
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
+from .evidence import MIN_SPREAD, best_headings, centre_and_spread
 
 RIDGE = 1e-3
 """Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
@@ -26,25 +24,18 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
     `sampling_weight` (R,): how many references of the map each represents; None: one each.
     """
     logarithms = np.log(np.maximum(similarity, np.float32(MIN_SIMILARITY)))
-    centre, spread = _centre_and_spread(best_headings(logarithms)[0], sampling_weight)
-    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / spread)
+    centre, spread = centre_and_spread(best_headings(logarithms)[0], sampling_weight)
+    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, MIN_SPREAD))
     return scores
 
 
 def standard_score(similarity: float, best: Floats, sampling_weight: Array | None = None) -> float:
     """Standardises one more similarity as `standard_scores` does, given the references' at their best headings (R,)."""
-    centre, spread = _centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
-    return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / spread
+    centre, spread = centre_and_spread(np.log(np.maximum(best, np.float32(MIN_SIMILARITY))), sampling_weight)
+    return (math.log(max(similarity, MIN_SIMILARITY)) - centre) / max(spread, MIN_SPREAD)
 
 
-def _centre_and_spread(logarithms: Floats, sampling_weight: Array | None) -> tuple[float, float]:
-    best = logarithms.astype(np.float64)
-    centre = float(np.average(best, weights=sampling_weight))
-    spread = math.sqrt(float(np.average(np.square(best - centre), weights=sampling_weight)))
-    return centre, max(spread, 1e-6)
-
-
-def logistic_fit(scores: Array, weights: Array, right: npt.NDArray[np.bool_]) -> tuple[float, float]:
+def logistic_fit(scores: Array, weights: Array, right: Bools) -> tuple[float, float]:
     """Slope and middle of the log odds of `right` over scores (N,), each counted by its weight (N,).
 
     Where both kinds weigh the same in all, slope (z - middle) is the log of the likelihood ratio. The slope is never
@@ -85,7 +76,7 @@ def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: floa
     return ratios
 
 
-def correlation_length(values: Array, places: Array, compared: npt.NDArray[np.bool_] | None = None) -> float | None:
+def correlation_length(values: Array, places: Array, compared: Bools | None = None) -> float | None:
     """The distance l of exp(-d / l) that fits the products of standardised values (N,) at `places` (N, 2) best.
 
     Of all pairs at different places, or of those `compared` (N, N). None where there are too few, or all values are

@@ -7,10 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
-
-Array = npt.NDArray[np.float64]
-Members = npt.NDArray[np.bool_]
 
 NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 """Steps to a cell itself and its 26 neighbours: (3, 27)."""
@@ -39,7 +37,7 @@ def weighted_mean(poses: Array, weights: Array) -> Array:
 
 
 @compiled(nogil=True)
-def _mean(poses: Array, weights: Array, sines: Array, cosines: Array, members: Members) -> tuple[Array, float]:
+def _mean(poses: Array, weights: Array, sines: Array, cosines: Array, members: Bools) -> tuple[Array, float]:
     mean = np.zeros(3)
     total = sine = cosine = 0.0
     for n in range(len(poses)):
@@ -55,7 +53,7 @@ def _mean(poses: Array, weights: Array, sines: Array, cosines: Array, members: M
 
 
 @compiled(nogil=True)
-def _covariance(poses: Array, weights: Array, mean: Array, members: Members) -> Array:
+def _covariance(poses: Array, weights: Array, mean: Array, members: Bools) -> Array:
     covariance = np.zeros((3, 3))
     total = 0.0
     for n in range(len(poses)):
@@ -110,7 +108,7 @@ def _mode_and_mean(
 
 
 @compiled(nogil=True)
-def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Members:
+def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Bools:
     """Tests whether each of poses (N, 3) is within a tolerance of a pose (3,): (N,)."""
     out = np.zeros(len(poses), np.bool_)
     for n in range(len(poses)):
@@ -176,7 +174,7 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> 
 
 
 @compiled(nogil=True)
-def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: int) -> int:
+def _slot(slots: npt.NDArray[np.int32], cells: Ints, number: int) -> int:
     last = len(slots) - 1  # a power of two, less one
     at = (number * 40503) & last
     while slots[at] >= 0 and cells[slots[at]] != number:
@@ -187,7 +185,7 @@ def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: in
 @compiled(nogil=True)
 def _climb(
     poses: Array, weights: Array, sines: Array, cosines: Array, centre: Array, radius: float, angle: float
-) -> Members:
+) -> Bools:
     # Mean shift with a flat kernel; the particles it ends with, or all of them where it finds none.
     members = np.zeros(len(poses), np.bool_)
     least = np.cos(angle)
@@ -221,7 +219,7 @@ def effective_size(weights: Array) -> float:
     return float(np.add.reduce(weights) ** 2 / np.add.reduce(np.square(weights)))
 
 
-def systematic(weights: Array, number: int, offset: float) -> npt.NDArray[np.int64]:
+def systematic(weights: Array, number: int, offset: float) -> Ints:
     """Indices of `number` particles drawn by weight with one comb of equal teeth: (number,), ascending.
 
     `offset` in [0, 1) places the comb. Particle i is drawn floor or ceil of number w_i times; unbiased for a uniform
@@ -233,7 +231,7 @@ def systematic(weights: Array, number: int, offset: float) -> npt.NDArray[np.int
 
 
 @compiled(nogil=True)
-def _comb(weights: Array, offset: float, out: npt.NDArray[np.int64]) -> None:
+def _comb(weights: Array, offset: float, out: Ints) -> None:
     number = len(out)
     step = weights.sum() / number
     at, reached, last = 0, weights[0], len(weights) - 1

@@ -3,11 +3,9 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 
 @compiled(nogil=True)
@@ -36,16 +34,6 @@ def solve(matrix: Array, right: Array) -> Array:
             x[i] -= lower[k, i] * x[k]
         x[i] /= lower[i, i]
     return x
-
-
-@compiled(nogil=True)
-def cross(one: Array, two: Array) -> Array:
-    """The vector product of two vectors (3,)."""
-    out = np.empty(3)
-    out[0] = one[1] * two[2] - one[2] * two[1]
-    out[1] = one[2] * two[0] - one[0] * two[2]
-    out[2] = one[0] * two[1] - one[1] * two[0]
-    return out
 
 
 @compiled(nogil=True)

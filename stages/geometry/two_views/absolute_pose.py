@@ -13,13 +13,11 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import rotated_by
 
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
 from .refinement import refinement
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 def three_point_pose(
@@ -110,9 +108,7 @@ def _miss(R: Array, t: Array, bearing: Array, point: Array) -> float:
 
 
 @compiled(nogil=True)
-def _judge(
-    rotations: Array, translations: Array, bearings: Array, points: Array, limit: float
-) -> tuple[npt.NDArray[np.int64], Array]:
+def _judge(rotations: Array, translations: Array, bearings: Array, points: Array, limit: float) -> tuple[Ints, Array]:
     # For each pose: how many points agree with it, and the sum of truncated misses.
     counts, costs = np.zeros(len(rotations), np.int64), np.zeros(len(rotations))
     for k in range(len(rotations)):

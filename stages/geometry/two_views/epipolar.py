@@ -17,24 +17,18 @@ import numpy.typing as npt
 import poselib
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .triangulation import depths
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Poses = tuple[Array, Array]
 """Rotations (K, 3, 3) and translations (K, 3)."""
 
 
-def cross_matrix(vector: npt.ArrayLike) -> Array:
-    """[v]x (3, 3), so that [v]x w = v x w."""
-    x, y, z = np.asarray(vector, dtype=np.float64)
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def essential(rotation: Array, translation: npt.ArrayLike) -> Array:
-    """E = [t]x R (3, 3)."""
-    product: Array = cross_matrix(translation) @ rotation
+    """E = [t]x R (3, 3), with [t]x w = t x w."""
+    x, y, z = np.asarray(translation, dtype=np.float64)
+    product: Array = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ rotation
     return product
 
 
@@ -167,7 +161,7 @@ def decompose(matrix: Array) -> Poses:
     return np.stack([one, one, other, other], axis=-3), np.stack([along, -along, along, -along], axis=-2)
 
 
-def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> npt.NDArray[np.int64]:
+def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> Ints:
     """For each relative pose how many points lie in front of both cameras: (K,).
 
     In front is a positive depth along both bearings, wherever they look; the sign of z, which is what pinhole code

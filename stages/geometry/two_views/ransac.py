@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array, Bools, Ints
+
 BATCH = 32
 """Samples that are drawn and solved at once."""
 
@@ -20,11 +20,11 @@ class AgreedPose:
 
     rotation: Array
     translation: Array
-    inliers: npt.NDArray[np.bool_]
+    inliers: Bools
     samples: int
 
 
-def samples_of(number: int, size: int, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+def samples_of(number: int, size: int, rng: np.random.Generator) -> Ints:
     """The next `BATCH` samples (BATCH, size) of `number` rows, none twice in a sample. Draws from `rng`."""
     return np.argsort(rng.random((BATCH, number)), axis=1)[:, :size]
 

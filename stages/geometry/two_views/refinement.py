@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 import numba
-import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.small_systems import solve
 
-Array = npt.NDArray[np.float64]
 Refinement = Callable[[Array, Array, Array, Array, float, int, int], tuple[Array, Array]]
 MAX_DAMPING = 1e6
 """Damping beyond which no step leads further down."""

@@ -12,15 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
+from omninav.stages.geometry.arrays import Array, Bools, Ints
+from omninav.stages.geometry.probability.small_systems import rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
 from .refinement import refinement
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
 """Pairs of bearings in a sample."""
@@ -211,7 +209,7 @@ def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
         side = np.array([-t[1] / level, t[0] / level, 0.0])
         return rotated_by(R, 0.0, 0.0, step[0]), unit(t + step[1] * side)
     side = np.array([-t[1] / level, t[0] / level, 0.0]) if level > 1e-6 else np.array([1.0, 0.0, 0.0])
-    return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * cross(t, side))
+    return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * np.cross(t, side))
 
 
 @compiled(nogil=True)

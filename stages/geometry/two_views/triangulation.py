@@ -7,7 +7,7 @@ Relative pose as everywhere: X1 = R X2 + t takes coordinates of view 2 to those 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 
 def depths(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, translation: Array) -> tuple[Array, Array]:

@@ -3,11 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools
+
 from .epipolar import shared_residuals, turn_about_vertical
 from .triangulation import depths, parallax
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 Motion = tuple[float, float, float]
 """Pose of the second view seen from the first: x forward, y left (m), turn (rad)."""
 

@@ -49,7 +49,7 @@ def test_a_guess_is_called_one_and_truth_that_is_asked_for_must_be_there() -> No
 @pytest.mark.parametrize(("source", "pose"), [("truth", TRUE), ("odometry", DRIVEN)])
 def test_a_map_keeps_its_source_and_a_view_without_it_is_counted(source: str, pose: Pose) -> None:
     map, ctx = ReferenceGraph.empty(), context(first=False)
-    map.take_poses_from(source)  # type: ignore[arg-type]
+    map.put(pose_source=source)
     map.insert(TRUE, VIEW, "histograms")
     assert pose_of_view(ctx, DRIVEN, TRUE, map, "auto") is pose
     lacking = {"odometry": DRIVEN, "truth": TRUE} | {source: None}
@@ -61,7 +61,7 @@ def test_a_map_keeps_its_source_and_a_view_without_it_is_counted(source: str, po
 @pytest.mark.parametrize("source", ["odometry", "guess"])
 def test_frames_of_two_logs_are_not_mixed(source: str) -> None:
     map = ReferenceGraph.empty()
-    map.take_poses_from(source)  # type: ignore[arg-type]
+    map.put(pose_source=source)
     assert pose_of_view(context(log=1), DRIVEN, None, map, "auto") is DRIVEN  # the first log had no view
     map.insert(TRUE, VIEW, "histograms")
     assert pose_of_view(context(log=0), DRIVEN, None, map, "auto") is DRIVEN
@@ -72,6 +72,6 @@ def test_frames_of_two_logs_are_not_mixed(source: str) -> None:
 
 def test_logs_with_ground_truth_go_into_one_map() -> None:
     map = ReferenceGraph.empty()
-    map.take_poses_from("truth")
+    map.put(pose_source="truth")
     map.insert(TRUE, VIEW, "histograms")
     assert pose_of_view(context(log=1), DRIVEN, TRUE, map, "auto") is TRUE

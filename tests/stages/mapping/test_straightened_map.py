@@ -6,13 +6,12 @@ import pytest
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
 from omninav.stages.geometry.plane.drive_graph import straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.straightened_map import StraightenMap
 from omninav.stages.values.maps import ReferenceGraph
 
-MIN_GAP = "omninav.stages.mapping.straightened_map.MIN_GAP"
+MIN_GAP = "omninav.stages.geometry.appearance.closures.MIN_GAP"
 
 LAP = np.concatenate([np.tile([0.2, 0.0, 0.0], (24, 1)), np.tile([0.2, 0.0, np.pi / 8], (8, 1))])
 TRUTH = chain(np.tile(LAP, (4, 1))[:110])  # a stadium, one and three quarters times around
@@ -106,7 +105,7 @@ def test_the_way_along_the_drive_is_what_keeps_neighbours_apart(monkeypatch):
 
 
 def test_fewer_references_that_look_for_others_find_fewer(monkeypatch):
-    monkeypatch.setattr("omninav.stages.mapping.straightened_map.SAMPLES", 20)
+    monkeypatch.setattr("omninav.stages.geometry.appearance.closures.SAMPLES", 20)
     few = straightened(bent())[0].metrics.values["straightened"]
     assert 0 < few["closures"] <= 20
 
@@ -127,7 +126,7 @@ def test_poses_are_those_of_odometry_and_closures_in_units_of_the_length_scale()
     unit = length_scale(map.poses, map.features, "histograms")
     steps = np.hypot(*np.diff(map.poses[:, :2], axis=0).T)
     driven = np.append(0.0, np.cumsum(steps))
-    closures = closures_by_appearance(looks, driven, True, MAX_DISTANCES["histograms"], 36, 0.7, 5.0 * unit, 1000)
+    closures = closures_by_appearance(looks, "histograms", driven, unit)
     drives = np.zeros(len(looks), np.int64)
     poses, weights = straightened_drives(map.poses, drives, closures, 0.5 * unit, np.radians(5.0))
     np.testing.assert_allclose(out.map.poses, poses, atol=1e-9)

@@ -18,7 +18,8 @@ def test_every_image_of_a_log_has_a_pose_in_the_free_space_of_the_grid(path, ima
     assert not recording.dropped
     assert isinstance(recording.camera, HyperbolicMirror)
     assert recording.image(images - 1).shape == (recording.camera.height_px, recording.camera.width, 3)
-    assert (read_occupancy(GRID).states_at(recording.truth[:, :2]) == FREE).all()
+    grid = read_occupancy(GRID)
+    assert (grid.cells[tuple(grid.cells_of(recording.truth).T)] == FREE).all()
 
 
 def test_odometry_is_of_the_same_drive_but_drifts():

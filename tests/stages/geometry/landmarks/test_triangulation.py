@@ -26,8 +26,10 @@ def test_points_are_where_all_bearings_meet() -> None:
 
 def test_parallax_is_the_largest_angle_between_bearings() -> None:
     centres = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    found = triangulated_tracks(*towards(np.array([[0.0, 2.0, 0.0]]), centres), **LIMITS)
-    assert found.parallax == pytest.approx([math.pi / 4])
+    track = towards(np.array([[0.0, 2.0, 0.0]]), centres)
+    for least, is_found in ((math.pi / 4 - 1e-6, True), (math.pi / 4 + 1e-6, False)):
+        found = triangulated_tracks(*track, **{**LIMITS, "min_parallax": least})
+        assert np.isfinite(found.points).all() == is_found
 
 
 def test_a_bearing_of_something_else_is_dropped_and_does_not_bend_the_point() -> None:
@@ -68,4 +70,4 @@ def test_there_is_no_point_where_nothing_tells_its_depth(point, centres, sign) -
 def test_without_tracks_there_are_no_points() -> None:
     found = triangulated_tracks(np.zeros(1, np.int64), np.empty((0, 3)), np.empty((0, 3)), **LIMITS)
     assert found.points.shape == (0, 3)
-    assert found.kept.shape == found.parallax.shape == (0,)
+    assert found.kept.shape == (0,)
