@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, MessageIndex, Schema
 
 from .chunks import MAGIC, RECORD_HEAD, Allowance, Place, parse, records_in, unpack
-from .message import BadMessage, Location, LogError, Message, Record
+from .message import BadMessage, Location, LogError, Losses, Message, Record
 from .message_types import standard_types, types_of
 from .summary import read_summary, walk
 
@@ -30,7 +30,7 @@ _LAST_TIME = 2**63
 """Times are kept as signed numbers of 64 bits, as ROS has them."""
 
 
-class LogReader:
+class LogReader(Losses):
     """One MCAP file: its topics, attachments and messages, as far as they are sound.
 
     Opening reads the summary at the end of the file, where there is one, and nothing else. `scan` goes through the
@@ -49,9 +49,8 @@ class LogReader:
     """
 
     def __init__(self, path: Path | str) -> None:
+        super().__init__()
         self.path = Path(path)
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._chunks: list[tuple[Place, bool]] = []
@@ -142,11 +141,6 @@ class LogReader:
                 self.drop("bad_message", str(error))
                 continue
             yield Message(record.topic, self._type_on(record.topic), stamp, record.log_time, content)
-
-    def drop(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count something lost."""
-        self.dropped[kind] += number
-        self.details.setdefault(kind, detail)
 
     def _complete(self) -> None:
         """Go through the file once if that has not happened: attachments, and what the summary would have held."""

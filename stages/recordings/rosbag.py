@@ -19,7 +19,7 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, Allowance, unpack_lz4, unpack_zstd
-from omninav.pipeline.mcap.message import BadMessage, Record
+from omninav.pipeline.mcap.message import BadMessage, Losses, Record
 from omninav.pipeline.mcap.message_types import refuse_long_arrays, standard_types
 
 from .recording import Format, OpenOptions, UnreadableRecording
@@ -164,13 +164,12 @@ def _stated_counts(path: Path) -> dict[str, int]:
     return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in topics}
 
 
-class BagFeed:
+class BagFeed(Losses):
     """A bag as a feed of messages. What rosbags finds wrong on the way ends the scan and counts as `bad_chunk`."""
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         for part in (path / "metadata.yaml", *path.glob("*.db3")) if path.is_dir() else (path,):
             if part.exists() and not part.is_file():
@@ -276,11 +275,6 @@ class BagFeed:
             return self._reader.deserialize(bytes(data), msgtype)
         except Exception as error:
             raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error!s:.160})") from None
-
-    def drop(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count something lost."""
-        self.dropped[kind] += number
-        self.details.setdefault(kind, detail)
 
     def _has_header(self, msgtype: str) -> bool:
         fields = self._reader.typestore.fielddefs.get(msgtype, ([], []))[1]

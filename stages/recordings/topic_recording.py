@@ -3,6 +3,7 @@
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,12 +13,12 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
-from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .decode_ahead import DecodeAhead
-from .messages import is_blank, scan_of
+from .messages import scan_of
+from .recording import checked_image
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -78,22 +79,7 @@ class TopicRecording:
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         where = f"{self.name}: image {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
-        try:
-            pixels = self._images.image(frame, following)
-        except BadMessage as error:
-            self._feed.drop("bad_message", str(error))
-        except Undecodable as error:
-            self._feed.drop("undecodable_image", f"{where}: {error}")
-        else:
-            size = (self.camera.height_px, self.camera.width)
-            if pixels.shape[:2] != size:
-                height, width = pixels.shape[:2]
-                self._feed.drop("wrong_size", f"{where} is {width} x {height}, the camera {size[1]} x {size[0]}")
-            elif is_blank(pixels):
-                self._feed.drop("blank_image", f"{where} is blank")
-            else:
-                return pixels
-        return None
+        return checked_image(partial(self._images.image, frame, following), where, self.camera, self._feed.drop)
 
     def scan(self, frame: int) -> Scan | None:
         """The last ring of ranges before a frame, read now; None where the last second has none, or a broken one."""
