@@ -38,10 +38,6 @@ class CameraTransport(Transport):
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
         """Nobody is there."""
 
-    def matched(self, topic: str) -> int:
-        """The camera, of its images."""
-        return int(topic == TOPIC)
-
     def offered(self) -> dict[str, str]:
         """The images."""
         return {TOPIC: MESSAGE}

@@ -83,13 +83,6 @@ class DdsTransport(Transport):
         if written < 0:
             raise TransportError(f"transport=dds: {topic}: a message could not be sent (DDS error {written})")
 
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        with self._lock:
-            reader, writer = self._readers.get(topic), self._writers.get(topic)
-        there = len(reader.get_matched_publications()) if reader is not None else 0
-        return there + (len(writer.get_matched_subscriptions()) if writer is not None else 0)
-
     def offered(self) -> dict[str, str]:
         """Topics that others publish now, with their types."""
         found = {}

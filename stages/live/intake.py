@@ -129,7 +129,7 @@ class Intake:
                 trouble = f"{topic} carries {offered[topic]:.80}, not {kind}{self._advice(topic, kind, offered)}"
             elif heard is None:
                 trouble = f"nothing on {topic} ({kind}) for {now - self._since:.0f} s"
-                trouble += "" if self.transport.matched(topic) else ", nobody publishes it"
+                trouble += "" if topic in offered else ", nobody publishes it"
                 trouble += self._advice(topic, kind, offered)
             elif now - heard > max(SILENT_S, self.patience_s):
                 trouble = f"{topic} ({kind}) has been silent for {now - heard:.0f} s"

@@ -40,7 +40,6 @@ class RclpyTransport(Transport):
         rclpy.init(context=self._context, domain_id=domain)
         self._node = rclpy.create_node("omninav_live", context=self._context, enable_rosout=False)
         self._lock = threading.RLock()
-        self._subscriptions: dict[str, Any] = {}
         self._publishers: dict[str, Any] = {}
         self._mismatched: dict[str, str] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -66,7 +65,7 @@ class RclpyTransport(Transport):
 
         events = SubscriptionEventCallbacks(incompatible_qos=lambda event: self._note_mismatch(topic, event))
         with self._lock:
-            self._subscriptions[topic] = self._node.create_subscription(
+            self._node.create_subscription(
                 _resolve(msgtype, topic), topic, receive, qos, raw=True, event_callbacks=events
             )
         self._executor.wake()
@@ -77,13 +76,6 @@ class RclpyTransport(Transport):
             if topic not in self._publishers:
                 self._publishers[topic] = self._publisher(topic, msgtype, latched)
         self._publishers[topic].publish(data)
-
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        with self._lock:
-            subscribed, published = topic in self._subscriptions, self._publishers.get(topic)
-        there = self._node.count_publishers(topic) if subscribed else 0
-        return there + (published.get_subscription_count() if published is not None else 0)
 
     def offered(self) -> dict[str, str]:
         """Topics that others publish now, with their types."""

@@ -6,7 +6,7 @@ import os
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Literal, NamedTuple, TypeVar
 
@@ -45,11 +45,6 @@ class MessageQueue:
     def open(self, topic: str, newest: bool) -> None:
         """Make room for a topic: for its newest message alone, or for all up to `MAX_WAITING`."""
         self._arrivals[topic] = deque(maxlen=1 if newest else MAX_WAITING)
-
-    @property
-    def topics(self) -> Collection[str]:
-        """Those that have room."""
-        return self._arrivals.keys()
 
     def put(self, arrival: Arrival) -> None:
         """Keep a message; where there is no room the oldest of its topic is overtaken."""
@@ -92,12 +87,8 @@ class Transport(ABC):
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
         """Send a message in CDR. `latched`: whoever comes later gets the last one too (transient local).
 
-        Reliable. The first message of a topic announces it; peers match only then (see `matched`).
+        Reliable. The first message of a topic announces it; peers match only then.
         """
-
-    @abstractmethod
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic that is subscribed to or published."""
 
     @abstractmethod
     def offered(self) -> dict[str, str]:

@@ -6,7 +6,7 @@ import struct
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from omninav.pipeline.mcap.message_types import standard_types
@@ -84,14 +84,16 @@ class ZenohTransport(Transport):
             attachment = struct.pack("<qqB", self._sent[topic], time.time_ns(), len(sender)) + sender
             self._publishers[topic].put(data, attachment=attachment)
 
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        wanted = {"MS": topic in self._publishers, "MP": topic in self.inbox.topics}
-        return sum(wanted[kind] for own, kind, name, _ in self._endpoints() if name == topic and own != self._id)
-
     def offered(self) -> dict[str, str]:
         """Topics that others publish now, with their types."""
-        return {name: kind for own, end, name, kind in self._endpoints() if end == "MP" and own != self._id}
+        with self._counting:
+            tokens = [token.split("/") for token in self._tokens]
+        found = {}
+        for parts in tokens:
+            kind = parts[10].split("::") if len(parts) == 13 else []
+            if len(kind) == 4 and parts[5] == "MP" and parts[2] != self._id:
+                found[parts[9].replace("%", "/")] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
+        return found
 
     def mismatched(self) -> dict[str, str]:
         """Over zenoh every QoS fits."""
@@ -114,15 +116,6 @@ class ZenohTransport(Transport):
         with self._counting:
             change = self._tokens.add if sample.kind == zenoh.SampleKind.PUT else self._tokens.discard
             change(str(sample.key_expr))
-
-    def _endpoints(self) -> Iterator[tuple[str, str, str, str]]:
-        """Session, kind, topic and message type of what tokens tell."""
-        with self._counting:
-            tokens = [token.split("/") for token in self._tokens]
-        for parts in tokens:
-            kind = parts[10].split("::") if len(parts) == 13 else []
-            if len(kind) == 4 and parts[5] in ("MP", "MS"):
-                yield parts[2], parts[5], parts[9].replace("%", "/"), f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
 
 
 def _settings() -> Any:

@@ -52,9 +52,6 @@ class Wire(Transport):
     def publish(self, topic, msgtype, data, latched=False):
         self.sent.append((topic, decode(msgtype, data)))
 
-    def matched(self, topic):
-        return 1
-
     def offered(self):
         return self.there
 
