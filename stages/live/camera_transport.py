@@ -42,10 +42,6 @@ class CameraTransport(Transport):
         """The images."""
         return {TOPIC: MESSAGE}
 
-    def mismatched(self) -> dict[str, str]:
-        """Everything fits."""
-        return {}
-
     def take(self, timeout_s: float = 0.0) -> Arrival | None:
         """The newest image, if there is one since the last."""
         with self._changed:

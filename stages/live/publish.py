@@ -215,7 +215,7 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
     try:
         transport.publish(topic, msgtype, data, latched)
     except TransportError as error:
-        transport.status.leave_out(topic, str(error))
+        transport.status.left_out[topic] = str(error)
 
 
 def _row(pose: Pose) -> Array:

@@ -17,6 +17,8 @@ from .status import LiveStatus
 TransportName = Literal["dds", "rclpy", "zenoh"]
 """`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`.
 `zenoh`: a robot with rmw_zenoh, no ROS needed (`omninav[zenoh]`)."""
+DEPTH, NEWEST_DEPTH = 1000, 16
+"""Messages of a topic that DDS keeps until our thread takes them: all of them, or only the newest are wanted."""
 MAX_WAITING = 10_000
 """Messages of one topic that wait to be taken; of more the oldest is overtaken. A minute of odometry at 150 Hz."""
 
@@ -94,9 +96,9 @@ class Transport(ABC):
     def offered(self) -> dict[str, str]:
         """Topics that others publish now, with their types."""
 
-    @abstractmethod
     def mismatched(self) -> dict[str, str]:
         """Topics of ours whose other end asks for or offers another QoS: topic -> which policy."""
+        return {}
 
     def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
         """Answer a service, with requests and answers in CDR; False where the transport has no services."""

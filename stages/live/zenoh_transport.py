@@ -33,7 +33,7 @@ class ZenohTransport(Transport):
 
     Data has the key `domain/topic/type/hash`; a liveliness token of each node, publisher and subscription tells the
     others what there is; an attachment holds number, time (ns) and sender of a message. It obeys what rmw_zenoh does:
-    `ZENOH_SESSION_CONFIG_URI`, a file, and `ZENOH_CONFIG_OVERRIDE`, as `key=value;key=value`.
+    `ZENOH_SESSION_CONFIG_URI`, a file, and `ZENOH_CONFIG_OVERRIDE`, as `key=value;key=value`. Every QoS fits.
     """
 
     def __init__(self, domain: int) -> None:
@@ -56,7 +56,6 @@ class ZenohTransport(Transport):
         self._declare("NN")
 
     def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
-        """Receive a topic from now on."""
         self.inbox.open(topic, newest)
 
         def receive(sample: Any) -> None:
@@ -70,7 +69,6 @@ class ZenohTransport(Transport):
             self._declare("MS", topic, msgtype, VOLATILE)
 
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-        """Send a message in CDR."""
         from zenoh import ext
 
         with self._lock:
@@ -85,7 +83,6 @@ class ZenohTransport(Transport):
             self._publishers[topic].put(data, attachment=attachment)
 
     def offered(self) -> dict[str, str]:
-        """Topics that others publish now, with their types."""
         with self._counting:
             tokens = [token.split("/") for token in self._tokens]
         found = {}
@@ -95,12 +92,7 @@ class ZenohTransport(Transport):
                 found[parts[9].replace("%", "/")] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
         return found
 
-    def mismatched(self) -> dict[str, str]:
-        """Over zenoh every QoS fits."""
-        return {}
-
     def close(self) -> None:
-        """Leave the domain."""
         self._session.close()
 
     def _declare(self, kind: str, topic: str = "", msgtype: str = "", qos: str = "") -> None:

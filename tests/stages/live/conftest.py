@@ -55,9 +55,6 @@ class Wire(Transport):
     def offered(self):
         return self.there
 
-    def mismatched(self):
-        return {}
-
     def close(self):
         """Nothing is open."""
 

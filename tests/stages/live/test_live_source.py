@@ -40,9 +40,6 @@ class Loopback(Transport):
     def offered(self) -> dict[str, str]:
         return getattr(self, "offers", {})
 
-    def mismatched(self) -> dict[str, str]:
-        return {}
-
     def close(self) -> None:
         pass
 
