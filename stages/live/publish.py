@@ -1,5 +1,6 @@
 """What a live run tells the robot and whoever watches, every tick."""
 
+import time
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -34,6 +35,8 @@ Array = npt.NDArray[np.float64]
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE_ARRAY = "geometry_msgs/msg/PoseArray"
 TF = "tf2_msgs/msg/TFMessage"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+OK, WARN = 0, 1
 PARTICLE, PARTICLE_CLOUD = "nav2_msgs/msg/Particle", "nav2_msgs/msg/ParticleCloud"
 NAV2 = {
     PARTICLE: "geometry_msgs/Pose pose\nfloat64 weight\n",
@@ -211,6 +214,27 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
         transport.publish(topic, msgtype, data, latched)
     except TransportError as error:
         transport.status.left_out[topic] = str(error)
+
+
+def publish_diagnostics(transport: Transport, topic: str) -> None:
+    """Publish the transport's status: latency, rate, what was left out, and every trouble in words."""
+    status = transport.status
+    troubles = "; ".join(sorted(status.troubles.values()))
+    values = {"rate_hz": f"{status.rate_hz:.2f}", "spread_m": f"{status.spread_m:.3f}"}
+    if status.latencies_ms is not None:
+        values["latency_ms.median"], values["latency_ms.p95"] = (f"{each:.1f}" for each in status.latencies_ms)
+    if status.age_ms is not None:
+        values["age_ms.median"] = f"{status.age_ms:.1f}"
+    values |= {kind: str(number) for kind, number in sorted(status.counts.items())}
+    values |= {f"left out: {what}": why for what, why in sorted(status.left_out.items())}
+    state = {
+        "level": WARN if troubles else OK,
+        "name": "omninav",
+        "message": troubles or "running",
+        "hardware_id": "",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }
+    send(transport, topic, DIAGNOSTICS, encode_message(DIAGNOSTICS, {"status": [state]}, time.time_ns()))
 
 
 def _row(pose: Pose) -> Array:
