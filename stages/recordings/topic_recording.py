@@ -19,6 +19,7 @@ from omninav.stages.values.scan import Scan
 from .decode_ahead import DecodeAhead
 from .messages import scan_of
 from .recording import checked_image
+from .stamps import ascending, lone
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -41,6 +42,29 @@ class Feed(Protocol):
     def fetch(self, location: Any) -> bytes | memoryview: ...
     def decode(self, topic: str, data: bytes | memoryview) -> Any: ...
     def drop(self, kind: str, detail: str) -> None: ...
+
+
+def in_order(
+    feed: Feed, name: str, topic: str, stamps: Stamps, log_times: Stamps, repeats: str = "duplicate_stamp"
+) -> Stamps:
+    """Which of a topic's messages to keep so that their stamps ascend, in that order: (K,). The others are counted.
+
+    `repeats`: what a repeated stamp is counted as.
+    """
+    order = np.argsort(log_times, kind="stable")
+    stamps = stamps[order]
+    kept = np.arange(len(stamps))
+    if (np.diff(stamps) <= 0).any():
+        chosen, repeated, backward = ascending(stamps.tolist())
+        for number in repeated:
+            feed.drop(repeats, f"{name}: {topic} repeats the stamp {stamps[number]} ns")
+        for number in backward:
+            feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {stamps[number]} ns")
+        kept = np.array(chosen, np.int64)
+    apart = lone(stamps[kept])
+    for stamp in stamps[kept[apart]]:
+        feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {stamp} ns")
+    return order[kept[~apart]]
 
 
 class TopicRecording:

@@ -18,10 +18,10 @@ from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
-from .pose_topic import NOWHERE, PoseTopic, Track
+from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
-from .stamps import ascending, lone, poses_at, within
-from .topic_recording import Feed, TopicRecording
+from .stamps import poses_at, within
+from .topic_recording import Feed, TopicRecording, in_order
 from .transforms import TransformTopic
 
 Array = npt.NDArray[np.float64]
@@ -235,16 +235,8 @@ def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Recor
 
 
 def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats: str) -> list[Record]:
-    records = sorted(records, key=lambda record: record.log_time)
-    kept, repeated, backward = ascending([record.stamp for record in records])
-    for number in repeated:
-        feed.drop(repeats, f"{name}: {topic} repeats the stamp {records[number].stamp} ns")
-    for number in backward:
-        feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {records[number].stamp} ns")
-    apart = lone(np.array([records[number].stamp for number in kept], dtype=np.int64))
-    for number in np.array(kept, dtype=np.int64)[apart]:
-        feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {records[number].stamp} ns")
-    return [records[number] for number, alone in zip(kept, apart, strict=True) if not alone]
+    times = np.array([(each.stamp, min(each.log_time, MAX_STAMP)) for each in records], np.int64).reshape(-1, 2)
+    return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:
