@@ -81,17 +81,19 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         _drop_frames(feed, name, "no_position", stamps, ~keep, f"outside the time of {topics.truth}")
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
-        lost = ", ".join(f"{count} {kind}" for kind, count in sorted(feed.dropped.items())) or "it is empty"
-        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({lost})")
+        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
 
     def fetch_image(frame: int) -> Callable[[], Pixels]:
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
         return lambda: pixels_of(message)
 
-    def size() -> tuple[int, int]:
-        return _first_size(name, len(frames), fetch_image)
-
-    view, camera_files = find_camera(name, feed, options.camera, size, files, infos)
+    width, height = _first_size(name, len(frames), fetch_image)
+    view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
+    if (width, height) != (view.width, view.height_px):
+        raise UnreadableRecording(
+            f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; "
+            "give camera=PATH/camera.yaml"
+        )
     recording = TopicRecording(
         name=name,
         camera=view,
@@ -106,7 +108,6 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     )
     if len(files) == 1 and (sentence := set_back(found[image_topic])):
         recording.assumed = (f"{name}: {sentence}",)
-    _check_size(recording, fetch_image)
     return recording
 
 
@@ -123,18 +124,13 @@ def set_back(records: Sequence[Record]) -> str:
     )
 
 
-def find_camera(
-    name: str,
-    feed: Feed,
-    named: str | None,
-    size: Callable[[], tuple[int, int]],
-    files: Sequence[Path],
-    infos: Sequence[Any],
+def _camera(
+    name: str, feed: Feed, named: str | None, size: tuple[int, int], files: Sequence[Path], infos: Sequence[Any]
 ) -> tuple[Camera, list[Path]]:
     """The camera, and the files beside the recording that describe it."""
     beside = next((f for path in files for f in (path.parent / "camera.yaml",) if f.is_file()), None)
     if named is not None:
-        return named_camera(named, size)
+        return named_camera(named, lambda: size)
     if "camera.yaml" in feed.attachments:
         return parse_camera(feed.attachments["camera.yaml"], f"{name}: attachment camera.yaml"), []
     if beside is not None:
@@ -242,17 +238,6 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:
     for stamp in stamps[lost]:
         feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
-
-
-def _check_size(recording: TopicRecording, fetch_image: Callable[[int], Callable[[], Pixels]]) -> None:
-    """Refuse a camera that does not belong to the images, by the first image that can be decoded."""
-    width, height = _first_size(recording.name, len(recording.stamps), fetch_image)
-    camera = recording.camera
-    if (height, width) != (camera.height_px, camera.width):
-        raise UnreadableRecording(
-            f"{recording.name}: its images are {width} x {height}, but its camera says "
-            f"{camera.width} x {camera.height_px}; give camera=PATH/camera.yaml"
-        )
 
 
 def _first_size(name: str, number: int, fetch_image: Callable[[int], Callable[[], Pixels]]) -> tuple[int, int]:
