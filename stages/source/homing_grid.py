@@ -129,8 +129,7 @@ class RenderedViews:
             )
         points = grid_around(target, spacing, radius)
         points = points[world.is_free(points, config.robot.radius)]
-        seen = [in_sight(world, target, (float(x), float(y))) for x, y in points]
-        points = points[np.array(seen, np.bool_)]
+        points = points[in_sight(world, target, points)]
         headings = rng.uniform(-math.pi, math.pi, len(points))
         self.poses = np.concatenate([[target], np.column_stack([points, headings])])
         self._camera, self._scene = RobotCamera(config, "homing grid", day), world.scene
@@ -169,10 +168,10 @@ def grid_around(target: tuple[float, float, float], spacing: float, radius: floa
     return np.column_stack([x.ravel()[near] + target[0], y.ravel()[near] + target[1]])
 
 
-def in_sight(world: World, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether no body stands between two points at the height of the camera."""
-    height = world.config.eye_height
-    away = np.array([other[0] - one[0], other[1] - one[1], 0.0])
-    metres = float(np.linalg.norm(away))
-    hit = first_hits(world.boxes, world.config.height, (one[0], one[1], height), away[None] / metres)
-    return bool(hit[0] > metres)
+def in_sight(world: World, target: tuple[float, ...], points: Array) -> npt.NDArray[np.bool_]:
+    """Between which of some points (N, 2) and a target no body stands at the height of the camera: (N,)."""
+    away = np.column_stack([points - target[:2], np.zeros(len(points))])
+    metres = np.linalg.norm(away, axis=1)
+    eye = (target[0], target[1], world.config.eye_height)
+    seen: npt.NDArray[np.bool_] = first_hits(world.boxes, world.config.height, eye, away / metres[:, None]) > metres
+    return seen
