@@ -133,7 +133,7 @@ class LogReader(Losses):
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Decoded messages in the order of their stamps; equal stamps in the order of the file."""
-        found = [(record.stamp, number, record) for number, record in enumerate(_without_data(self.scan(topics)))]
+        found = [(each.stamp, number, each._replace(data=b"")) for number, each in enumerate(self.scan(topics))]
         for stamp, _, record in sorted(found):
             try:
                 content = self.decode(record.topic, self.fetch(record.location))
@@ -327,12 +327,3 @@ class LogReader(Losses):
                 standard_types() if schema is None else types_of(msgtype, schema.encoding, schema.data)
             )
         return self._stores[msgtype]
-
-
-def read_messages(path: Path | str, topics: Collection[str] | None = None) -> Iterator[Message]:
-    """Decoded messages of a log in the order of their header stamps. See `LogReader` for what becomes of damage."""
-    yield from LogReader(path).messages(topics)
-
-
-def _without_data(records: Iterator[Record]) -> Iterator[Record]:
-    return (record._replace(data=b"") for record in records)

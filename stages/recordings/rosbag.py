@@ -225,6 +225,7 @@ class BagFeed(Losses):
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         headers = {c.topic: self._has_header(c.msgtype) for c in wanted}
         number: Counter[tuple[str, int]] = Counter()
+        found: Counter[str] = Counter()
         self._limits.begin()
         allowance = self._limits.allowance
         try:
@@ -241,11 +242,9 @@ class BagFeed(Losses):
                     stamp = self._stamp(data)
                 yield Record(topic, stamp, time, data, (topic, time, number[topic, time]))
                 number[topic, time] += 1
+                found[topic] += 1
         except Exception as error:
             self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split()):.160})")
-        found: Counter[str] = Counter()
-        for (topic, _), messages in number.items():
-            found[topic] += messages
         for topic in {connection.topic for connection in wanted}:
             stated = self._stated.pop(topic, 0)  # said once, however often it is read
             if stated > found[topic]:
