@@ -22,7 +22,7 @@ from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
 from .decode_ahead import DecodeAhead
-from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, known_layouts, read_description
+from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, read_description
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording, checked_image
@@ -358,11 +358,6 @@ class DescribedFolder(Format):
         if which:
             description = replace(description, which=which)
         return ImageFolder(log, folder, description, str(file), options)
-
-    def hint(self, folder: str, options: OpenOptions) -> str:
-        """Advice for a folder that nothing describes."""
-        layouts = ", ".join(sorted(known_layouts(options.layout_folders)))
-        return f"for images with CSVs type log=LAYOUT:{folder} (layouts: {layouts})"
 
     def _described(self, log: str, file: Path, options: OpenOptions) -> ImageFolder:
         description = read_description(file, options.layout_folders)

@@ -142,7 +142,3 @@ class Format(ABC):
     @abstractmethod
     def open(self, log: str, options: OpenOptions) -> Recording:
         """The recording. Raises `UnreadableRecording` or another `BadInput`."""
-
-    def hint(self, folder: str, options: OpenOptions) -> str:
-        """Advice for a folder that no format opens; '' where this one has nothing to say."""
-        return ""
