@@ -13,14 +13,13 @@ from mcap.records import Attachment, Channel, MessageIndex, Schema
 
 from .chunks import MAGIC, RECORD_HEAD, Allowance, Place, parse, records_in, unpack
 from .message import BadMessage, Location, LogError, Losses, Message, Record
-from .message_types import standard_types, types_of
+from .message_types import has_header, header_stamp, standard_types, types_of
 from .summary import read_summary, walk
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 _MESSAGE = struct.Struct("<HIQQ")
-_STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _BYTES_IN_MEMORY = 32_000_000
 """Unpacked chunks kept beside the last one used, bytes: logs up to that size are unpacked once."""
 
@@ -270,12 +269,10 @@ class LogReader(Losses):
         if known is None:
             self.drop("bad_message", f"{self.path}: a message names channel {number}, which is not described")
             return
-        topic, has_header = known
+        topic, headed = known
         if topics is None or topic in topics:
-            stamp = log_time
-            if has_header and len(data) >= 12:
-                seconds, nanoseconds = _STAMP_LITTLE(data, 4) if data[1] & 1 else _STAMP_BIG(data, 4)
-                stamp = seconds * 1_000_000_000 + nanoseconds
+            written = header_stamp(data) if headed else None
+            stamp = log_time if written is None else written
             if stamp >= _LAST_TIME:
                 self.drop("bad_message", f"{self.path}: a message on {topic:.80} has the time {stamp} ns")
                 return
@@ -315,8 +312,7 @@ class LogReader(Losses):
             if channel is None:
                 return None
             msgtype = self._type_of(channel)
-            fields = self._store(msgtype).fielddefs.get(msgtype, ([], []))[1]
-            self._known_channels[number] = channel.topic, bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
+            self._known_channels[number] = channel.topic, has_header(self._store(msgtype), msgtype)
         return self._known_channels[number]
 
     def _store(self, msgtype: str) -> "Typestore":

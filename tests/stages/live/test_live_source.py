@@ -11,7 +11,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.mcap.message_types import encode_message
+from omninav.pipeline.mcap.message_types import encode_message, header_stamp
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake
 from omninav.stages.live import live_source as live
@@ -337,10 +337,10 @@ def test_an_image_waits_for_truth_half_as_long_as_for_odometry(
     drive.join()
     messages = said()
     image = next(n for n, each in enumerate(messages) if each.topic == "/camera/image/compressed" and n > 100)
-    stamp = intake.stamp_of(messages[image])
+    stamp = header_stamp(messages[image].data)
     for arrival in messages[: image + 100]:
         truth = arrival.topic == "/ground_truth/pose"
-        if arrival.topic == "/odom" or (truth and intake.stamp_of(arrival) < stamp):
+        if arrival.topic == "/odom" or (truth and header_stamp(arrival.data) < stamp):
             robot.inbox.put(arrival)
     robot.inbox.put(messages[image])
     assert drive.source._intake.next(0.0) is None  # its truth may still come
