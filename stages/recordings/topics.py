@@ -63,7 +63,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         except BadMessage as error:
             feed.drop("bad_message", str(error))
             continue
-        found[record.topic].append(record._replace(data=b""))
+        found[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
 
     if transforms is not None:
         transforms.require(name, feed.topics.get(transforms.topic, ""))
@@ -231,7 +231,7 @@ def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Recor
 
 
 def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats: str) -> list[Record]:
-    times = np.array([(each.stamp, min(each.log_time, MAX_STAMP)) for each in records], np.int64).reshape(-1, 2)
+    times = np.array([(each.stamp, each.log_time) for each in records], np.int64).reshape(-1, 2)
     return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
