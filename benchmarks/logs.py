@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.mcap.reader import read_messages
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogWriter
 
 from .table import Row, medians
@@ -36,7 +36,7 @@ def _rows(what: str, path: Path) -> list[Row]:
     """Ours checks every checksum and sorts by header stamps; theirs with and without checking."""
     taken = medians(
         {
-            "ours": lambda: sum(1 for _ in read_messages(path)),
+            "ours": lambda: sum(1 for _ in LogReader(path).messages()),
             "checked": lambda: _theirs(path, True),
             "unchecked": lambda: _theirs(path, False),
         },

@@ -1,5 +1,6 @@
 """Messages as they lie in a log and as they are decoded, and the errors of those that are unsound."""
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,6 +13,19 @@ class LogError(BadInput):
 
 class BadMessage(Exception):
     """One message that cannot be decoded. The message is one line: which topic and what is wrong."""
+
+
+class Losses:
+    """What could not be used: `dropped` counts it by kind, `details` tells the first case of each."""
+
+    def __init__(self) -> None:
+        self.dropped: Counter[str] = Counter()
+        self.details: dict[str, str] = {}
+
+    def drop(self, kind: str, detail: str, number: int = 1) -> None:
+        """Count something lost."""
+        self.dropped[kind] += number
+        self.details.setdefault(kind, detail)
 
 
 @dataclass(frozen=True)

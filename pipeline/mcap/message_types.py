@@ -1,5 +1,6 @@
 """ROS 2 message types: those that come with ROS, those that a file defines, and messages made from mappings."""
 
+import struct
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from .message import LogError
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
+_STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _BYTES = {"octet": "uint8", "byte": "uint8", "char": "uint8"}
 _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
 MAX_DEFINITION = 100_000
@@ -69,6 +71,23 @@ def refuse_long_arrays(store: "Typestore", msgtype: str) -> None:
 
     if parts(msgtype) > MAX_PARTS:
         raise ValueError(f"{msgtype} has more than {MAX_PARTS:,} parts")
+
+
+def has_header(store: "Typestore", msgtype: str) -> bool:
+    """Whether messages of a type begin with a header."""
+    fields = store.fielddefs.get(msgtype, ([], []))[1]
+    return bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
+
+
+def header_stamp(data: bytes | memoryview, cdr: bool = True) -> int | None:
+    """The stamp (ns) of a message that begins with a header; None where it is too short for one.
+
+    CDR has 4 bytes of encapsulation before it, ROS 1 (`cdr` false) as many of a sequence number.
+    """
+    if len(data) < 12:
+        return None
+    seconds, nanoseconds = _STAMP_BIG(data, 4) if cdr and not data[1] & 1 else _STAMP_LITTLE(data, 4)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
 
 
 def encode_message(msgtype: str, content: Any, stamp: int | None = None) -> bytes:

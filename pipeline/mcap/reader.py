@@ -12,15 +12,14 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, MessageIndex, Schema
 
 from .chunks import MAGIC, RECORD_HEAD, Allowance, Place, parse, records_in, unpack
-from .message import BadMessage, Location, LogError, Message, Record
-from .message_types import standard_types, types_of
+from .message import BadMessage, Location, LogError, Losses, Message, Record
+from .message_types import has_header, header_stamp, standard_types, types_of
 from .summary import read_summary, walk
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 _MESSAGE = struct.Struct("<HIQQ")
-_STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _BYTES_IN_MEMORY = 32_000_000
 """Unpacked chunks kept beside the last one used, bytes: logs up to that size are unpacked once."""
 
@@ -30,7 +29,7 @@ _LAST_TIME = 2**63
 """Times are kept as signed numbers of 64 bits, as ROS has them."""
 
 
-class LogReader:
+class LogReader(Losses):
     """One MCAP file: its topics, attachments and messages, as far as they are sound.
 
     Opening reads the summary at the end of the file, where there is one, and nothing else. `scan` goes through the
@@ -49,9 +48,8 @@ class LogReader:
     """
 
     def __init__(self, path: Path | str) -> None:
+        super().__init__()
         self.path = Path(path)
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._chunks: list[tuple[Place, bool]] = []
@@ -134,7 +132,7 @@ class LogReader:
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Decoded messages in the order of their stamps; equal stamps in the order of the file."""
-        found = [(record.stamp, number, record) for number, record in enumerate(_without_data(self.scan(topics)))]
+        found = [(each.stamp, number, each._replace(data=b"")) for number, each in enumerate(self.scan(topics))]
         for stamp, _, record in sorted(found):
             try:
                 content = self.decode(record.topic, self.fetch(record.location))
@@ -142,11 +140,6 @@ class LogReader:
                 self.drop("bad_message", str(error))
                 continue
             yield Message(record.topic, self._type_on(record.topic), stamp, record.log_time, content)
-
-    def drop(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count something lost."""
-        self.dropped[kind] += number
-        self.details.setdefault(kind, detail)
 
     def _complete(self) -> None:
         """Go through the file once if that has not happened: attachments, and what the summary would have held."""
@@ -276,12 +269,10 @@ class LogReader:
         if known is None:
             self.drop("bad_message", f"{self.path}: a message names channel {number}, which is not described")
             return
-        topic, has_header = known
+        topic, headed = known
         if topics is None or topic in topics:
-            stamp = log_time
-            if has_header and len(data) >= 12:
-                seconds, nanoseconds = _STAMP_LITTLE(data, 4) if data[1] & 1 else _STAMP_BIG(data, 4)
-                stamp = seconds * 1_000_000_000 + nanoseconds
+            written = header_stamp(data) if headed else None
+            stamp = log_time if written is None else written
             if stamp >= _LAST_TIME:
                 self.drop("bad_message", f"{self.path}: a message on {topic:.80} has the time {stamp} ns")
                 return
@@ -321,8 +312,7 @@ class LogReader:
             if channel is None:
                 return None
             msgtype = self._type_of(channel)
-            fields = self._store(msgtype).fielddefs.get(msgtype, ([], []))[1]
-            self._known_channels[number] = channel.topic, bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
+            self._known_channels[number] = channel.topic, has_header(self._store(msgtype), msgtype)
         return self._known_channels[number]
 
     def _store(self, msgtype: str) -> "Typestore":
@@ -333,12 +323,3 @@ class LogReader:
                 standard_types() if schema is None else types_of(msgtype, schema.encoding, schema.data)
             )
         return self._stores[msgtype]
-
-
-def read_messages(path: Path | str, topics: Collection[str] | None = None) -> Iterator[Message]:
-    """Decoded messages of a log in the order of their header stamps. See `LogReader` for what becomes of damage."""
-    yield from LogReader(path).messages(topics)
-
-
-def _without_data(records: Iterator[Record]) -> Iterator[Record]:
-    return (record._replace(data=b"") for record in records)

@@ -7,7 +7,6 @@ It opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and wi
 from collections import Counter
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 from mcap.writer import CompressionType, Writer
@@ -94,12 +93,7 @@ class LogWriter(LogStream):
         super().__init__(self._stack.enter_context(part.open("wb")), self.path, self.chunk_bytes)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *raised: Any) -> None:
         if kind is None:
             self.finish()
-        self._stack.__exit__(kind, error, trace)
+        self._stack.__exit__(kind, *raised)

@@ -61,4 +61,4 @@ def _serve(transport: Transport, service: str, srvtype: str, answer: Callable[[b
     try:
         transport.serve(service, srvtype, answer)
     except TransportError as error:  # a ROS without these messages
-        transport.status.leave_out(service, str(error))
+        transport.status.left_out[service] = str(error)

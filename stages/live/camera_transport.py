@@ -38,17 +38,9 @@ class CameraTransport(Transport):
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
         """Nobody is there."""
 
-    def matched(self, topic: str) -> int:
-        """The camera, of its images."""
-        return int(topic == TOPIC)
-
     def offered(self) -> dict[str, str]:
         """The images."""
         return {TOPIC: MESSAGE}
-
-    def mismatched(self) -> dict[str, str]:
-        """Everything fits."""
-        return {}
 
     def take(self, timeout_s: float = 0.0) -> Arrival | None:
         """The newest image, if there is one since the last."""

@@ -6,14 +6,12 @@ import time
 from typing import Any
 from xml.sax.saxutils import escape
 
-from .transport import Arrival, Transport, TransportError
+from .transport import DEPTH, NEWEST_DEPTH, Arrival, Transport, TransportError
 
 FAST_DDS = "1.15"
 """The vendor whose type information CycloneDDS cannot match; with it ignored, types match by name."""
 INCOMPATIBLE = {2: "durability", 4: "deadline", 8: "liveliness", 11: "reliability", 23: "data representation"}
 """DDS' numbers of the policies that ROS sets."""
-DEPTH, NEWEST_DEPTH = 1000, 16
-"""Messages of a topic that DDS keeps until our thread takes them: all of them, or only the newest are wanted."""
 POLL_NS = 200_000_000
 
 
@@ -56,7 +54,6 @@ class DdsTransport(Transport):
         self._thread.start()
 
     def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
-        """Receive a topic from now on."""
         from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
         from cyclonedds.qos import Policy, Qos
         from cyclonedds.sub import DataReader
@@ -73,7 +70,6 @@ class DdsTransport(Transport):
             self._waitset.attach(ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any))
 
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-        """Send a message in CDR."""
         from cyclonedds._clayer import ddspy_write
 
         with self._lock:
@@ -83,15 +79,7 @@ class DdsTransport(Transport):
         if written < 0:
             raise TransportError(f"transport=dds: {topic}: a message could not be sent (DDS error {written})")
 
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        with self._lock:
-            reader, writer = self._readers.get(topic), self._writers.get(topic)
-        there = len(reader.get_matched_publications()) if reader is not None else 0
-        return there + (len(writer.get_matched_subscriptions()) if writer is not None else 0)
-
     def offered(self) -> dict[str, str]:
-        """Topics that others publish now, with their types."""
         found = {}
         for sample in self._offers.read(N=10_000):
             if getattr(sample, "participant_key", None) == self._participant.guid:
@@ -102,7 +90,6 @@ class DdsTransport(Transport):
         return found
 
     def mismatched(self) -> dict[str, str]:
-        """Topics of ours whose other end asks for or offers another QoS."""
         with self._lock:
             statuses = {
                 topic: reader.get_requested_incompatible_qos_status() for topic, reader in self._readers.items()
@@ -115,7 +102,6 @@ class DdsTransport(Transport):
         }
 
     def close(self) -> None:
-        """Leave the domain."""
         self._closed.set()
         self._thread.join(timeout=2.0)
         with self._lock:

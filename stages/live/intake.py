@@ -1,6 +1,5 @@
 """What comes from a robot, put together: the newest image that odometry reaches, and what belongs to it."""
 
-import struct
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -8,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.mcap.message_types import standard_types
+from omninav.pipeline.mcap.message_types import header_stamp, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import camera_from_info
 from omninav.stages.recordings.live_record import Frame, LiveHeader, OdometryBuffer, Role
@@ -129,7 +128,7 @@ class Intake:
                 trouble = f"{topic} carries {offered[topic]:.80}, not {kind}{self._advice(topic, kind, offered)}"
             elif heard is None:
                 trouble = f"nothing on {topic} ({kind}) for {now - self._since:.0f} s"
-                trouble += "" if self.transport.matched(topic) else ", nobody publishes it"
+                trouble += "" if topic in offered else ", nobody publishes it"
                 trouble += self._advice(topic, kind, offered)
             elif now - heard > max(SILENT_S, self.patience_s):
                 trouble = f"{topic} ({kind}) has been silent for {now - heard:.0f} s"
@@ -179,7 +178,7 @@ class Intake:
         self._received[arrival.topic] = time.monotonic()
         role = self.header.topics.get(arrival.topic)
         if role == "image":
-            stamp = stamp_of(arrival)
+            stamp = header_stamp(arrival.data)
             if stamp is None:
                 self._drop("bad_message", f"{arrival.topic}: a message of {len(arrival.data)} bytes is no image")
             else:
@@ -294,12 +293,3 @@ def type_on(topic: str, role: Role) -> str:
     if role != "image":
         return TYPES[role]
     return IMAGE_TYPES[0 if topic.endswith("compressed") else 1]
-
-
-def stamp_of(arrival: Arrival) -> int | None:
-    """The header stamp (ns) of a message that begins with a header; None where it is too short for one."""
-    data = arrival.data
-    if len(data) < 12:
-        return None
-    seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
-    return int(seconds) * 10**9 + int(nanoseconds)

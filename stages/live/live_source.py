@@ -27,10 +27,10 @@ from omninav.stages.values.pose import Pose
 from .amcl_services import serve_amcl, serve_restart
 from .camera_device import TOPIC, device_camera
 from .camera_transport import connect_camera
-from .diagnostics import publish_diagnostics
 from .drive_record import DriveRecord, unfinished
 from .intake import Intake
 from .live_position import Guess, LiveSourceState
+from .publish import publish_diagnostics
 from .transport import Transport, TransportName, connect, disconnect
 
 LIVE, DEVICE = "live", "camera:"

@@ -1,5 +1,7 @@
 """What a live run tells the robot and whoever watches, every tick."""
 
+import time
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -33,6 +35,8 @@ Array = npt.NDArray[np.float64]
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE_ARRAY = "geometry_msgs/msg/PoseArray"
 TF = "tf2_msgs/msg/TFMessage"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+OK, WARN = 0, 1
 PARTICLE, PARTICLE_CLOUD = "nav2_msgs/msg/Particle", "nav2_msgs/msg/ParticleCloud"
 NAV2 = {
     PARTICLE: "geometry_msgs/Pose pose\nfloat64 weight\n",
@@ -41,7 +45,21 @@ NAV2 = {
 """Definitions of nav2's messages, which do not come with ROS."""
 
 
-class Publish(Stage):
+@dataclass(kw_only=True, eq=False)
+class Publisher:
+    """Joins a robot's domain: a mixin, beside `Stage`."""
+
+    transport: TransportName = "dds"
+    """As the source's."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """As the source's."""
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain."""
+        self._transport: Transport = connect(self.transport, self.domain)
+
+
+class Publish(Publisher, Stage):
     """Publishes the pose, `map -> odom` and the command over ROS 2, before anything that can wait.
 
     The command is published as it was computed in this tick, zero where there was none, once more zero when the run
@@ -51,10 +69,6 @@ class Publish(Stage):
     with the old transform a navigation stack stops.
     """
 
-    transport: TransportName = "dds"
-    """As the source's."""
-    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
-    """As the source's."""
     pose: str | None = "/estimate/pose"
     """The estimate (PoseWithCovarianceStamped, latched); `/amcl_pose` takes AMCL's place."""
     unsure: bool = False
@@ -77,7 +91,7 @@ class Publish(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
-        self._transport: Transport = connect(self.transport, self.domain)
+        super().setup(ctx)
         self._watchdog: Watchdog | None = None
         self._stamps: list[int] = []
 
@@ -142,23 +156,15 @@ class Publish(Stage):
         send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
 
 
-class PublishBelief(Stage):
+class PublishBelief(Publisher, Stage):
     """Publishes the belief in few poses over ROS 2, after the pose itself."""
 
-    transport: TransportName = "dds"
-    """As the source's."""
-    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
-    """As the source's."""
     topic: str | None = "/belief"
     """The belief in few poses; null: it is not published."""
     message: Literal["PoseArray", "ParticleCloud"] = "PoseArray"
     """What it is published as: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
     map_frame: str = MAP
     """The map's frame."""
-
-    def setup(self, ctx: Context) -> None:
-        """Join the domain."""
-        self._transport: Transport = connect(self.transport, self.domain)
 
     def step(self, ctx: Context, tick: Tick, belief: Particles | GaussianMixture | None = None) -> None:
         """One tick. `belief`: thinned. Nothing while a record is made again."""
@@ -177,19 +183,11 @@ class PublishBelief(Stage):
         return PARTICLE_CLOUD, {"particles": weighted}
 
 
-class PublishMessages(Stage):
+class PublishMessages(Publisher, Stage):
     """Publishes what else a run shows of each tick, latched: the path, the map, the route (`nodes.messages.topics`)."""
 
-    transport: TransportName = "dds"
-    """As the source's."""
-    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
-    """As the source's."""
     grid: str = "/grid"
     """What `/grid` is published as: nav2 reads its map on `/map`."""
-
-    def setup(self, ctx: Context) -> None:
-        """Join the domain."""
-        self._transport: Transport = connect(self.transport, self.domain)
 
     def step(self, ctx: Context, messages: RosMessages) -> None:
         """One tick."""
@@ -215,7 +213,28 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
     try:
         transport.publish(topic, msgtype, data, latched)
     except TransportError as error:
-        transport.status.leave_out(topic, str(error))
+        transport.status.left_out[topic] = str(error)
+
+
+def publish_diagnostics(transport: Transport, topic: str) -> None:
+    """Publish the transport's status: latency, rate, what was left out, and every trouble in words."""
+    status = transport.status
+    troubles = "; ".join(sorted(status.troubles.values()))
+    values = {"rate_hz": f"{status.rate_hz:.2f}", "spread_m": f"{status.spread_m:.3f}"}
+    if status.latencies_ms is not None:
+        values["latency_ms.median"], values["latency_ms.p95"] = (f"{each:.1f}" for each in status.latencies_ms)
+    if status.age_ms is not None:
+        values["age_ms.median"] = f"{status.age_ms:.1f}"
+    values |= {kind: str(number) for kind, number in sorted(status.counts.items())}
+    values |= {f"left out: {what}": why for what, why in sorted(status.left_out.items())}
+    state = {
+        "level": WARN if troubles else OK,
+        "name": "omninav",
+        "message": troubles or "running",
+        "hardware_id": "",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }
+    send(transport, topic, DIAGNOSTICS, encode_message(DIAGNOSTICS, {"status": [state]}, time.time_ns()))
 
 
 def _row(pose: Pose) -> Array:

@@ -7,10 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from .transport import Arrival, Transport, TransportError
-
-DEPTH, NEWEST_DEPTH = 1000, 16
-"""Messages of a topic that ROS keeps until our thread takes them: all of them, or only the newest are wanted."""
+from .transport import DEPTH, NEWEST_DEPTH, Arrival, Transport, TransportError
 
 
 def open_transport(domain: int) -> Transport:
@@ -40,7 +37,6 @@ class RclpyTransport(Transport):
         rclpy.init(context=self._context, domain_id=domain)
         self._node = rclpy.create_node("omninav_live", context=self._context, enable_rosout=False)
         self._lock = threading.RLock()
-        self._subscriptions: dict[str, Any] = {}
         self._publishers: dict[str, Any] = {}
         self._mismatched: dict[str, str] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -54,7 +50,6 @@ class RclpyTransport(Transport):
         self._thread.start()
 
     def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
-        """Receive a topic from now on."""
         from rclpy.event_handler import SubscriptionEventCallbacks
         from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 
@@ -66,27 +61,18 @@ class RclpyTransport(Transport):
 
         events = SubscriptionEventCallbacks(incompatible_qos=lambda event: self._note_mismatch(topic, event))
         with self._lock:
-            self._subscriptions[topic] = self._node.create_subscription(
+            self._node.create_subscription(
                 _resolve(msgtype, topic), topic, receive, qos, raw=True, event_callbacks=events
             )
         self._executor.wake()
 
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-        """Send a message in CDR."""
         with self._lock:
             if topic not in self._publishers:
                 self._publishers[topic] = self._publisher(topic, msgtype, latched)
         self._publishers[topic].publish(data)
 
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        with self._lock:
-            subscribed, published = topic in self._subscriptions, self._publishers.get(topic)
-        there = self._node.count_publishers(topic) if subscribed else 0
-        return there + (published.get_subscription_count() if published is not None else 0)
-
     def offered(self) -> dict[str, str]:
-        """Topics that others publish now, with their types."""
         found = {}
         for topic, _ in self._node.get_topic_names_and_types():
             for end in self._node.get_publishers_info_by_topic(topic):
@@ -95,12 +81,10 @@ class RclpyTransport(Transport):
         return found
 
     def mismatched(self) -> dict[str, str]:
-        """Topics of ours whose other end asks for or offers another QoS."""
         with self._lock:
             return dict(self._mismatched)
 
     def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
-        """Answer a service."""
         from rclpy.serialization import deserialize_message, serialize_message
 
         kind = _resolve(srvtype, service)
@@ -114,7 +98,6 @@ class RclpyTransport(Transport):
         return True
 
     def close(self) -> None:
-        """Leave the domain."""
         self._executor.shutdown(timeout_sec=2.0)
         self._thread.join(timeout=2.0)
         self._node.destroy_node()

@@ -32,10 +32,6 @@ class LiveStatus:
         else:
             self.troubles.pop(what, None)
 
-    def leave_out(self, what: str, why: str) -> None:
-        """Do without a topic or a service from now on."""
-        self.left_out[what] = why
-
     def news(self) -> list[str]:
         """Why something is left out, of what has not been said yet."""
         unsaid = [why for what, why in sorted(self.left_out.items()) if what not in self._reported]

@@ -6,7 +6,7 @@ import os
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Literal, NamedTuple, TypeVar
 
@@ -17,6 +17,8 @@ from .status import LiveStatus
 TransportName = Literal["dds", "rclpy", "zenoh"]
 """`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`.
 `zenoh`: a robot with rmw_zenoh, no ROS needed (`omninav[zenoh]`)."""
+DEPTH, NEWEST_DEPTH = 1000, 16
+"""Messages of a topic that DDS keeps until our thread takes them: all of them, or only the newest are wanted."""
 MAX_WAITING = 10_000
 """Messages of one topic that wait to be taken; of more the oldest is overtaken. A minute of odometry at 150 Hz."""
 
@@ -45,11 +47,6 @@ class MessageQueue:
     def open(self, topic: str, newest: bool) -> None:
         """Make room for a topic: for its newest message alone, or for all up to `MAX_WAITING`."""
         self._arrivals[topic] = deque(maxlen=1 if newest else MAX_WAITING)
-
-    @property
-    def topics(self) -> Collection[str]:
-        """Those that have room."""
-        return self._arrivals.keys()
 
     def put(self, arrival: Arrival) -> None:
         """Keep a message; where there is no room the oldest of its topic is overtaken."""
@@ -92,20 +89,16 @@ class Transport(ABC):
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
         """Send a message in CDR. `latched`: whoever comes later gets the last one too (transient local).
 
-        Reliable. The first message of a topic announces it; peers match only then (see `matched`).
+        Reliable. The first message of a topic announces it; peers match only then.
         """
-
-    @abstractmethod
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic that is subscribed to or published."""
 
     @abstractmethod
     def offered(self) -> dict[str, str]:
         """Topics that others publish now, with their types."""
 
-    @abstractmethod
     def mismatched(self) -> dict[str, str]:
         """Topics of ours whose other end asks for or offers another QoS: topic -> which policy."""
+        return {}
 
     def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
         """Answer a service, with requests and answers in CDR; False where the transport has no services."""

@@ -6,7 +6,7 @@ import struct
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from omninav.pipeline.mcap.message_types import standard_types
@@ -33,7 +33,7 @@ class ZenohTransport(Transport):
 
     Data has the key `domain/topic/type/hash`; a liveliness token of each node, publisher and subscription tells the
     others what there is; an attachment holds number, time (ns) and sender of a message. It obeys what rmw_zenoh does:
-    `ZENOH_SESSION_CONFIG_URI`, a file, and `ZENOH_CONFIG_OVERRIDE`, as `key=value;key=value`.
+    `ZENOH_SESSION_CONFIG_URI`, a file, and `ZENOH_CONFIG_OVERRIDE`, as `key=value;key=value`. Every QoS fits.
     """
 
     def __init__(self, domain: int) -> None:
@@ -56,7 +56,6 @@ class ZenohTransport(Transport):
         self._declare("NN")
 
     def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
-        """Receive a topic from now on."""
         self.inbox.open(topic, newest)
 
         def receive(sample: Any) -> None:
@@ -70,7 +69,6 @@ class ZenohTransport(Transport):
             self._declare("MS", topic, msgtype, VOLATILE)
 
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-        """Send a message in CDR."""
         from zenoh import ext
 
         with self._lock:
@@ -84,21 +82,17 @@ class ZenohTransport(Transport):
             attachment = struct.pack("<qqB", self._sent[topic], time.time_ns(), len(sender)) + sender
             self._publishers[topic].put(data, attachment=attachment)
 
-    def matched(self, topic: str) -> int:
-        """How many are at the other end of a topic."""
-        wanted = {"MS": topic in self._publishers, "MP": topic in self.inbox.topics}
-        return sum(wanted[kind] for own, kind, name, _ in self._endpoints() if name == topic and own != self._id)
-
     def offered(self) -> dict[str, str]:
-        """Topics that others publish now, with their types."""
-        return {name: kind for own, end, name, kind in self._endpoints() if end == "MP" and own != self._id}
-
-    def mismatched(self) -> dict[str, str]:
-        """Over zenoh every QoS fits."""
-        return {}
+        with self._counting:
+            tokens = [token.split("/") for token in self._tokens]
+        found = {}
+        for parts in tokens:
+            kind = parts[10].split("::") if len(parts) == 13 else []
+            if len(kind) == 4 and parts[5] == "MP" and parts[2] != self._id:
+                found[parts[9].replace("%", "/")] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
+        return found
 
     def close(self) -> None:
-        """Leave the domain."""
         self._session.close()
 
     def _declare(self, kind: str, topic: str = "", msgtype: str = "", qos: str = "") -> None:
@@ -114,15 +108,6 @@ class ZenohTransport(Transport):
         with self._counting:
             change = self._tokens.add if sample.kind == zenoh.SampleKind.PUT else self._tokens.discard
             change(str(sample.key_expr))
-
-    def _endpoints(self) -> Iterator[tuple[str, str, str, str]]:
-        """Session, kind, topic and message type of what tokens tell."""
-        with self._counting:
-            tokens = [token.split("/") for token in self._tokens]
-        for parts in tokens:
-            kind = parts[10].split("::") if len(parts) == 13 else []
-            if len(kind) == 4 and parts[5] in ("MP", "MS"):
-                yield parts[2], parts[5], parts[9].replace("%", "/"), f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
 
 
 def _settings() -> Any:

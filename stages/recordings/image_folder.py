@@ -3,7 +3,6 @@
 import hashlib
 import os
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -16,17 +15,17 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Undecodable, decode_image, orientation_of
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
 from .decode_ahead import DecodeAhead
-from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, known_layouts, read_description
-from .messages import is_blank
+from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, read_description
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
-from .recording import Format, OpenOptions, UnreadableRecording
+from .recording import Format, OpenOptions, UnreadableRecording, checked_image
 from .stamps import ascending, lone
 from .tables import NO_TIME, CsvTable, Delimiter, by_numbers, read_table, table_of
 
@@ -38,7 +37,7 @@ MAX_DIGITS = 10
 """Digits of an image's number."""
 
 
-class ImageFolder:
+class ImageFolder(Losses):
     """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
     Images are turned as the EXIF orientation of JPEG files says (`turned`).
@@ -52,9 +51,8 @@ class ImageFolder:
     assumed: Sequence[str] = ()
 
     def __init__(self, name: str, folder: Path, description: Description, where: str, options: OpenOptions) -> None:
+        super().__init__()
         self.name = name
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self._folder, self._description, self._where = folder, description, where
         if not folder.is_dir():
             raise UnreadableRecording(f"{folder}: no such folder")
@@ -85,20 +83,8 @@ class ImageFolder:
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
-        path = self._paths_kept[frame]
-        try:
-            pixels = self._images.image(frame, following)
-        except (Undecodable, BadInput) as error:
-            self._drop("undecodable_image", f"{path}: {error}")
-            return None
-        height, width = pixels.shape[:2]
-        if (height, width) != (self.camera.height_px, self.camera.width):
-            self._drop("wrong_size", f"{path}: {width} x {height}, not {self.camera.width} x {self.camera.height_px}")
-            return None
-        if is_blank(pixels):
-            self._drop("blank_image", f"{path} is blank")
-            return None
-        return pixels
+        decode = partial(self._images.image, frame, following)
+        return checked_image(decode, str(self._paths_kept[frame]), self.camera, self._drop)
 
     def scan(self, frame: int) -> None:
         """A folder of images holds no range readings."""
@@ -111,8 +97,7 @@ class ImageFolder:
         return whole.hexdigest()
 
     def _drop(self, kind: str, detail: str) -> None:
-        self.dropped[kind] += 1
-        self.details.setdefault(kind, f"{self.name}: {detail}")
+        self.drop(kind, f"{self.name}: {detail}")
 
     def _find(self, pattern: str, kind: Callable[[Path], bool] = Path.is_file) -> Path:
         """The one file, or folder, that a pattern names."""
@@ -373,11 +358,6 @@ class DescribedFolder(Format):
         if which:
             description = replace(description, which=which)
         return ImageFolder(log, folder, description, str(file), options)
-
-    def hint(self, folder: str, options: OpenOptions) -> str:
-        """Advice for a folder that nothing describes."""
-        layouts = ", ".join(sorted(known_layouts(options.layout_folders)))
-        return f"for images with CSVs type log=LAYOUT:{folder} (layouts: {layouts})"
 
     def _described(self, log: str, file: Path, options: OpenOptions) -> ImageFolder:
         description = read_description(file, options.layout_folders)

@@ -177,14 +177,6 @@ class LiveRecording(TopicRecording):
         """The range readings that the tick had."""
         return self._frames[frame].scan
 
-    def restart(self, frame: int) -> Reinitialise | None:
-        """Where the belief was to start again at that tick."""
-        return self._frames[frame].restart
-
-    def goal(self, frame: int) -> GoalPoint | None:
-        """Where the robot was asked to go at that tick."""
-        return self._frames[frame].goal
-
     def frame(self, frame: int) -> Frame:
         """All but the image of a tick."""
         return self._frames[frame]

@@ -47,11 +47,6 @@ class LiveTrack:
         """Stamp of the last pose that is believed."""
         return self._known[-1].stamp if self._known else None
 
-    @property
-    def first(self) -> int | None:
-        """Stamp of the first pose that is still known."""
-        return self._known[0].stamp if self._known else None
-
     def add(self, stamp: int, pose: Sequence[float], item: Any = None) -> list[Any]:
         """Take a pose. Returns the items of all poses that are now believed and were not before, in their order."""
         new = _Pose(stamp, np.array(pose, dtype=np.float64), item)

@@ -8,7 +8,7 @@ from typing import Any
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
-from omninav.pipeline.mcap.message import Location, Record
+from omninav.pipeline.mcap.message import Location, Losses, Record
 from omninav.pipeline.mcap.reader import LogReader
 
 from .live_record import HEADER, LiveRecording
@@ -69,8 +69,7 @@ class SplitLog:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._parts = [LogReader(path) for path in paths]
-        self._dropped: Counter[str] = Counter()
-        self._details: dict[str, str] = {}
+        self._own = Losses()
 
     @property
     def topics(self) -> dict[str, str]:
@@ -85,12 +84,12 @@ class SplitLog:
     @property
     def dropped(self) -> Counter[str]:
         """Data lost in any part."""
-        return sum((part.dropped for part in self._parts), self._dropped.copy())
+        return sum((part.dropped for part in self._parts), self._own.dropped.copy())
 
     @property
     def details(self) -> dict[str, str]:
         """The first case of each kind."""
-        return {kind: said for part in reversed(self._parts) for kind, said in part.details.items()} | self._details
+        return {kind: said for part in reversed(self._parts) for kind, said in part.details.items()} | self._own.details
 
     def scan(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Every sound message, part by part."""
@@ -109,5 +108,4 @@ class SplitLog:
 
     def drop(self, kind: str, detail: str) -> None:
         """Count something lost."""
-        self._dropped[kind] += 1
-        self._details.setdefault(kind, detail)
+        self._own.drop(kind, detail)

@@ -7,6 +7,7 @@ from pathlib import Path
 from omninav.pipeline.files import user_path
 from omninav.stages.camera.model import Ring
 
+from .description import known_layouts
 from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
 
@@ -45,8 +46,9 @@ def open_recording(
         return recording
     kinds = "; ".join(one.names for one in formats)
     if path.is_dir():
-        hints = "; ".join(filter(None, (one.hint(log, options) for one in formats)))
-        raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {hints}")
+        layouts = ", ".join(sorted(known_layouts(layout_folders)))
+        advice = f"for images with CSVs type log=LAYOUT:{log} (layouts: {layouts})"
+        raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {advice}")
     if not path.exists() and any(path.suffix in one.suffixes for one in formats):
         raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
     what = "not a recording" if path.exists() else f"no such file{_candidates(path)}"

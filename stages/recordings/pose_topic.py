@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .plausibility import MotionLimits, believed, without_jumps
-from .stamps import ascending, lone
-from .topic_recording import Feed
+from .topic_recording import Feed, in_order
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -49,9 +48,8 @@ class PoseTopic:
         `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
         """
         poses, stamps = np.array(self._poses).reshape(-1, 3), np.array(self._stamps, np.int64)
-        order = np.argsort(np.array(self._log_times), kind="stable")
-        kept = self._in_order(feed, name, stamps[order])
-        stamps, poses = stamps[order[kept]], poses[order[kept]]
+        kept = in_order(feed, name, self.topic, stamps, np.array(self._log_times, np.int64))
+        stamps, poses = stamps[kept], poses[kept]
         rows, begun, gaps = believed(stamps, poses, limits)
         unlikely = np.setdiff1d(np.flatnonzero(np.isfinite(poses).all(axis=1)), rows)
         self._drop(feed, name, "impossible_motion", stamps, poses, unlikely, limits)
@@ -82,18 +80,3 @@ class PoseTopic:
             detail += "; most are like this: check the unit (m, rad)"
         for _ in rows:
             feed.drop(kind, detail)
-
-    def _in_order(self, feed: Feed, name: str, stamps: Stamps) -> Rows:
-        """Which messages to keep so that stamps ascend."""
-        kept = np.arange(len(stamps))
-        if (np.diff(stamps) <= 0).any():
-            chosen, repeated, backward = ascending(stamps.tolist())
-            for number in repeated:
-                feed.drop("duplicate_stamp", f"{name}: {self.topic} repeats the stamp {stamps[number]} ns")
-            for number in backward:
-                feed.drop("backward_stamp", f"{name}: {self.topic} has a stamp out of order, {stamps[number]} ns")
-            kept = np.array(chosen, np.int64)
-        apart = lone(stamps[kept])
-        for stamp in stamps[kept[apart]]:
-            feed.drop("lone_stamp", f"{name}: {self.topic} has a stamp hours from all others, {stamp} ns")
-        return kept[~apart]

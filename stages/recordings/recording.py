@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -12,10 +12,13 @@ import numpy.typing as npt
 
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
+from .messages import is_blank
 from .plausibility import MotionLimits
 
 Array = npt.NDArray[np.float64]
@@ -68,6 +71,28 @@ class Recording(Protocol):
         """sha256 over all content that the frames are made from."""
 
 
+def checked_image(
+    decode: Callable[[], Pixels], where: str, camera: Camera, drop: Callable[[str, str], None]
+) -> Pixels | None:
+    """The image that `decode` gives; None (and counted) where it cannot be decoded, is blank or of another size."""
+    try:
+        pixels = decode()
+    except BadMessage as error:
+        drop("bad_message", str(error))
+        return None
+    except (Undecodable, BadInput) as error:
+        drop("undecodable_image", f"{where}: {error}")
+        return None
+    height, width = pixels.shape[:2]
+    if (width, height) != (camera.width, camera.height_px):
+        drop("wrong_size", f"{where} is {width} x {height}, the camera {camera.width} x {camera.height_px}")
+        return None
+    if is_blank(pixels):
+        drop("blank_image", f"{where} is blank")
+        return None
+    return pixels
+
+
 @dataclass(frozen=True)
 class Topics:
     """The topics to read. `image` null: `/camera/image/compressed`, else `/camera/image`. Others null: not read."""
@@ -117,7 +142,3 @@ class Format(ABC):
     @abstractmethod
     def open(self, log: str, options: OpenOptions) -> Recording:
         """The recording. Raises `UnreadableRecording` or another `BadInput`."""
-
-    def hint(self, folder: str, options: OpenOptions) -> str:
-        """Advice for a folder that no format opens; '' where this one has nothing to say."""
-        return ""

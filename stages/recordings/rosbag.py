@@ -3,7 +3,6 @@
 import bz2
 import io
 import sqlite3
-import struct
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from itertools import compress
@@ -19,8 +18,8 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, Allowance, unpack_lz4, unpack_zstd
-from omninav.pipeline.mcap.message import BadMessage, Record
-from omninav.pipeline.mcap.message_types import refuse_long_arrays, standard_types
+from omninav.pipeline.mcap.message import BadMessage, Losses, Record
+from omninav.pipeline.mcap.message_types import has_header, header_stamp, refuse_long_arrays, standard_types
 
 from .recording import Format, OpenOptions, UnreadableRecording
 from .topic_recording import TopicRecording
@@ -164,13 +163,12 @@ def _stated_counts(path: Path) -> dict[str, int]:
     return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in topics}
 
 
-class BagFeed:
+class BagFeed(Losses):
     """A bag as a feed of messages. What rosbags finds wrong on the way ends the scan and counts as `bad_chunk`."""
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         for part in (path / "metadata.yaml", *path.glob("*.db3")) if path.is_dir() else (path,):
             if part.exists() and not part.is_file():
@@ -224,29 +222,28 @@ class BagFeed:
     def scan(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Messages in the order of the bag's times."""
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
-        headers = {c.topic: self._has_header(c.msgtype) for c in wanted}
+        headed = {c.topic: has_header(self._reader.typestore, c.msgtype) for c in wanted}
         number: Counter[tuple[str, int]] = Counter()
+        found: Counter[str] = Counter()
         self._limits.begin()
         allowance = self._limits.allowance
         try:
             for connection, time, data in self._reader.messages(wanted) if wanted else ():
                 allowance.read_message()
-                topic, stamp = connection.topic, time
+                topic = connection.topic
                 if not (
                     isinstance(time, int) and 0 <= time < 2**63 and isinstance(data, bytes | memoryview)
                 ):  # SQLite holds all
                     self.drop("bad_message", f"{self.path}: a message on {topic:.80} is no message, or has no time")
                     continue
                 allowance.unpack(len(data))
-                if headers[topic] and len(data) >= 12:
-                    stamp = self._stamp(data)
+                written = header_stamp(data, cdr=self._reader.is2) if headed[topic] else None
+                stamp = time if written is None else written
                 yield Record(topic, stamp, time, data, (topic, time, number[topic, time]))
                 number[topic, time] += 1
+                found[topic] += 1
         except Exception as error:
             self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split()):.160})")
-        found: Counter[str] = Counter()
-        for (topic, _), messages in number.items():
-            found[topic] += messages
         for topic in {connection.topic for connection in wanted}:
             stated = self._stated.pop(topic, 0)  # said once, however often it is read
             if stated > found[topic]:
@@ -276,18 +273,3 @@ class BagFeed:
             return self._reader.deserialize(bytes(data), msgtype)
         except Exception as error:
             raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error!s:.160})") from None
-
-    def drop(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count something lost."""
-        self.dropped[kind] += number
-        self.details.setdefault(kind, detail)
-
-    def _has_header(self, msgtype: str) -> bool:
-        fields = self._reader.typestore.fielddefs.get(msgtype, ([], []))[1]
-        return bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
-
-    def _stamp(self, data: bytes | memoryview) -> int:
-        # CDR: 4 bytes of encapsulation, then the stamp. ROS 1: 4 bytes of sequence number, then the stamp
-        big = self._reader.is2 and not data[1] & 1
-        seconds, nanoseconds = struct.unpack_from(">iI" if big else "<iI", data, 4)
-        return int(seconds * 1_000_000_000 + nanoseconds)

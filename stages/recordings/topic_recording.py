@@ -3,6 +3,7 @@
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,12 +13,13 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
-from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .decode_ahead import DecodeAhead
-from .messages import is_blank, scan_of
+from .messages import scan_of
+from .recording import checked_image
+from .stamps import ascending, lone
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -40,6 +42,29 @@ class Feed(Protocol):
     def fetch(self, location: Any) -> bytes | memoryview: ...
     def decode(self, topic: str, data: bytes | memoryview) -> Any: ...
     def drop(self, kind: str, detail: str) -> None: ...
+
+
+def in_order(
+    feed: Feed, name: str, topic: str, stamps: Stamps, log_times: Stamps, repeats: str = "duplicate_stamp"
+) -> Stamps:
+    """Which of a topic's messages to keep so that their stamps ascend, in that order: (K,). The others are counted.
+
+    `repeats`: what a repeated stamp is counted as.
+    """
+    order = np.argsort(log_times, kind="stable")
+    stamps = stamps[order]
+    kept = np.arange(len(stamps))
+    if (np.diff(stamps) <= 0).any():
+        chosen, repeated, backward = ascending(stamps.tolist())
+        for number in repeated:
+            feed.drop(repeats, f"{name}: {topic} repeats the stamp {stamps[number]} ns")
+        for number in backward:
+            feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {stamps[number]} ns")
+        kept = np.array(chosen, np.int64)
+    apart = lone(stamps[kept])
+    for stamp in stamps[kept[apart]]:
+        feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {stamp} ns")
+    return order[kept[~apart]]
 
 
 class TopicRecording:
@@ -78,22 +103,7 @@ class TopicRecording:
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         where = f"{self.name}: image {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
-        try:
-            pixels = self._images.image(frame, following)
-        except BadMessage as error:
-            self._feed.drop("bad_message", str(error))
-        except Undecodable as error:
-            self._feed.drop("undecodable_image", f"{where}: {error}")
-        else:
-            size = (self.camera.height_px, self.camera.width)
-            if pixels.shape[:2] != size:
-                height, width = pixels.shape[:2]
-                self._feed.drop("wrong_size", f"{where} is {width} x {height}, the camera {size[1]} x {size[0]}")
-            elif is_blank(pixels):
-                self._feed.drop("blank_image", f"{where} is blank")
-            else:
-                return pixels
-        return None
+        return checked_image(partial(self._images.image, frame, following), where, self.camera, self._feed.drop)
 
     def scan(self, frame: int) -> Scan | None:
         """The last ring of ranges before a frame, read now; None where the last second has none, or a broken one."""

@@ -18,10 +18,10 @@ from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
-from .pose_topic import NOWHERE, PoseTopic, Track
+from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
-from .stamps import ascending, lone, poses_at, within
-from .topic_recording import Feed, TopicRecording
+from .stamps import poses_at, within
+from .topic_recording import Feed, TopicRecording, in_order
 from .transforms import TransformTopic
 
 Array = npt.NDArray[np.float64]
@@ -63,7 +63,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         except BadMessage as error:
             feed.drop("bad_message", str(error))
             continue
-        found[record.topic].append(record._replace(data=b""))
+        found[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
 
     if transforms is not None:
         transforms.require(name, feed.topics.get(transforms.topic, ""))
@@ -81,17 +81,19 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         _drop_frames(feed, name, "no_position", stamps, ~keep, f"outside the time of {topics.truth}")
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
-        lost = ", ".join(f"{count} {kind}" for kind, count in sorted(feed.dropped.items())) or "it is empty"
-        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({lost})")
+        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
 
     def fetch_image(frame: int) -> Callable[[], Pixels]:
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
         return lambda: pixels_of(message)
 
-    def size() -> tuple[int, int]:
-        return _first_size(name, len(frames), fetch_image)
-
-    view, camera_files = find_camera(name, feed, options.camera, size, files, infos)
+    width, height = _first_size(name, len(frames), fetch_image)
+    view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
+    if (width, height) != (view.width, view.height_px):
+        raise UnreadableRecording(
+            f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; "
+            "give camera=PATH/camera.yaml"
+        )
     recording = TopicRecording(
         name=name,
         camera=view,
@@ -106,7 +108,6 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     )
     if len(files) == 1 and (sentence := set_back(found[image_topic])):
         recording.assumed = (f"{name}: {sentence}",)
-    _check_size(recording, fetch_image)
     return recording
 
 
@@ -123,18 +124,13 @@ def set_back(records: Sequence[Record]) -> str:
     )
 
 
-def find_camera(
-    name: str,
-    feed: Feed,
-    named: str | None,
-    size: Callable[[], tuple[int, int]],
-    files: Sequence[Path],
-    infos: Sequence[Any],
+def _camera(
+    name: str, feed: Feed, named: str | None, size: tuple[int, int], files: Sequence[Path], infos: Sequence[Any]
 ) -> tuple[Camera, list[Path]]:
     """The camera, and the files beside the recording that describe it."""
     beside = next((f for path in files for f in (path.parent / "camera.yaml",) if f.is_file()), None)
     if named is not None:
-        return named_camera(named, size)
+        return named_camera(named, lambda: size)
     if "camera.yaml" in feed.attachments:
         return parse_camera(feed.attachments["camera.yaml"], f"{name}: attachment camera.yaml"), []
     if beside is not None:
@@ -235,32 +231,13 @@ def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Recor
 
 
 def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats: str) -> list[Record]:
-    records = sorted(records, key=lambda record: record.log_time)
-    kept, repeated, backward = ascending([record.stamp for record in records])
-    for number in repeated:
-        feed.drop(repeats, f"{name}: {topic} repeats the stamp {records[number].stamp} ns")
-    for number in backward:
-        feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {records[number].stamp} ns")
-    apart = lone(np.array([records[number].stamp for number in kept], dtype=np.int64))
-    for number in np.array(kept, dtype=np.int64)[apart]:
-        feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {records[number].stamp} ns")
-    return [records[number] for number, alone in zip(kept, apart, strict=True) if not alone]
+    times = np.array([(each.stamp, each.log_time) for each in records], np.int64).reshape(-1, 2)
+    return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:
     for stamp in stamps[lost]:
         feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
-
-
-def _check_size(recording: TopicRecording, fetch_image: Callable[[int], Callable[[], Pixels]]) -> None:
-    """Refuse a camera that does not belong to the images, by the first image that can be decoded."""
-    width, height = _first_size(recording.name, len(recording.stamps), fetch_image)
-    camera = recording.camera
-    if (height, width) != (camera.height_px, camera.width):
-        raise UnreadableRecording(
-            f"{recording.name}: its images are {width} x {height}, but its camera says "
-            f"{camera.width} x {camera.height_px}; give camera=PATH/camera.yaml"
-        )
 
 
 def _first_size(name: str, number: int, fetch_image: Callable[[int], Callable[[], Pixels]]) -> tuple[int, int]:

@@ -3,8 +3,8 @@
 import hashlib
 import os
 import re
-from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, user_path
+from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera
-from omninav.stages.values.encoded_image import MAX_PIXELS
+from omninav.stages.values.encoded_image import MAX_PIXELS, Undecodable
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import write_camera
-from .messages import is_blank
 from .named_camera import assumed_camera, named_camera
-from .recording import Format, OpenOptions, UnreadableRecording
+from .recording import Format, OpenOptions, UnreadableRecording, checked_image
 from .stamps import ascending
 
 Stamps = npt.NDArray[np.int64]
@@ -35,7 +35,7 @@ CONTAINERS = re.compile(
 """How MP4 and MOV, AVI, Matroska and WebM, MPEG-TS and -PS, Ogg and FLV begin: FFmpeg would also follow playlists."""
 
 
-class VideoRecording:
+class VideoRecording(Losses):
     """The frames of a video as a `Recording`; it has neither odometry nor positions. Stamps count from its beginning.
 
     Images are decoded one after another; one before the last that was asked for is reached from the beginning, so that
@@ -49,9 +49,8 @@ class VideoRecording:
     truth: None = None
 
     def __init__(self, name: str, path: Path, options: OpenOptions) -> None:
+        super().__init__()
         self.name, self._path = name, path
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
         self.assumed: Sequence[str] = ()
         self._capture = _opened(path)
         width, height = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH + axis)) for axis in (0, 1))
@@ -70,22 +69,11 @@ class VideoRecording:
         self._next = 0
         self._ahead: int | None = None
         self.camera = self._camera(options.camera)
-        self._shape = (self.camera.height_px, self.camera.width)
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded or is blank."""
         where = f"frame {frame} at {self.stamps[frame] / 1e9:.3f} s"
-        pixels = self._decoded(frame)
-        if pixels is None:
-            self._drop("undecodable_image", f"{where} cannot be decoded")
-        elif pixels.shape[:2] != self._shape:
-            height, width = pixels.shape[:2]
-            self._drop("wrong_size", f"{where} is {width} x {height}, the camera {self._shape[1]} x {self._shape[0]}")
-        elif is_blank(pixels):
-            self._drop("blank_image", f"{where} is blank")
-        else:
-            return pixels
-        return None
+        return checked_image(partial(self._decoded, frame), where, self.camera, self._drop)
 
     def scan(self, frame: int) -> None:
         """A video holds no range readings."""
@@ -94,20 +82,20 @@ class VideoRecording:
         """sha256 over the file and the camera."""
         return hashlib.sha256((digest_file(self._path) + write_camera(self.camera)).encode()).hexdigest()
 
-    def _decoded(self, frame: int) -> Pixels | None:
-        """The frame at a stamp, by going on until the decoder is there; None where it passes over it."""
+    def _decoded(self, frame: int) -> Pixels:
+        """The frame at a stamp, by going on until the decoder is there; `Undecodable` where it passes over it."""
         target = int(self.stamps[frame])
         if frame < self._next:
             self._capture, self._ahead = _opened(self._path), None
         self._next = frame + 1
         while self._ahead is None or self._ahead < target - TOLERANCE_NS:
             if not self._capture.grab():
-                return None
+                raise Undecodable("it cannot be decoded")
             self._ahead = _position(self._capture)
-        if self._ahead > target + TOLERANCE_NS:
-            return None
-        _, pixels = self._capture.retrieve()
-        return None if pixels is None else np.asarray(pixels, np.uint8)
+        pixels = None if self._ahead > target + TOLERANCE_NS else self._capture.retrieve()[1]
+        if pixels is None:
+            raise Undecodable("it cannot be decoded")
+        return np.asarray(pixels, np.uint8)
 
     def _in_order(self, times: list[int]) -> Stamps:
         kept, repeated, _ = ascending(sorted(times))  # packets come in the order of decoding
@@ -116,9 +104,11 @@ class VideoRecording:
         return np.array(sorted(times), np.int64)[kept]
 
     def _camera(self, named: str | None) -> Camera:
-        first = self._decoded(0)
-        if first is None:
-            raise UnreadableRecording(f"{self.name}: its first frame cannot be decoded; {_repair(self._path)}")
+        try:
+            first = self._decoded(0)
+        except Undecodable:
+            message = f"{self.name}: its first frame cannot be decoded; {_repair(self._path)}"
+            raise UnreadableRecording(message) from None
         height, width = first.shape[:2]
         beside = self._path.parent / "camera.yaml"
         if named is not None or beside.is_file():
@@ -134,8 +124,7 @@ class VideoRecording:
         return camera
 
     def _drop(self, kind: str, detail: str, number: int = 1) -> None:
-        self.dropped[kind] += number
-        self.details.setdefault(kind, f"{self.name}: {detail}")
+        self.drop(kind, f"{self.name}: {detail}", number)
 
 
 class Video(Format):

@@ -41,10 +41,6 @@ CARRIED_AT_S = 0.5
 """Seconds after which a robot with a drawn start is carried away."""
 
 
-def _nowhere() -> F64:
-    return np.zeros(0)
-
-
 class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
@@ -52,7 +48,7 @@ class ClosedLoopState(State):
     everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given.
     """
 
-    robot: F64 = field(default_factory=_nowhere)
+    robot: F64 = field(default_factory=lambda: np.zeros(0))
     track: F64 = field(default_factory=lambda: np.zeros((0, 4)))
     crowd: F64 = field(default_factory=lambda: np.zeros((0, 5)))
     odometry: F64 = field(default_factory=lambda: np.zeros(3))
@@ -177,7 +173,7 @@ class ClosedLoop(Source):
             x, y, heading = drawn_pose(self._world, ctx.rng).tolist()
             teleport(robot, Kidnapping(at=now, to=(x, y, heading)))
             ctx.count("kidnapped")
-        return Motion(*(float(value) for value in rolled))
+        return Motion(*rolled.tolist())
 
     def _perceive(
         self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None, goal: GoalPoint | None
@@ -190,11 +186,11 @@ class ClosedLoop(Source):
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
             image=self._look(ctx, simulation.robot, now, people),
             camera=self._camera.described,
-            odometry=_pose(simulation.odometry),
+            odometry=Pose(*simulation.odometry.tolist()),
             motion=motion,
             scan=scan_value(self.world, metres),
             goal=goal,
-            truth=_pose(pose),
+            truth=Pose(*pose.tolist()),
             tally=EpisodeStatistics(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
         )
 
@@ -240,7 +236,3 @@ class ClosedLoop(Source):
                 f"{', '.join(sorted(self.world.routes)) or 'none'}; or type nodes.source.start=[x,y,heading]"
             )
         return pose
-
-
-def _pose(row: F64) -> Pose:
-    return Pose(*(float(value) for value in row))

@@ -2,7 +2,7 @@
 
 import math
 from functools import cached_property
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,16 +28,6 @@ class HomingGridState(State):
     """Number of views so far."""
 
     views: int = 0
-
-
-class Views(Protocol):
-    """Images and where they were taken: `poses` (N, 3), the target's first."""
-
-    camera: Camera
-    poses: Array
-
-    def image(self, row: int) -> Pixels | None:
-        """The image of a row."""
 
 
 class HomingGrid(Source):
@@ -77,7 +67,7 @@ class HomingGrid(Source):
         """Build the world, or open the log, and choose the points."""
         recording = self._recording
         if recording is None:
-            self._views: Views = RenderedViews(
+            self._views: RenderedViews | RecordedViews = RenderedViews(
                 self.world, self.day, self.target, self.spacing_m, self.radius_m, ctx.rng
             )
         elif self.target == "drawn":
@@ -110,14 +100,14 @@ class HomingGrid(Source):
                     tick=Tick(index=row, stamp=row * 10**9, frame=row, first_of_log=row == 0),
                     image=Image(pixels),
                     camera=self._views.camera,
-                    truth=Pose(*(float(number) for number in self._views.poses[row])),
+                    truth=Pose(*self._views.poses[row].tolist()),
                 )
             ctx.count("undecodable_image", detail=f"view {row}")
         return None
 
 
 class RenderedViews:
-    """Views of a simulated world."""
+    """Views of a simulated world: images, and `poses` (N, 3) at which they are taken, the target's first."""
 
     def __init__(
         self,
@@ -139,12 +129,11 @@ class RenderedViews:
             )
         points = grid_around(target, spacing, radius)
         points = points[world.is_free(points, config.robot.radius)]
-        seen = [in_sight(world, target, (float(x), float(y))) for x, y in points]
-        points = points[np.array(seen, np.bool_)]
+        points = points[in_sight(world, target, points)]
         headings = rng.uniform(-math.pi, math.pi, len(points))
         self.poses = np.concatenate([[target], np.column_stack([points, headings])])
         self._camera, self._scene = RobotCamera(config, "homing grid", day), world.scene
-        self.camera = self._camera.described
+        self.camera: Camera = self._camera.described
 
     def image(self, row: int) -> Pixels | None:
         """Rendered now, with the camera's noise; all are of one moment, and of one exposure."""
@@ -152,7 +141,7 @@ class RenderedViews:
 
 
 class RecordedViews:
-    """Views of a log, around that which was taken closest to a point."""
+    """Views of a log, as `RenderedViews`, around that which was taken closest to a point."""
 
     def __init__(self, recording: Recording, target: tuple[float, float, float], radius: float) -> None:
         if recording.truth is None or not np.isfinite(recording.truth).all(axis=1).any():
@@ -179,10 +168,10 @@ def grid_around(target: tuple[float, float, float], spacing: float, radius: floa
     return np.column_stack([x.ravel()[near] + target[0], y.ravel()[near] + target[1]])
 
 
-def in_sight(world: World, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether no body stands between two points at the height of the camera."""
-    height = world.config.eye_height
-    away = np.array([other[0] - one[0], other[1] - one[1], 0.0])
-    metres = float(np.linalg.norm(away))
-    hit = first_hits(world.boxes, world.config.height, (one[0], one[1], height), away[None] / metres)
-    return bool(hit[0] > metres)
+def in_sight(world: World, target: tuple[float, ...], points: Array) -> npt.NDArray[np.bool_]:
+    """Between which of some points (N, 2) and a target no body stands at the height of the camera: (N,)."""
+    away = np.column_stack([points - target[:2], np.zeros(len(points))])
+    metres = np.linalg.norm(away, axis=1)
+    eye = (target[0], target[1], world.config.eye_height)
+    seen: npt.NDArray[np.bool_] = first_hits(world.boxes, world.config.height, eye, away / metres[:, None]) > metres
+    return seen

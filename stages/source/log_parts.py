@@ -20,17 +20,6 @@ OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Which frames of a log are used; see the parameters of the same names of `Playback`."""
-
-    first: int
-    stop: int | None
-    stride: int
-    cuts: Sequence[Cut]
-    rate_hz: float | None
-
-
-@dataclass(frozen=True)
 class LogPart:
     """One drive of a recording: between two pauses, or all of it.
 
@@ -45,18 +34,24 @@ class LogPart:
     kind: OdometryKind
 
 
-def parts_of(recording: Recording, truth: Array | None, selection: Selection, guess: bool) -> list[LogPart]:
+def parts_of(
+    recording: Recording,
+    truth: Array | None,
+    cuts: Sequence[Cut],
+    selected: slice,
+    rate_hz: float | None,
+    guess: bool,
+) -> list[LogPart]:
     """The drives of a recording. `guess`: motion is guessed where none is measured, though positions may be known.
 
-    Raises `UnreadableRecording` where no frame is left.
+    `selected`: of the frames that the cuts leave. Raises `UnreadableRecording` where no frame is left.
     """
-    cuts, stamps = selection.cuts, recording.stamps
+    stamps = recording.stamps
     check_cuts(cuts, len(stamps), recording.name)
-    frames = remaining_frames(cuts, len(stamps))[selection.first : selection.stop : selection.stride]
-    frames = thinned(frames, stamps, selection.rate_hz)
+    frames = thinned(remaining_frames(cuts, len(stamps))[selected], stamps, rate_hz)
     if not len(frames):
         raise UnreadableRecording(
-            f"{recording.name}: first={selection.first}, stop={selection.stop} leaves none of its frames; "
+            f"{recording.name}: first={selected.start}, stop={selected.stop} leaves none of its frames; "
             "type nodes.source.first=0 nodes.source.stop=null"
         )
     poses = truth if recording.odometry is None else recording.odometry

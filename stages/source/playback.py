@@ -24,7 +24,7 @@ from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
 from .frozen_odometry import frozen_steps
-from .log_parts import LogPart, Selection, parts_of, pauses
+from .log_parts import LogPart, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
@@ -147,6 +147,7 @@ class Playback(Source, ABC):
             first_of_log=first,
         )
         truth = None if part.truth is None else part.truth[frame]
+        live = recording.frame(frame) if isinstance(recording, LiveRecording) else None
         odometry, motion = self._motion(ctx, position, part, image)
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -157,8 +158,8 @@ class Playback(Source, ABC):
             motion=motion,
             truth=pose_of(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
-            restart=recording.restart(frame) if isinstance(recording, LiveRecording) else None,
-            goal=recording.goal(frame) if isinstance(recording, LiveRecording) else None,
+            restart=None if live is None else live.restart,
+            goal=None if live is None else live.goal,
         )
 
     def _begin(self, ctx: Context, part: LogPart) -> None:
@@ -200,7 +201,7 @@ class Playback(Source, ABC):
         if getattr(self, "_opened", None) is not None:
             return
         recordings = self.recordings()
-        selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz)
+        selected = slice(self.first, self.stop, self.stride)
         self._parts: list[LogPart] = []
         self._doubts: list[str] = []
         for recording in recordings:
@@ -210,6 +211,6 @@ class Playback(Source, ABC):
                     recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
                 )
                 self._doubts += doubts
-            self._parts += parts_of(recording, truth, selection, self._guesses())
+            self._parts += parts_of(recording, truth, self.cuts, selected, self.rate_hz, self._guesses())
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.stages.camera.rays import normalised
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
@@ -75,8 +76,8 @@ class TwoViews(Source):
         )
 
     def _seen(self, rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
-        bearings = _unit(points)
-        return _unit(bearings + math.radians(self.noise_deg) * rng.normal(size=bearings.shape))
+        bearings = normalised(points)
+        return normalised(bearings + math.radians(self.noise_deg) * rng.normal(size=bearings.shape))
 
     def _directions(self, rng: np.random.Generator, number: int, elevation_deg: float) -> np.ndarray:
         around = rng.uniform(-math.pi, math.pi, number)
@@ -85,14 +86,9 @@ class TwoViews(Source):
         return np.stack([level * np.cos(around), level * np.sin(around), up], axis=-1)
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    unit: np.ndarray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return unit
-
-
 def _any_rotation(rng: np.random.Generator) -> np.ndarray:
     # A uniform unit quaternion as a matrix.
-    w, x, y, z = _unit(rng.normal(size=4))
+    w, x, y, z = normalised(rng.normal(size=4))
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

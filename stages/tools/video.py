@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.files import user_path
-from omninav.pipeline.mcap.reader import read_messages
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings.messages import pose_of
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.thumbnails import decoded
@@ -85,7 +85,7 @@ def scenes_in(log: Path) -> Iterator[dict[str, Any]]:
     """The last content of each topic at each tick with a pose, as `seconds` since the first, and the topic's name."""
     known: dict[str, Any] = {}
     begun = None
-    for stamp, messages in groupby(read_messages(log, TOPICS), key=lambda message: message.stamp):
+    for stamp, messages in groupby(LogReader(log).messages(TOPICS), key=lambda message: message.stamp):
         now = {message.topic: message.content for message in messages}
         begun = stamp if begun is None else begun
         known |= now

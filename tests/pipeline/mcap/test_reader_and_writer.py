@@ -12,7 +12,7 @@ import zstandard
 from omninav.pipeline.mcap.chunks import MAGIC
 from omninav.pipeline.mcap.message import BadMessage, LogError
 from omninav.pipeline.mcap.message_types import make_message
-from omninav.pipeline.mcap.reader import LogReader, read_messages
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogWriter
 
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -60,7 +60,7 @@ def test_messages_come_back_in_the_order_of_their_header_stamps(tmp_path: Path) 
     with LogWriter(path) as log:
         for log_time, stamp in ((1, 30), (2, 10), (3, 20)):
             log.write("/pose", POSE, stamp, {"header": {"frame_id": "map"}}, log_time=log_time)
-    found = list(read_messages(path))
+    found = list(LogReader(path).messages())
     assert [(m.stamp, m.log_time) for m in found] == [(10, 2), (20, 3), (30, 1)]
     assert found[0].content.header.frame_id == "map"
 
@@ -68,7 +68,7 @@ def test_messages_come_back_in_the_order_of_their_header_stamps(tmp_path: Path) 
 def test_a_message_without_a_header_has_its_log_time_as_stamp(tmp_path: Path) -> None:
     with LogWriter(tmp_path / "log.mcap") as log:
         log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"})
-    (message,) = read_messages(tmp_path / "log.mcap")
+    (message,) = LogReader(tmp_path / "log.mcap").messages()
     assert (message.stamp, message.content.data) == (7, "seven")
 
 

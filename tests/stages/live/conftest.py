@@ -52,14 +52,8 @@ class Wire(Transport):
     def publish(self, topic, msgtype, data, latched=False):
         self.sent.append((topic, decode(msgtype, data)))
 
-    def matched(self, topic):
-        return 1
-
     def offered(self):
         return self.there
-
-    def mismatched(self):
-        return {}
 
     def close(self):
         """Nothing is open."""

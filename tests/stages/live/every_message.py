@@ -11,8 +11,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message_types import encode_message
-from omninav.stages.live.diagnostics import publish_diagnostics
-from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages
+from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages, publish_diagnostics
 from omninav.stages.live.transport import connect
 from omninav.stages.plots.grid_message import grid_message
 from omninav.stages.plots.markers import homing_arrow, map_markers

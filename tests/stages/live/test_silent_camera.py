@@ -14,7 +14,7 @@ import omninav
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake, publish
 from omninav.stages.live import live_source as live
-from omninav.stages.live.diagnostics import WARN
+from omninav.stages.live.publish import WARN
 from omninav.stages.live.transport import Arrival
 
 from .conftest import Wire

@@ -182,6 +182,13 @@ def test_images_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
     assert recording.dropped == {"outside_odometry": FRAMES - len(recording.stamps)}
 
 
+def test_an_image_that_was_logged_after_the_year_2262_is_out_of_order(tmp_path: Path) -> None:
+    later = only(IMAGE)(lambda made, number: [made._replace(log_time=2**63 + 1) if number == 5 else made])
+    made = (changed for m in messages() for changed in later(m))
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+    assert recording.dropped == {"backward_stamp": 1}
+
+
 def test_without_odometry_images_without_a_position_are_counted(tmp_path: Path) -> None:
     last = START + 8_000_000_000
     made = (m for m in messages() if m.topic != ODOMETRY and not (m.topic == TRUTH and m.stamp > last))
