@@ -11,7 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from .drawn_graph import DrawnGraph, DrawnNode, DrawnWire, class_name, is_truth, node_of, origins_of
+from omninav.pipeline.graph.graph import Graph, Node, Wire
+
+from .drawn_graph import class_name, is_truth, node_of, origins_of
 
 TITLE, ROW, PAD, GAP = 36.0, 16.0, 8.0, 18.0
 """Pixels: a box's title, a port's row, the space below the ports, and between boxes."""
@@ -89,7 +91,7 @@ class Layout:
     links: list["Link"]
 
 
-def layout(graph: DrawnGraph) -> Layout:
+def layout(graph: Graph) -> Layout:
     """Boxes with their widths, layers in order, and the heights at which the items of each layer stand."""
     boxes = _boxes(graph)
     layers, links = _layers(graph, boxes, [box for box in boxes.values() if box.lifetime != "after"])
@@ -98,7 +100,7 @@ def layout(graph: DrawnGraph) -> Layout:
     return Layout(boxes, layers, links)
 
 
-def _boxes(graph: DrawnGraph) -> dict[str, Box]:
+def _boxes(graph: Graph) -> dict[str, Box]:
     read = {origin for wire in graph.wires for origin in origins_of(wire)}
     boxes: dict[str, Box] = {}
     for name in sorted({node_of(origin) for origin in read} - set(graph.nodes)):
@@ -108,7 +110,7 @@ def _boxes(graph: DrawnGraph) -> dict[str, Box]:
             name, "file or other run", "made before this run, or by another graph", "before", [], rows, outside=True
         )
     for node in graph.nodes.values():
-        inputs = [_input_row(graph, node, wire) for wire in graph.wires if wire.to_node == node.name]
+        inputs = [_input_row(graph, node, wire) for wire in graph.inputs_of(node.name)]
         ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read] or list(node.signature.outputs)
         if node.lifetime == "after":
             ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
@@ -120,11 +122,11 @@ def _boxes(graph: DrawnGraph) -> dict[str, Box]:
     return boxes
 
 
-def _input_row(graph: DrawnGraph, node: DrawnNode, wire: DrawnWire) -> Row:
+def _input_row(graph: Graph, node: Node, wire: Wire) -> Row:
     origins = origins_of(wire)
     row = Row(wire.to_port, origins, wire.to_port, any(is_truth(graph, origin) for origin in origins))
     if node.lifetime == "after":
-        row.text = f"{wire.to_port} ← {wire.from_node}.{wire.from_port}"
+        row.text = f"{wire.to_port} ← {wire.origin}"
     elif wire.hold:
         row.text = f"{wire.to_port} (held)"
     return row
@@ -144,7 +146,7 @@ def text_width(text: str, size: float) -> float:
     return size * (0.58 * (len(text) - narrow) + 0.33 * narrow)
 
 
-def _hover(node: DrawnNode) -> str:
+def _hover(node: Node) -> str:
     lines = [f"{node.name}: {node.target}", node.signature.summary]
     for name, parameter in node.signature.parameters.items():
         lines.append(f"{name} = {node.parameters.get(name, parameter.default)!r}")
@@ -173,14 +175,14 @@ class Link:
         return self.end.y if isinstance(self.end, Passage) else self.end.input_y(self.port)
 
 
-def _layers(graph: DrawnGraph, boxes: dict[str, Box], flow: list[Box]) -> tuple[list[list[Item]], list[Link]]:
+def _layers(graph: Graph, boxes: dict[str, Box], flow: list[Box]) -> tuple[list[list[Item]], list[Link]]:
     """Boxes by the longest path that leads to them; long wires get a passage in every layer between."""
     names = {box.name for box in flow}
     edges: list[tuple[str, str, str, bool]] = []  # origin, to node, to port, is it a first value
     for wire in graph.wires:
         if wire.to_node in names:
             if not wire.delay:
-                edges.append((f"{wire.from_node}.{wire.from_port}", wire.to_node, wire.to_port, False))
+                edges.append((wire.origin, wire.to_node, wire.to_port, False))
             if wire.initial and node_of(wire.initial) != wire.to_node:
                 edges.append((wire.initial, wire.to_node, wire.to_port, True))
     depth = dict.fromkeys(names, 0)
