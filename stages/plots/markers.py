@@ -30,7 +30,7 @@ def map_markers(map: AnyMap, stamp: int) -> Fields:
         return {"markers": [means, gaussian_markers(stamp, "ellipses", DARK, map.means, map.covariances, map.weights)]}
     spots = map.poses[:, :2]
     if isinstance(map, TopologicalMap):
-        ways = [spots[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+        ways = [spots[map.whole_way(link)] for link in range(len(map.links))]
         ends = np.concatenate([np.empty((0, 2)), *(np.repeat(way, 2, axis=0)[1:-1] for way in ways)])
         places = spots[map.places]
         return {

@@ -51,7 +51,7 @@ def draw_map(chart: Chart, map: AnyMap) -> None:
         return
     if isinstance(map, TopologicalMap):
         poses = map.poses[map.places]
-        lines = [map.poses[[map.places[a], *map.path_of(n), map.places[b]]] for n, (a, b) in enumerate(map.links)]
+        lines = [map.poses[map.whole_way(link)] for link in range(len(map.links))]
         draw_lines(chart.base, lines, "line", 0.9)
         chart.base.dots(poses, "grey", 4.0)
         chart.name(f"places ({len(map)})", "grey", "dot")
