@@ -6,7 +6,7 @@ of what runs every tick. A wire that is longer than a layer passes between the b
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,13 +19,12 @@ TITLE, ROW, PAD, GAP = 36.0, 16.0, 8.0, 18.0
 """Pixels: a box's title, a port's row, the space below the ports, and between boxes."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Row:
-    """A port on a box. `origins`: for an input, what enters it."""
+    """A port on a box: its name, what is written there, and whether it is ground truth."""
 
     name: str
-    origins: list[str] = field(default_factory=list)
-    text: str = ""
+    text: str
     truth: bool = False
 
 
@@ -46,18 +45,11 @@ class Box:
     width: float = 0.0
 
     @cached_property
-    def rows(self) -> int:
-        """Number of its rows of ports."""
-        return (
-            len(self.inputs) + len(self.outputs)
-            if self.lifetime == "after"
-            else max(len(self.inputs), len(self.outputs))
-        )
-
-    @cached_property
     def height(self) -> float:
         """Its height in pixels."""
-        return TITLE + ROW * self.rows + (PAD if self.rows else 0)
+        numbers = len(self.inputs), len(self.outputs)
+        rows = sum(numbers) if self.lifetime == "after" else max(numbers)
+        return TITLE + ROW * rows + (PAD if rows else 0)
 
     def input_y(self, port: str) -> float:
         """Point at which a wire enters."""
@@ -105,16 +97,16 @@ def _boxes(graph: Graph) -> dict[str, Box]:
     boxes: dict[str, Box] = {}
     for name in sorted({node_of(origin) for origin in read} - set(graph.nodes)):
         ports = sorted(origin.partition(".")[2] for origin in read if node_of(origin) == name)
-        rows = [Row(port, text=port) for port in ports]
+        rows = [Row(port, port) for port in ports]
         boxes[name] = Box(
             name, "file or other run", "made before this run, or by another graph", "before", [], rows, outside=True
         )
     for node in graph.nodes.values():
         inputs = [_input_row(graph, node, wire) for wire in graph.inputs_of(node.name)]
-        ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read] or list(node.signature.outputs)
-        if node.lifetime == "after":
-            ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
-        outputs = [Row(port, text=port, truth=is_truth(graph, f"{node.name}.{port}")) for port in ports]
+        ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
+        if not ports and node.lifetime != "after":
+            ports = list(node.signature.outputs)
+        outputs = [Row(port, port, is_truth(graph, f"{node.name}.{port}")) for port in ports]
         source = node.signature.is_source
         boxes[node.name] = Box(node.name, class_name(node.target), _hover(node), node.lifetime, inputs, outputs, source)
     for box in boxes.values():
@@ -123,13 +115,10 @@ def _boxes(graph: Graph) -> dict[str, Box]:
 
 
 def _input_row(graph: Graph, node: Node, wire: Wire) -> Row:
-    origins = origins_of(wire)
-    row = Row(wire.to_port, origins, wire.to_port, any(is_truth(graph, origin) for origin in origins))
+    text = f"{wire.to_port} (held)" if wire.hold else wire.to_port
     if node.lifetime == "after":
-        row.text = f"{wire.to_port} ← {wire.origin}"
-    elif wire.hold:
-        row.text = f"{wire.to_port} (held)"
-    return row
+        text = f"{wire.to_port} ← {wire.origin}"
+    return Row(wire.to_port, text, any(is_truth(graph, origin) for origin in origins_of(wire)))
 
 
 def _box_width(box: Box) -> float:

@@ -109,8 +109,6 @@ class _Painter:
 
     def _cards(self, left: float, right: float, top: float) -> tuple[float, float]:
         """Cards of the "after" stages side by side below the loop, each in the shortest column: right, bottom."""
-        if not self.after:
-            return right, top
         width = max(box.width for box in self.after)
         right = max(right, left + 28 + width)
         columns = min(len(self.after), max(1, int((right - left - 28 + 14) // (width + 14))))
