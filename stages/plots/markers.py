@@ -3,16 +3,14 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.mcap.message_types import standard_types
-from omninav.stages.plots.pose_messages import BASE, MAP, Fields, header, quaternion, ros_point
+from omninav.stages.plots.pose_messages import BASE, MAP, Array, Fields, header, quaternion, ros_point
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-Array = npt.NDArray[np.float64]
 Colour = tuple[float, float, float]
 ARROW, LINES, POINTS, TEXT = 0, 5, 8, 9
 """Types of visualization_msgs/Marker."""

@@ -12,9 +12,8 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .drawing import extent_of, grid_extent, shown_landmarks
+from .drawing import Array, extent_of, grid_extent, shown_landmarks
 
-Array = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 
 STANDING = (152, 143, 139)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
@@ -17,7 +17,6 @@ from .drawing import extent_of
 from .map_growth import X_LABEL
 from .plan_chart import draw_surroundings, plan_chart
 
-Array = npt.NDArray[np.float64]
 COLOURS: tuple[Colour, ...] = ("blue", "orange", "green", "pink")
 SAME_M = 1.0
 """Largest distance between components of two frames that are the same place, metres."""

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visibility import VisibilityAreas
@@ -29,7 +29,6 @@ from .drawing import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 
 HUES = (ESTIMATE, MARK, ODOMETRY, "#CC79A7")
 """Colours of a view's areas, in turns."""

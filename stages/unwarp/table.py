@@ -7,11 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput
-from omninav.stages.camera.model import Camera
+from omninav.stages.camera.model import Array, Bools, Camera
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
-
-Array = npt.NDArray[np.float64]
 
 
 class RemapTable(NamedTuple):
@@ -30,7 +28,7 @@ class RemapTable(NamedTuple):
         return cast(Pixels, cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border))
 
 
-def remap_table(camera: Camera, rays: Array) -> tuple[RemapTable, npt.NDArray[np.bool_]]:
+def remap_table(camera: Camera, rays: Array) -> tuple[RemapTable, Bools]:
     """The table of an image whose pixels look along rays (rows, columns, 3), and which of them the camera shows."""
     pixels, shown = camera.project(rays)
     u, v = np.where(shown[..., None], pixels, -10.0).transpose(2, 0, 1).astype(np.float32)

@@ -8,14 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.camera.model import Camera, require_elevations
+from omninav.stages.camera.model import Array, Camera, require_elevations
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Image, Pixels, Windows
 
 from .table import RemapTable, remap_table
-
-Array = npt.NDArray[np.float64]
 
 
 def window_rays(heading: float, pitch: float, field: float, columns: int, rows: int) -> Array:
