@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 # Okabe & Ito's palette (2008), dark enough on white
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
-REFERENCE, EDGE, MARK, PARTICLE, LANDMARK = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7", "#0072B2"
+REFERENCE, EDGE, MARK, LANDMARK = "#8a8f98", "#c9ccd1", "#009E73", "#0072B2"
 
 LANDMARK_SHARE = 2.0
 """Landmarks on either side that do not decide how far a plot goes, per cent."""

@@ -76,9 +76,9 @@ def draw_landmarks(chart: Chart, map: AnyMap | None) -> None:
     chart.name(f"landmarks ({len(map.landmarks)})", "grey", "square")
 
 
-def jumps(path: Array, metres: float = JUMP_M) -> list[int]:
-    """The rows of a path (N, 2 or more) that lie farther than that from the row before."""
-    far: list[int] = (np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > metres) + 1).tolist()
+def jumps(path: Array) -> list[int]:
+    """The rows of a path (N, 2 or more) that lie farther than `JUMP_M` from the row before."""
+    far: list[int] = (np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > JUMP_M) + 1).tolist()
     return far
 
 
