@@ -55,9 +55,7 @@ def gaussian_markers(
     stamp: int, namespace: str, colour: Colour, means: Array, covariances: Array, weights: Array
 ) -> Fields:
     """Gaussians (K, …) as a list of lines: the two axes of each, one standard deviation to either side."""
-    lines = marker(stamp, namespace, LINES, 0.02, colour, points(axis_ends(means, covariances)))
-    lines["colors"] = _colours(colour, np.repeat(weights, 4))
-    return lines
+    return weighted_points(stamp, namespace, colour, 0.02, axis_ends(means, covariances), np.repeat(weights, 4), LINES)
 
 
 def axis_ends(means: Array, covariances: Array) -> Array:
@@ -68,11 +66,13 @@ def axis_ends(means: Array, covariances: Array) -> Array:
     return ends.reshape(-1, 2)
 
 
-def weighted_points(stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array) -> Fields:
-    """Points (N, 2), each as opaque as its weight in [0, 1] says."""
-    shown = marker(stamp, namespace, POINTS, size, colour, points(places))
-    shown["colors"] = _colours(colour, weights)
-    return shown
+def weighted_points(
+    stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array, kind: int = POINTS
+) -> Fields:
+    """Points (N, 2), or ends of lines, each as opaque as its weight in [0, 1] says."""
+    rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
+    shown = marker(stamp, namespace, kind, size, colour, points(places))
+    return shown | {"colors": [rgba(*colour, weight) for weight in opacity(weights).tolist()]}
 
 
 def homing_arrow(stamp: int, direction: float, length: float) -> Fields:
@@ -113,11 +113,6 @@ def _text(stamp: int, number: int, text: str, place: Array) -> Fields:
     name = marker(stamp, "names", TEXT, 0.3, DARK, [])
     name["pose"]["position"] = ros_point(*place) | {"z": 0.3}
     return name | {"id": number, "text": text}
-
-
-def _colours(colour: Colour, weights: Array) -> list[Any]:
-    rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
-    return [rgba(*colour, weight) for weight in opacity(weights).tolist()]
 
 
 def opacity(weights: Array) -> Array:
