@@ -29,13 +29,12 @@ from omninav.stages.monitor.map_check import CheckMap
 from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
-from omninav.stages.unwarp.table import PanoramaTable
+from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
 IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odom", "/ground_truth/pose"
 SECOND = 1_000_000_000
-PANORAMAS = PanoramaTable(360, 80)
 
 Change = Callable[[Message, float], Message | None]
 """Takes a message and when it came, in seconds from the first one, and gives what is written in its place."""
@@ -238,9 +237,11 @@ def learned(tour: str) -> ReferenceGraph:
     """A map from a tour, as `omninav` learns it."""
     ctx, learn = Context("map"), LearnReferenceGraph()
     describe, map, state = HsvHistogram(grey_world="local"), None, LearnReferenceGraphState()
+    unwarp = UnwarpPanorama()
+    unwarp.setup(ctx)
     describe.setup(ctx)
     for out in ticks(LogSource(log=tour), ctx):
-        features = describe.step(ctx, panorama=PANORAMAS.panorama(out.image, out.camera)).features
+        features = describe.step(ctx, unwarp.step(ctx, out.image, out.camera).panorama).features
         map = learn.step(ctx, features, out.odometry, out.truth, map, state).map
     assert map is not None
     return map
@@ -253,10 +254,11 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
     of_map = CheckMap().step(ctx, map).conflicts
     found = [Found(0, sentence) for sentence in ctx.warnings]
     describe, match, strip = HsvHistogram(grey_world="local"), SelectiveMatch(penalty="three_quarters"), GreyStrip()
-    watch, state = InputConflicts(), InputConflictsState()
+    watch, state, unwarp = InputConflicts(), InputConflictsState(), UnwarpPanorama()
+    unwarp.setup(ctx)
     describe.setup(ctx)
     for number, out in enumerate(ticks(LogSource(log=drive), ctx), 1):
-        panorama = PANORAMAS.panorama(out.image, out.camera)
+        panorama = unwarp.step(ctx, out.image, out.camera).panorama
         features = describe.step(ctx, panorama=panorama).features
         watch.step(
             ctx, state, strip.step(ctx, panorama).strip, out.odometry, out.motion,

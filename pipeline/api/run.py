@@ -14,7 +14,7 @@ from omninav.pipeline.graph.problems import BadInput, suggest
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.graph.value import Value
-from omninav.pipeline.report.notebook_table import notebook_table
+from omninav.pipeline.report.key_figures import key_figures
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import key_table
 from omninav.pipeline.run.execution import execute
@@ -149,11 +149,13 @@ class Run:
         head = (
             f"<p><b>{escape(self.folder.name)}</b> {escape(self.status)}, <code>{escape(str(self.folder))}</code></p>"
         )
-        return head + (
-            notebook_table(self._described(), read_timing(self.folder))
-            if (self.folder / "metrics.json").is_file()
-            else ""
+        if not (self.folder / "metrics.json").is_file():
+            return head
+        rows = (
+            f'<tr><td style="text-align:left">{escape(figure.name)}</td><td>{escape(figure.text)}</td></tr>'
+            for figure in key_figures(self._described(), read_timing(self.folder))
         )
+        return f"{head}<table>{''.join(rows)}</table>"
 
 
 @plain_errors()

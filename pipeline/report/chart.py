@@ -7,7 +7,6 @@ import base64
 import math
 from collections.abc import Sequence
 from html import escape
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -32,6 +31,8 @@ COLOURS: dict[Colour, str] = {
 """Okabe & Ito's (2008), as they are on white."""
 BEGINNING = '<svg class="chart"'
 """First characters of every chart, and of no other drawing."""
+WIDTH = 560.0
+"""Pixels for which a drawing is made; it is shown at any width."""
 LEFT, RIGHT, TOP, BOTTOM, ROW = 64.0, 12.0, 30.0, 50.0, 24.0
 """Pixels around the axes, and of a row of the legend; wide enough for the larger letters of a narrow page."""
 
@@ -127,12 +128,12 @@ class Layer:
             look = f"fill:none;stroke:{ink(colour)};stroke-width:2.2"
             self.marks.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" style="{look}"/>')
 
-    def square(self, point: Array, colour: Colour, half: float = 4.0) -> None:
+    def square(self, point: Array, colour: Colour) -> None:
         """A square around a point."""
         ((x, y),) = self._pixels(point[None, :2]).tolist()
         if np.isfinite((x, y)).all():
-            side = f'width="{2 * half:g}" height="{2 * half:g}"'
-            self.marks.append(f'<rect x="{x - half:.1f}" y="{y - half:.1f}" {side} style="fill:{ink(colour)}"/>')
+            where = f'x="{x - 4:.1f}" y="{y - 4:.1f}" width="8" height="8"'
+            self.marks.append(f'<rect {where} style="fill:{ink(colour)}"/>')
 
     def crosses(self, points: Array, colour: Colour, half: float = 4.0) -> None:
         """A cross at each point."""
@@ -189,11 +190,11 @@ class Layer:
         if text:
             self.marks.append(_text(at + 4, self.y.end + 14, text, "start"))
 
-    def band(self, x: tuple[float, float], colour: Colour, opacity: float = 0.25) -> None:
+    def band(self, x: tuple[float, float], colour: Colour) -> None:
         """A band from bottom to top, at least two pixels wide."""
         first, last = self.x(x).tolist()
         where = f'x="{first:.1f}" y="{self.y.end:.1f}" width="{max(last - first, 2.0):.1f}"'
-        look = f"fill:{ink(colour)};fill-opacity:{opacity:.2g}"
+        look = f"fill:{ink(colour)};fill-opacity:0.25"
         self.marks.append(f'<rect {where} height="{abs(self.y.start - self.y.end):.1f}" style="{look}"/>')
 
     def level(self, y: float, colour: Colour) -> None:
@@ -210,8 +211,7 @@ class Layer:
 class Chart:
     """Axes with units, one layer of marks, and a legend.
 
-    `equal`: as many pixels for a unit of y as of x, within `height` (least, greatest). `width` is what the drawing is
-    made for; it is shown at any.
+    `equal`: as many pixels for a unit of y as of x, within `height` (least, greatest).
     """
 
     def __init__(
@@ -224,17 +224,16 @@ class Chart:
         equal: bool = False,
         log: bool = False,
         height: tuple[float, float] = (190.0, 520.0),
-        width: float = 560.0,
     ) -> None:
-        inner = width - LEFT - RIGHT
+        inner = WIDTH - LEFT - RIGHT
         across, up = x[1] - x[0], y[1] - y[0]
         tall = float(np.clip(inner * up / across, *height)) if equal else height[0]
         if equal:  # the part that is shown grows to the shape of the axes
             unit = max(across / inner, up / tall)
             x = ((x[0] + x[1] - unit * inner) / 2, (x[0] + x[1] + unit * inner) / 2)
             y = ((y[0] + y[1] - unit * tall) / 2, (y[0] + y[1] + unit * tall) / 2)
-        self.width, self.tall = width, tall
-        self.x, self.y = Scale(*x, LEFT, width - RIGHT), Scale(*y, TOP + tall, TOP, log)
+        self.tall = tall
+        self.x, self.y = Scale(*x, LEFT, WIDTH - RIGHT), Scale(*y, TOP + tall, TOP, log)
         self.labels, self.base = (x_label, y_label), Layer(self.x, self.y)
         self._legend: list[tuple[str, Colour, Symbol]] = []
 
@@ -251,9 +250,9 @@ class Chart:
         """Leave the legend to another chart of the same drawing."""
         self._legend.clear()
 
-    def parts(self, top: float = 0.0) -> tuple[str, float]:
+    def parts(self, top: float) -> tuple[str, float]:
         """The drawing below `top`, and where it ends."""
-        x, y, right, bottom = self.x, self.y, self.width - RIGHT, TOP + self.tall
+        x, y, right, bottom = self.x, self.y, WIDTH - RIGHT, TOP + self.tall
         out = [f'<g transform="translate(0 {top:g})">']
         out += [f'<path d="M{at:.1f} {TOP}V{bottom:.1f}" class="grid"/>' for at in x(x.ticks()).tolist()]
         out += [f'<path d="M{LEFT} {at:.1f}H{right:.1f}" class="grid"/>' for at in y(y.ticks()).tolist()]
@@ -277,7 +276,7 @@ class Chart:
         out, left, row = [], LEFT - 30, 0
         for words, colour, symbol in self._legend:
             wide = 44 + 9.3 * len(words)
-            if left + wide > self.width and left > LEFT:
+            if left + wide > WIDTH and left > LEFT:
                 left, row = LEFT - 30, row + 1
             out += [_symbol(left, top + ROW * (row + 0.4), colour, symbol)]
             out += [_text(left + 30, top + ROW * (row + 0.4) + 5, words, "start")]
@@ -295,25 +294,13 @@ def stacked(charts: Sequence[Chart]) -> bytes:
         "<style>.chart text{font:13px system-ui,sans-serif;fill:var(--quiet,#5c6773)}.chart .grid{stroke:var(--line,"
         "#dfe3e8);stroke-width:.7}.chart .axis{fill:none;stroke:var(--quiet,#5c6773)}</style>"
     )
-    size = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {charts[0].width:g} {top:g}"'
+    size = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {top:g}"'
     return f"{BEGINNING} {size}>{look}{''.join(out)}</svg>".encode()
-
-
-def limits(values: Array, margin: float = 0.04) -> tuple[float, float]:
-    """The range of what is finite, with a margin; (0, 1) where nothing is."""
-    there = values[np.isfinite(values)]
-    if not len(there):
-        return 0.0, 1.0
-    low, high = float(there.min()), float(there.max())
-    pad = margin * (high - low) or 0.5
-    return low - pad, high + pad
 
 
 def broken(points: Array, rows: npt.NDArray[np.int64] | Sequence[int]) -> Array:
     """Points with a row of NaN before each of some rows, so that a line is interrupted there."""
-    parts = [points[a:b, :2] for a, b in pairwise([0, *rows, len(points)])]
-    gap = np.full((1, 2), np.nan)
-    return np.concatenate([row for part in parts for row in (part, gap)][:-1]) if parts else points
+    return np.insert(points[:, :2], rows, np.nan, axis=0)
 
 
 def steps(at: npt.ArrayLike, heights: npt.ArrayLike) -> Array:

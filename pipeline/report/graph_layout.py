@@ -6,24 +6,25 @@ of what runs every tick. A wire that is longer than a layer passes between the b
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from .drawn_graph import DrawnGraph, DrawnNode, DrawnWire, class_name, is_truth, node_of, origins_of
+from omninav.pipeline.graph.graph import Graph, Node, Wire
+
+from .drawn_graph import class_name, is_truth, node_of, origins_of
 
 TITLE, ROW, PAD, GAP = 36.0, 16.0, 8.0, 18.0
 """Pixels: a box's title, a port's row, the space below the ports, and between boxes."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Row:
-    """A port on a box. `origins`: for an input, what enters it."""
+    """A port on a box: its name, what is written there, and whether it is ground truth."""
 
     name: str
-    origins: list[str] = field(default_factory=list)
-    text: str = ""
+    text: str
     truth: bool = False
 
 
@@ -44,18 +45,11 @@ class Box:
     width: float = 0.0
 
     @cached_property
-    def rows(self) -> int:
-        """Number of its rows of ports."""
-        return (
-            len(self.inputs) + len(self.outputs)
-            if self.lifetime == "after"
-            else max(len(self.inputs), len(self.outputs))
-        )
-
-    @cached_property
     def height(self) -> float:
         """Its height in pixels."""
-        return TITLE + ROW * self.rows + (PAD if self.rows else 0)
+        numbers = len(self.inputs), len(self.outputs)
+        rows = sum(numbers) if self.lifetime == "after" else max(numbers)
+        return TITLE + ROW * rows + (PAD if rows else 0)
 
     def input_y(self, port: str) -> float:
         """Point at which a wire enters."""
@@ -89,7 +83,7 @@ class Layout:
     links: list["Link"]
 
 
-def layout(graph: DrawnGraph) -> Layout:
+def layout(graph: Graph) -> Layout:
     """Boxes with their widths, layers in order, and the heights at which the items of each layer stand."""
     boxes = _boxes(graph)
     layers, links = _layers(graph, boxes, [box for box in boxes.values() if box.lifetime != "after"])
@@ -98,21 +92,21 @@ def layout(graph: DrawnGraph) -> Layout:
     return Layout(boxes, layers, links)
 
 
-def _boxes(graph: DrawnGraph) -> dict[str, Box]:
+def _boxes(graph: Graph) -> dict[str, Box]:
     read = {origin for wire in graph.wires for origin in origins_of(wire)}
     boxes: dict[str, Box] = {}
     for name in sorted({node_of(origin) for origin in read} - set(graph.nodes)):
         ports = sorted(origin.partition(".")[2] for origin in read if node_of(origin) == name)
-        rows = [Row(port, text=port) for port in ports]
+        rows = [Row(port, port) for port in ports]
         boxes[name] = Box(
             name, "file or other run", "made before this run, or by another graph", "before", [], rows, outside=True
         )
     for node in graph.nodes.values():
-        inputs = [_input_row(graph, node, wire) for wire in graph.wires if wire.to_node == node.name]
-        ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read] or list(node.signature.outputs)
-        if node.lifetime == "after":
-            ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
-        outputs = [Row(port, text=port, truth=is_truth(graph, f"{node.name}.{port}")) for port in ports]
+        inputs = [_input_row(graph, node, wire) for wire in graph.inputs_of(node.name)]
+        ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
+        if not ports and node.lifetime != "after":
+            ports = list(node.signature.outputs)
+        outputs = [Row(port, port, is_truth(graph, f"{node.name}.{port}")) for port in ports]
         source = node.signature.is_source
         boxes[node.name] = Box(node.name, class_name(node.target), _hover(node), node.lifetime, inputs, outputs, source)
     for box in boxes.values():
@@ -120,14 +114,11 @@ def _boxes(graph: DrawnGraph) -> dict[str, Box]:
     return boxes
 
 
-def _input_row(graph: DrawnGraph, node: DrawnNode, wire: DrawnWire) -> Row:
-    origins = origins_of(wire)
-    row = Row(wire.to_port, origins, wire.to_port, any(is_truth(graph, origin) for origin in origins))
+def _input_row(graph: Graph, node: Node, wire: Wire) -> Row:
+    text = f"{wire.to_port} (held)" if wire.hold else wire.to_port
     if node.lifetime == "after":
-        row.text = f"{wire.to_port} ← {wire.from_node}.{wire.from_port}"
-    elif wire.hold:
-        row.text = f"{wire.to_port} (held)"
-    return row
+        text = f"{wire.to_port} ← {wire.origin}"
+    return Row(wire.to_port, text, any(is_truth(graph, origin) for origin in origins_of(wire)))
 
 
 def _box_width(box: Box) -> float:
@@ -144,7 +135,7 @@ def text_width(text: str, size: float) -> float:
     return size * (0.58 * (len(text) - narrow) + 0.33 * narrow)
 
 
-def _hover(node: DrawnNode) -> str:
+def _hover(node: Node) -> str:
     lines = [f"{node.name}: {node.target}", node.signature.summary]
     for name, parameter in node.signature.parameters.items():
         lines.append(f"{name} = {node.parameters.get(name, parameter.default)!r}")
@@ -173,14 +164,14 @@ class Link:
         return self.end.y if isinstance(self.end, Passage) else self.end.input_y(self.port)
 
 
-def _layers(graph: DrawnGraph, boxes: dict[str, Box], flow: list[Box]) -> tuple[list[list[Item]], list[Link]]:
+def _layers(graph: Graph, boxes: dict[str, Box], flow: list[Box]) -> tuple[list[list[Item]], list[Link]]:
     """Boxes by the longest path that leads to them; long wires get a passage in every layer between."""
     names = {box.name for box in flow}
     edges: list[tuple[str, str, str, bool]] = []  # origin, to node, to port, is it a first value
     for wire in graph.wires:
         if wire.to_node in names:
             if not wire.delay:
-                edges.append((f"{wire.from_node}.{wire.from_port}", wire.to_node, wire.to_port, False))
+                edges.append((wire.origin, wire.to_node, wire.to_port, False))
             if wire.initial and node_of(wire.initial) != wire.to_node:
                 edges.append((wire.initial, wire.to_node, wire.to_port, True))
     depth = dict.fromkeys(names, 0)

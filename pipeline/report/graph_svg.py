@@ -8,7 +8,9 @@ loop.
 from collections.abc import Sequence
 from html import escape
 
-from .drawn_graph import LIFETIMES, DrawnGraph, delay_in_words, is_truth, node_of
+from omninav.pipeline.graph.graph import Graph
+
+from .drawn_graph import LIFETIMES, delay_in_words, is_truth, node_of
 from .graph_layout import ROW, TITLE, Box, Item, Layout, Link, Passage, layout, text_width
 from .mermaid import TRUTH
 
@@ -19,13 +21,13 @@ COLOURS = {"before": ("#eef2f8", "#5b7db1"), "tick": ("#eef7f1", "#2f8f5b"), "af
 LANE, COLUMN_GAP, BAND_GAP, TOP = 20.0, 54.0, 24.0, 44.0
 
 
-def svg(graph: DrawnGraph) -> str:
+def svg(graph: Graph) -> str:
     """The graph as an SVG text, the same for the same graph. Hovering over a box or a wire shows the rest."""
     return _Painter(graph, layout(graph)).paint()
 
 
 class _Painter:
-    def __init__(self, graph: DrawnGraph, found: Layout) -> None:
+    def __init__(self, graph: Graph, found: Layout) -> None:
         self.graph, self.boxes, self.layers, self.links = graph, found.boxes, found.layers, found.links
         self.after = [box for box in self.boxes.values() if box.lifetime == "after"]
         self.delayed = [
@@ -39,7 +41,7 @@ class _Painter:
     def paint(self) -> str:
         bands = self._columns()
         low, high = self._vertical()
-        lanes = list(dict.fromkeys(f"{w.from_node}.{w.from_port}" for w in self.delayed))
+        lanes = list(dict.fromkeys(w.origin for w in self.delayed))
         floor = high + LANE * len(lanes) + (10 if lanes else 0)
         bottom = max(floor, low + 60) + 12
         left, right = 12.0, max((end for _, end in bands.values()), default=12.0)
@@ -107,8 +109,6 @@ class _Painter:
 
     def _cards(self, left: float, right: float, top: float) -> tuple[float, float]:
         """Cards of the "after" stages side by side below the loop, each in the shortest column: right, bottom."""
-        if not self.after:
-            return right, top
         width = max(box.width for box in self.after)
         right = max(right, left + 28 + width)
         columns = min(len(self.after), max(1, int((right - left - 28 + 14) // (width + 14))))
@@ -139,7 +139,7 @@ class _Painter:
         """All delayed readers of one output: down, back below everything, and up to each reader."""
         start = self.boxes[node_of(origin)]
         x0, y0 = start.x + start.width, start.output_y(origin.partition(".")[2])
-        wires = [w for w in self.delayed if f"{w.from_node}.{w.from_port}" == origin]
+        wires = [w for w in self.delayed if w.origin == origin]
         out = x0 + 13
         colour = TRUTH if is_truth(self.graph, origin) else DELAY
         for wire in wires:

@@ -2,13 +2,15 @@
 
 import re
 
-from .drawn_graph import LIFETIMES, DrawnGraph, class_name, delay_in_words, is_truth, node_of, origins_of
+from omninav.pipeline.graph.graph import Graph
+
+from .drawn_graph import LIFETIMES, class_name, delay_in_words, is_truth, node_of, origins_of
 
 TRUTH = "#b3261e"
 """The colour of ground truth."""
 
 
-def mermaid(graph: DrawnGraph) -> str:
+def mermaid(graph: Graph) -> str:
     """The graph as a Mermaid flowchart. Delayed and initial wires are dotted, collected ones thick."""
     lines = ["flowchart LR"]
     outside = sorted({node_of(origin) for w in graph.wires for origin in origins_of(w)} - set(graph.nodes))
@@ -33,8 +35,7 @@ def mermaid(graph: DrawnGraph) -> str:
     arrow = {"--": "-->", "-.": ".->", "==": "==>"}
     for (start, kind, end), names in joined.items():
         lines.append(f"  {_id(start)} {kind} {_quoted('<br/>'.join(names))} {arrow[kind]} {_id(end)}")
-    readers = sorted({w.to_node for w in graph.wires if is_truth(graph, f"{w.from_node}.{w.from_port}")})
-    readers = sorted({*readers, *(w.to_node for w in graph.wires if w.initial and is_truth(graph, w.initial))})
+    readers = sorted({w.to_node for w in graph.wires for origin in origins_of(w) if is_truth(graph, origin)})
     if readers:
         lines.append(f"  classDef truth stroke:{TRUTH},stroke-width:2px")
         lines.append(f"  class {','.join(_id(name) for name in readers)} truth")

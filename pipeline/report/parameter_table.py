@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 
-from .drawn_graph import DrawnGraph
+from omninav.pipeline.graph.graph import Graph
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class ParameterRow:
     changed: bool
 
 
-def parameter_rows(graph: DrawnGraph) -> list[ParameterRow]:
+def parameter_rows(graph: Graph) -> list[ParameterRow]:
     """All parameters in the order of the graph."""
     rows = []
     for node in graph.nodes.values():

@@ -40,11 +40,8 @@ class Plot:
 
 
 @contextmanager
-def plot(width: float, height: float, dpi: int = 110, media_type: str = "image/png") -> Iterator[Plot]:
-    """A blank figure of width x height inches in the house style, without pyplot's global state.
-
-    Line drawings are PNG; what holds photographs is JPEG (`media_type` image/jpeg), or it would be far too large.
-    """
+def plot(width: float, height: float, dpi: int = 110) -> Iterator[Plot]:
+    """A blank figure of width x height inches in the house style, as PNG, without pyplot's global state."""
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
@@ -54,8 +51,5 @@ def plot(width: float, height: float, dpi: int = 110, media_type: str = "image/p
         drawn = Plot(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
         yield drawn
         buffer = io.BytesIO()
-        if media_type == "image/jpeg":
-            drawn.canvas.savefig(buffer, format="jpeg", pil_kwargs={"quality": 85})
-        else:
-            drawn.canvas.savefig(buffer, format="png", metadata={"Software": None})
+        drawn.canvas.savefig(buffer, format="png", metadata={"Software": None})
         drawn.content = buffer.getvalue()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from omninav.pipeline.graph.results import Metrics
 
+from .key_figures import KeyFigure
 from .quantities import STATISTICS, Entry, entries, is_detail
 
 
@@ -27,21 +28,12 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Single:
-    """A number that stands by itself."""
-
-    name: str
-    value: str
-    unit: str
-
-
-@dataclass(frozen=True)
 class Results:
     """All of a run's numbers; `columns` are the statistics that any of them has."""
 
     columns: tuple[str, ...]
     quantities: tuple[Measured, ...]
-    singles: tuple[Single, ...]
+    singles: tuple[KeyFigure, ...]
 
 
 def results(metrics: Metrics, details: bool = True) -> Results:
@@ -75,8 +67,8 @@ def _row(entry: Entry, columns: tuple[str, ...]) -> ResultRow:
     return ResultRow(entry.where or "all frames", cells, not entry.groups)
 
 
-def _single(entry: Entry) -> Single:
+def _single(entry: Entry) -> KeyFigure:
     where, name = entry.where, entry.title
     if where:
         name = f"{where[:1].upper()}{where[1:]}: {name[:1].lower()}{name[1:]}"
-    return Single(name, *entry.in_words(entry.value))
+    return KeyFigure(name, *entry.in_words(entry.value))

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.results import Figure, Metrics, Slide, Table
 
 from .chart import BEGINNING
-from .drawn_graph import DrawnGraph
 from .key_figures import key_figures
 from .parameter_table import parameter_rows
 from .quantities import digits, head_of, headlines, per_log, title, unit
@@ -32,7 +32,7 @@ def write_report(
     figures: Sequence[Figure],
     tables: Sequence[Table],
     config_yaml: str,
-    graph: DrawnGraph | None = None,
+    graph: Graph | None = None,
     shown_as: Path | None = None,
 ) -> Path:
     """Write `report.html` into a run's folder: warnings, key figures and plots, then all else, folded.

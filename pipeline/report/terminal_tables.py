@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from omninav.pipeline.graph.results import Metrics
 
 from .key_figures import key_figures
-from .quantities import best_of, head_of, is_detail, numbers, with_unit
+from .quantities import best_of, head_of, is_detail, numbers
 from .results import results
 from .sweep_table import Overview
 
@@ -52,7 +52,7 @@ def results_table(metrics: Metrics) -> "TerminalTable":
             table.add_row(f"  {row.condition}", *row.cells, style="bold cyan" if row.plain else "")
         table.add_section()
     for single in found.singles:
-        table.add_row(single.name, with_unit(single.value, single.unit))
+        table.add_row(single.name, single.text)
     return table
 
 

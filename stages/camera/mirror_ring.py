@@ -8,9 +8,8 @@ import numpy.typing as npt
 
 from omninav.stages.values.image import Pixels
 
-from .model import Ring
+from .model import Array, Ring
 
-Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.float32]
 
 

@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from .model import Camera
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.thumbnails import encoded
 
-Pixels = npt.NDArray[np.uint8]
-Array = npt.NDArray[np.float64]
+from .model import Array, Camera
 
 
 class Thumbnail(NamedTuple):
@@ -27,8 +27,7 @@ class Thumbnail(NamedTuple):
 
     def jpeg(self, quality: int) -> bytes:
         """It as JPEG bytes."""
-        _, encoded = cv2.imencode(".jpg", self.pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
-        return encoded.tobytes()
+        return encoded(self.pixels, quality)
 
 
 def thumbnail(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
@@ -37,7 +36,7 @@ def thumbnail(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
     part = pixels[top:bottom, left:right]
     scale = min(1.0, columns / part.shape[1])
     if scale < 1.0:
-        size = columns, max(1, round(part.shape[0] * scale))
+        size = columns, max(1, round(part.shape[0] * columns / part.shape[1]))
         part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
     return Thumbnail(part, scale, (left, top))
 

@@ -201,8 +201,5 @@ def hypothesis_gaps(found: LoopHypotheses) -> Array:
 
 def path_steps(map: TopologicalMap) -> Array:
     """Distances between neighbouring views on all paths between places: metres, by the map's poses."""
-    steps = [np.empty(0)]
-    for link, (one, other) in enumerate(map.links):
-        path = map.poses[[map.places[one], *map.path_of(link), map.places[other]], :2]
-        steps.append(np.hypot(*np.diff(path, axis=0).T))
-    return np.concatenate(steps)
+    paths = [map.poses[map.whole_way(link), :2] for link in range(len(map.links))]
+    return np.concatenate([np.empty(0), *(np.hypot(*np.diff(path, axis=0).T) for path in paths)])

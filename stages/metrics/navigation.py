@@ -156,9 +156,9 @@ def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> flo
     spots = map.poses[:, :2]
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(spots)))
-    for link, (one, other) in enumerate(map.links.tolist()):
-        row = [int(map.places[one]), *map.path_of(link).tolist(), int(map.places[other])]
-        graph.add_edges_from((a, b, {"metres": math.dist(spots[a], spots[b])}) for a, b in pairwise(row))
+    for link in range(len(map.links)):
+        steps = pairwise(map.whole_way(link).tolist())
+        graph.add_edges_from((a, b, {"metres": math.dist(spots[a], spots[b])}) for a, b in steps)
     lengths = networkx.single_source_dijkstra_path_length(graph, int(map.places[goal]), weight="metres")
     ahead = np.hypot(*(spots - np.asarray(start, np.float64)).T)
     there = [float(ahead[view]) + metres for view, metres in lengths.items()]

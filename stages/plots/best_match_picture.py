@@ -3,16 +3,17 @@
 import math
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
+from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.map_places import AnyMap
-from omninav.stages.values.thumbnails import Thumbnails, decoded
+from omninav.stages.values.thumbnails import Thumbnails, decoded, encoded
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent
 
 from .panorama_snapshot import EncodedPanorama
+from .target_images import image_of
 
 COLUMNS = 240
 """Width of a picture, pixels: a page holds one for each of its frames."""
@@ -32,20 +33,15 @@ def picture_of_reference(
     reference: int, turn: float, map: AnyMap | None, thumbnails: Thumbnails | None
 ) -> bytes | None:
     """JPEG bytes of a reference's thumbnail, or of a place's; None where there is none. `turn`: rad, the robot's."""
-    image = int(map.places[reference]) if isinstance(map, TopologicalMap) else int(reference)
-    if thumbnails is None or image >= len(thumbnails) or thumbnails.ends[image] == thumbnails.ends[image + 1]:
-        return None
-    return _turned(thumbnails.image(image), turn)
+    pixels = image_of(int(map.places[reference]) if isinstance(map, TopologicalMap) else reference, thumbnails)
+    return None if pixels is None else _turned(pixels, turn)
 
 
 def picture_of_view(panorama: EncodedPanorama | None, turn: float) -> bytes | None:
     """JPEG bytes of an image of the drive itself; None where none was kept. `turn`: rad, the robot's against it."""
     if panorama is None:
         return None
-    pixels = decoded(panorama.jpeg)
-    if pixels.shape[1] > COLUMNS:
-        size = COLUMNS, max(1, round(pixels.shape[0] * COLUMNS / pixels.shape[1]))
-        pixels = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
+    pixels = thumbnail(decoded(panorama.jpeg), None, COLUMNS).pixels
     return _turned(pixels, 0.0 if panorama.headings else turn)
 
 
@@ -53,4 +49,4 @@ def _turned(pixels: Pixels, turn: float) -> bytes:
     if pixels.shape[1] > 2 * pixels.shape[0]:  # a panorama, not a mirror's disc
         columns = round(float(np.nan_to_num(turn)) / (2 * math.pi) * pixels.shape[1])
         pixels = np.roll(pixels, columns, axis=1)
-    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
+    return encoded(pixels)

@@ -90,10 +90,10 @@ def polyline(drawn: Pixels, points: npt.ArrayLike, colour: Colour, thickness: in
     cv2.polylines(drawn, [fixed(points).reshape(-1, 1, 2)], False, colour, thickness, cv2.LINE_AA, FINE)
 
 
-def disc(drawn: Pixels, centre: tuple[float, float], radius: float, colour: Colour, thickness: int = -1) -> None:
-    """A smooth disc, or a ring."""
+def disc(drawn: Pixels, centre: tuple[float, float], radius: float, colour: Colour) -> None:
+    """A smooth disc."""
     x, y = fixed(centre).tolist()
-    cv2.circle(drawn, (x, y), round(radius * 2**FINE), colour, thickness, cv2.LINE_AA, FINE)
+    cv2.circle(drawn, (x, y), round(radius * 2**FINE), colour, cv2.FILLED, cv2.LINE_AA, FINE)
 
 
 def arrow_head(drawn: Pixels, tip: Points, along: Points, colour: Colour, size: float) -> None:

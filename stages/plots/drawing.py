@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 # Okabe & Ito's palette (2008), dark enough on white
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
-REFERENCE, EDGE, MARK, PARTICLE, LANDMARK = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7", "#0072B2"
+REFERENCE, EDGE, MARK, LANDMARK = "#8a8f98", "#c9ccd1", "#009E73", "#0072B2"
 
 LANDMARK_SHARE = 2.0
 """Landmarks on either side that do not decide how far a plot goes, per cent."""
@@ -35,29 +35,30 @@ def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = N
         axes.set_ylim(extent[2], extent[3])
 
 
-def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
+def draw_map(axes: "Axes", map: AnyMap) -> None:
     """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs; of
     a topological map its places, joined along the images between them."""
-    if map is None or not len(map):
+    if not len(map):
         return
     from matplotlib.collections import LineCollection
 
     if isinstance(map, ViewMixtures):
         size = float(np.clip(3000 / max(len(map.weights), 1), 1.5, 9))
-        name = f"views ({len(map)}) at {len(map.weights)} places" if label else None
+        name = f"views ({len(map)}) at {len(map.weights)} places"
         x, y = map.means[:, :2].T
         heaviest = float(map.weights.max(initial=0.0)) or 1.0
         colours = faded(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
         axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
         return
-    topological = isinstance(map, TopologicalMap)
-    poses, edges = (map.poses[map.places], map.links[:0]) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
     if isinstance(map, TopologicalMap):
-        draw_links(axes, map)
-    if len(edges):
-        axes.add_collection(LineCollection(list(poses[edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
-    size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
-    name = f"{'places' if topological else 'references'} ({len(map)})" if label else None
+        poses, what, largest = map.poses[map.places], "places", 25
+        lines, colour = [map.poses[map.whole_way(link), :2] for link in range(len(map.links))], REFERENCE
+    else:
+        poses, what, largest = map.poses, "references", 9
+        lines, colour = list(map.poses[map.edges][:, :, :2]), EDGE
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.7, zorder=1))
+    size = float(np.clip(3000 / len(map), 1.5, largest))
+    name = f"{what} ({len(map)})"
     axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
 
 
@@ -88,15 +89,6 @@ def landmarks_of(map: AnyMap | None) -> Array:
     return np.empty((0, 2)) if landmarks is None else shown_landmarks(landmarks)
 
 
-def draw_links(axes: "Axes", map: TopologicalMap) -> None:
-    """The links of a topological map, each along the images between its two places."""
-    from matplotlib.collections import LineCollection
-
-    poses = map.poses[:, :2]
-    paths = [poses[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
-    axes.add_collection(LineCollection(paths, colors=REFERENCE, linewidths=0.7, zorder=1))
-
-
 def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
     """What is occupied in dark grey and what is unknown in light grey, under everything else."""
     if grid is None:
@@ -121,14 +113,14 @@ def faded(colour: str, opacity: Array) -> Array:
     return np.column_stack([np.tile(to_rgb(colour), (len(opacity), 1)), opacity])
 
 
-def draw_pose(axes: "Axes", pose: Array, length: float, colour: str, label: str | None = None) -> None:
+def draw_pose(axes: "Axes", pose: Array, length: float, colour: str) -> None:
     """A pose as a dot with an arrow of `length` metres along its heading."""
     if not np.isfinite(pose).all():
         return
     tip = (pose[0] + length * np.cos(pose[2]), pose[1] + length * np.sin(pose[2]))
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tip, xytext=(pose[0], pose[1]), arrowprops=arrow, zorder=6)
-    axes.plot([pose[0]], [pose[1]], "o", color=colour, markersize=4.5, zorder=6, label=label)
+    axes.plot([pose[0]], [pose[1]], "o", color=colour, markersize=4.5, zorder=6)
 
 
 def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float, float] | None:

@@ -14,6 +14,8 @@ from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.probability.calibration import ELLIPSE_95, squared_mahalanobis
+from omninav.stages.geometry.probability.gaussians import moments
+from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
@@ -27,7 +29,6 @@ from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 from . import homing_frames, landmark_matches
-from .belief_spread import spread_m
 from .best_match_picture import first_seen, picture_of_reference, picture_of_view
 from .drawing import extent_of
 from .homing_snapshot import EncodedHomingView
@@ -268,6 +269,17 @@ def _pose_at(drive: Drive, tick: int) -> Array | None:
     return poses[row] if there else None
 
 
+def _spread_m(belief: Particles | GaussianMixture) -> float:
+    """Standard deviation (m) of the distance from the belief's mean; NaN of an empty one."""
+    if not len(belief.weights):
+        return float("nan")
+    if isinstance(belief, GaussianMixture):
+        _, covariance, _ = moments(belief.means, belief.covariances, belief.weights)
+    else:
+        _, covariance = weighted_moments(belief.poses, belief.weights)
+    return float(np.sqrt(max(covariance[0, 0] + covariance[1, 1], 0.0)))
+
+
 def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> list[tuple[str, str]]:
     one = slice(n, n + 1)
     facts = []
@@ -282,7 +294,7 @@ def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> li
     if isinstance(belief, PlaceBelief):
         place = int(np.argmax(belief.probabilities))
         facts.append(("believed", f"place {place}, {100 * belief.probabilities[place]:.0f} %"))
-    elif belief is not None and np.isfinite(spread := spread_m(belief)) and spread > 0:
+    elif belief is not None and np.isfinite(spread := _spread_m(belief)) and spread > 0:
         facts.append(("spread of the belief", f"{spread:.3f} m"))
     if drive.reference[n] >= 0:
         words = [f"number {drive.reference[n]}"]

@@ -2,7 +2,6 @@
 
 import math
 
-import cv2
 import numpy as np
 
 from omninav.pipeline.report.chart import Layer
@@ -10,7 +9,7 @@ from omninav.stages.values.drive import Array
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.thumbnails import decoded
+from omninav.stages.values.thumbnails import decoded, encoded
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .draw_homing import LOST, draw_robot_view, draw_target_view, is_known
@@ -27,9 +26,9 @@ def images(snapshot: EncodedHomingView, target: Pixels | None) -> list[tuple[str
     """Captions and JPEG bytes: the robot's image with its features and the vector, and the target view."""
     seen = draw_robot_view(decoded(snapshot.jpeg), snapshot)
     if snapshot.vector is None:
-        return [("image", _jpeg(seen))]
+        return [("image", encoded(seen))]
     going_to = draw_target_view(target, snapshot, snapshot.size)
-    return [("image", _jpeg(seen)), (f"target: {snapshot.target or 'a view'}", _jpeg(going_to))]
+    return [("image", encoded(seen)), (f"target: {snapshot.target or 'a view'}", encoded(going_to))]
 
 
 def draw_vector(layer: Layer, pose: Array, vector: HomingVector | None, goal: Array) -> None:
@@ -69,7 +68,3 @@ def facts(
     if status is not None:
         found.append(("robot", f"{status.state}, {status.why}" if status.why else status.state))
     return found
-
-
-def _jpeg(pixels: Pixels) -> bytes:
-    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()

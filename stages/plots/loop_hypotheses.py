@@ -68,7 +68,7 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
 
 
 def _draw_places(chart: Chart, map: TopologicalMap) -> None:
-    paths = [map.poses[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    paths = [map.poses[map.whole_way(link)] for link in range(len(map.links))]
     loop = map.kinds == LOOP
     kinds: tuple[tuple[npt.NDArray[np.bool_], Colour, str], ...] = ((~loop, "blue", "driven"), (loop, "green", "loops"))
     for of_kind, colour, name in kinds:

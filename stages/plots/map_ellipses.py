@@ -50,15 +50,15 @@ class MapEllipses(FigureStage):
                 caption=f"{size} Each place is an ellipse of {SIGMAS:g} sigma, fainter where it "
                 f"weighs less. The line is the {'true path' if true else 'estimate'}. "
                 f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
-                content=_draw(map, paths, plan if true else None, SIGMAS, true),
+                content=_draw(map, paths, plan if true else None, true),
                 media_type="image/svg+xml",
                 order=12,
             )
         )
 
 
-def _draw(map: ViewMixtures, paths: Sequence[Array], plan: FloorPlan | None, sigmas: float, true: bool) -> bytes:
-    reach = sigmas * np.sqrt(np.diagonal(map.covariances, axis1=1, axis2=2)[:, :2])
+def _draw(map: ViewMixtures, paths: Sequence[Array], plan: FloorPlan | None, true: bool) -> bytes:
+    reach = SIGMAS * np.sqrt(np.diagonal(map.covariances, axis1=1, axis2=2)[:, :2])
     corners = map.means[:, None, :2] + np.stack([-reach, reach], axis=1)
     chart = plan_chart(extent_of(*paths, corners.reshape(-1, 2), margin=0.02))
     draw_surroundings(chart, None, None, plan)
@@ -68,6 +68,6 @@ def _draw(map: ViewMixtures, paths: Sequence[Array], plan: FloorPlan | None, sig
         chart.name("true path" if true else "estimate", colour)
     order = np.argsort(map.weights, kind="stable")[-MAX_ELLIPSES:]  # what weighs most lies on top
     share = np.clip(map.weights[order] / (map.weights.max() or 1.0), 0.15, 1.0)
-    chart.base.ellipses(map.means[order], map.covariances[order], share, "pink", sigmas)
+    chart.base.ellipses(map.means[order], map.covariances[order], share, "pink", SIGMAS)
     chart.name("places of the map's views", "pink", "ring")
     return chart.svg()

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.pipeline.report.chart import Chart, Colour, limits, stacked, steps
+from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
@@ -79,7 +79,9 @@ def _draw(frames: int, starts: Sequence[int], at: Ints, views: Ints, components:
     edges = np.arange(0, frames + width, width)
     added, removed = (np.histogram(at, edges, weights=counts)[0] for counts in (came, went))
     size = Chart(span, (0.0, 1.05 * max(int(components.max()), 1)), "", "in the map")
-    change = Chart(span, limits(np.concatenate([[0.0], added, -removed])), X_LABEL, f"per {width} frames")
+    low, high = -float(removed.max()), float(added.max())
+    pad = 0.04 * (high - low) or 0.5
+    change = Chart(span, (low - pad, high + pad), X_LABEL, f"per {width} frames")
     held: tuple[Named, ...] = ((components, "grey", "components"), (views, "blue", "references"))
     moved: tuple[Named, ...] = ((added, "green", "added"), (-removed, "orange", "removed"))
     for counts, colour, name in held:

@@ -1,18 +1,15 @@
 """Plots a map: where its reference views were taken."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import SOURCE_WORDS
 
 from .drawing import extent_of, landmarks_of
 from .plan_chart import draw_landmarks, draw_surroundings, plan_chart
-
-Array = npt.NDArray[np.float64]
 
 
 class MapPlot(FigureStage):

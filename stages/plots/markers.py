@@ -3,16 +3,14 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.mcap.message_types import standard_types
-from omninav.stages.plots.pose_messages import BASE, MAP, Fields, header, quaternion, ros_point
+from omninav.stages.plots.pose_messages import BASE, MAP, Array, Fields, header, quaternion, ros_point
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-Array = npt.NDArray[np.float64]
 Colour = tuple[float, float, float]
 ARROW, LINES, POINTS, TEXT = 0, 5, 8, 9
 """Types of visualization_msgs/Marker."""
@@ -30,7 +28,7 @@ def map_markers(map: AnyMap, stamp: int) -> Fields:
         return {"markers": [means, gaussian_markers(stamp, "ellipses", DARK, map.means, map.covariances, map.weights)]}
     spots = map.poses[:, :2]
     if isinstance(map, TopologicalMap):
-        ways = [spots[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+        ways = [spots[map.whole_way(link)] for link in range(len(map.links))]
         ends = np.concatenate([np.empty((0, 2)), *(np.repeat(way, 2, axis=0)[1:-1] for way in ways)])
         places = spots[map.places]
         return {
@@ -57,9 +55,7 @@ def gaussian_markers(
     stamp: int, namespace: str, colour: Colour, means: Array, covariances: Array, weights: Array
 ) -> Fields:
     """Gaussians (K, …) as a list of lines: the two axes of each, one standard deviation to either side."""
-    lines = marker(stamp, namespace, LINES, 0.02, colour, points(axis_ends(means, covariances)))
-    lines["colors"] = _colours(colour, np.repeat(weights, 4))
-    return lines
+    return weighted_points(stamp, namespace, colour, 0.02, axis_ends(means, covariances), np.repeat(weights, 4), LINES)
 
 
 def axis_ends(means: Array, covariances: Array) -> Array:
@@ -70,11 +66,13 @@ def axis_ends(means: Array, covariances: Array) -> Array:
     return ends.reshape(-1, 2)
 
 
-def weighted_points(stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array) -> Fields:
-    """Points (N, 2), each as opaque as its weight in [0, 1] says."""
-    shown = marker(stamp, namespace, POINTS, size, colour, points(places))
-    shown["colors"] = _colours(colour, weights)
-    return shown
+def weighted_points(
+    stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array, kind: int = POINTS
+) -> Fields:
+    """Points (N, 2), or ends of lines, each as opaque as its weight in [0, 1] says."""
+    rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
+    shown = marker(stamp, namespace, kind, size, colour, points(places))
+    return shown | {"colors": [rgba(*colour, weight) for weight in opacity(weights).tolist()]}
 
 
 def homing_arrow(stamp: int, direction: float, length: float) -> Fields:
@@ -115,11 +113,6 @@ def _text(stamp: int, number: int, text: str, place: Array) -> Fields:
     name = marker(stamp, "names", TEXT, 0.3, DARK, [])
     name["pose"]["position"] = ros_point(*place) | {"z": 0.3}
     return name | {"id": number, "text": text}
-
-
-def _colours(colour: Colour, weights: Array) -> list[Any]:
-    rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
-    return [rgba(*colour, weight) for weight in opacity(weights).tolist()]
 
 
 def opacity(weights: Array) -> Array:

@@ -3,7 +3,6 @@
 import math
 from typing import Annotated
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -11,6 +10,7 @@ from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.camera.model import seen_at
 from omninav.stages.camera.panorama import panorama_camera
+from omninav.stages.camera.thumbnail import Thumbnail, thumbnail
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.landmarks import LandmarkFix
 
@@ -46,26 +46,19 @@ class PanoramaSnapshot(Stage):
         """One frame; `fix`: by which of the features in it the pose was found."""
         if not is_snapshot_frame(tick.frame):
             return self.Out()
-        jpeg, headings = small_jpeg(panorama, COLUMNS, QUALITY)
+        small, headings = small_image(panorama, COLUMNS)
+        jpeg = small.jpeg(QUALITY)
         if fix is None or fix.bearings is None or fix.agree is None or isinstance(panorama, Windows):
             return self.Out(snapshot=EncodedPanorama(jpeg, headings))
-        points = seen_at(panorama_camera(panorama), fix.bearings.astype(np.float64))
-        shrink = min(1.0, COLUMNS / panorama.pixels.shape[1])
-        points = ((points + 0.5) * shrink - 0.5).astype(np.float32)
+        points = small.points(seen_at(panorama_camera(panorama), fix.bearings.astype(np.float64)))
         return self.Out(snapshot=EncodedPanorama(jpeg, headings, points, fix.agree == 0))
 
 
-def small_jpeg(panorama: Panorama | Windows, max_columns: int, quality: int) -> tuple[bytes, tuple[float, ...]]:
-    """JPEG bytes of a panorama, or of windows side by side, in at most so many columns; and where the windows look."""
-    headings: tuple[float, ...] = ()
-    pixels: cv2.typing.MatLike = panorama.pixels
-    if isinstance(panorama, Windows):
-        # From just right of straight behind around to straight behind, as a panorama is cut open.
-        order = np.argsort(np.mod(math.pi - panorama.headings, 2 * math.pi), kind="stable")
-        headings = tuple(float(panorama.headings[n]) for n in order)
-        pixels = np.concatenate([panorama.pixels[n] for n in order], axis=1)
-    if pixels.shape[1] > max_columns:
-        size = (max_columns, max(1, round(pixels.shape[0] * max_columns / pixels.shape[1])))
-        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return jpeg.tobytes(), headings
+def small_image(panorama: Panorama | Windows, columns: int) -> tuple[Thumbnail, tuple[float, ...]]:
+    """A panorama, or windows side by side, in at most so many columns; and where the windows look."""
+    if isinstance(panorama, Panorama):
+        return thumbnail(panorama.pixels, None, columns), ()
+    # From just right of straight behind around to straight behind, as a panorama is cut open.
+    order = np.argsort(np.mod(math.pi - panorama.headings, 2 * math.pi), kind="stable")
+    side_by_side = np.concatenate(panorama.pixels[order], axis=1)
+    return thumbnail(side_by_side, None, columns), tuple(panorama.headings[order].tolist())

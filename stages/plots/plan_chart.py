@@ -12,9 +12,8 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .drawing import extent_of, grid_extent, shown_landmarks
+from .drawing import Array, extent_of, grid_extent, shown_landmarks
 
-Array = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 
 STANDING = (152, 143, 139)
@@ -51,7 +50,7 @@ def draw_map(chart: Chart, map: AnyMap) -> None:
         return
     if isinstance(map, TopologicalMap):
         poses = map.poses[map.places]
-        lines = [map.poses[[map.places[a], *map.path_of(n), map.places[b]]] for n, (a, b) in enumerate(map.links)]
+        lines = [map.poses[map.whole_way(link)] for link in range(len(map.links))]
         draw_lines(chart.base, lines, "line", 0.9)
         chart.base.dots(poses, "grey", 4.0)
         chart.name(f"places ({len(map)})", "grey", "dot")
@@ -77,9 +76,9 @@ def draw_landmarks(chart: Chart, map: AnyMap | None) -> None:
     chart.name(f"landmarks ({len(map.landmarks)})", "grey", "square")
 
 
-def jumps(path: Array, metres: float = JUMP_M) -> list[int]:
-    """The rows of a path (N, 2 or more) that lie farther than that from the row before."""
-    far: list[int] = (np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > metres) + 1).tolist()
+def jumps(path: Array) -> list[int]:
+    """The rows of a path (N, 2 or more) that lie farther than `JUMP_M` from the row before."""
+    far: list[int] = (np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > JUMP_M) + 1).tolist()
     return far
 
 

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
@@ -17,7 +16,6 @@ from .drawing import extent_of
 from .map_growth import X_LABEL
 from .plan_chart import draw_surroundings, plan_chart
 
-Array = npt.NDArray[np.float64]
 COLOURS: tuple[Colour, ...] = ("blue", "orange", "green", "pink")
 SAME_M = 1.0
 """Largest distance between components of two frames that are the same place, metres."""
@@ -50,12 +48,9 @@ class ReferenceLife(FigureStage):
         if name is None:
             return self.Out()
         snapshots: list[Snapshot] = []
-        seen = []
-        path = drive.truth[:, :2]
         for row, now in enumerate(mixtures):
             if now is not None and (mine := now.ids == name).any():
                 snapshots.append((row, now.means[mine, :2].astype(np.float64), now.weights[mine].astype(np.float64)))
-                seen.append(row)
         if not snapshots:
             return self.Out()
         gone = next((row for row, event in enumerate(events) if event is not None and name in event.removed), None)
@@ -70,7 +65,7 @@ class ReferenceLife(FigureStage):
                 f"one colour in both plots{'; grey: all but the heaviest four' if len(lives) > len(COLOURS) else ''}. "
                 "Below: larger dots weigh more, circles are last places, crosses the true positions at these frames "
                 "(a map that learns with delay changes a little after the view was seen).",
-                content=_draw(lives, path, np.array(seen), plan, gone, len(drive)),
+                content=_draw(lives, drive.truth[:, :2], [row for row, _, _ in snapshots], plan, gone, len(drive)),
                 media_type="image/svg+xml",
                 order=16,
             )
@@ -121,7 +116,7 @@ def lives_of(snapshots: Sequence[Snapshot], same_m: float) -> list[Array]:
 def _draw(
     lives: Sequence[Array],
     path: Array,
-    seen: npt.NDArray[np.int64],
+    seen: Sequence[int],
     plan: FloorPlan | None,
     gone: int | None,
     frames: int,

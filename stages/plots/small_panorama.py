@@ -5,7 +5,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.values.image import Panorama, Windows
 
-from .panorama_snapshot import EncodedPanorama, small_jpeg
+from .panorama_snapshot import EncodedPanorama, small_image
 
 
 class SmallPanorama(Stage):
@@ -27,4 +27,5 @@ class SmallPanorama(Stage):
         """One frame."""
         if not self.columns:
             return self.Out()
-        return self.Out(panorama=EncodedPanorama(*small_jpeg(panorama, self.columns, 70)))
+        small, headings = small_image(panorama, self.columns)
+        return self.Out(panorama=EncodedPanorama(small.jpeg(70), headings))

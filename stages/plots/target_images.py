@@ -9,10 +9,11 @@ from omninav.stages.values.drive import Array
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.thumbnails import Thumbnails, decoded
+from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .homing_snapshot import EncodedHomingView
+from .thumbnails import joined
 
 
 class FirstThumbnail(Stage):
@@ -25,12 +26,7 @@ class FirstThumbnail(Stage):
 
     def step(self, ctx: Context, snapshots: Sequence[EncodedHomingView]) -> Out:
         """The whole run at once."""
-        first = next(iter(snapshots), None)
-        if first is None:
-            return self.Out()
-        return self.Out(
-            thumbnails=Thumbnails(np.frombuffer(first.jpeg, np.uint8), np.array([0, len(first.jpeg)], np.int64))
-        )
+        return self.Out(thumbnails=joined([snapshots[0].jpeg]) if snapshots else None)
 
 
 def target_view(progress: PathProgress | None, route: PlannedRoute | None, map: TopologicalMap | None) -> int | None:
@@ -65,7 +61,6 @@ def target_of(
 
 def image_of(view: int | None, thumbnails: Thumbnails | None) -> Pixels | None:
     """A view's image, where there is a thumbnail of it."""
-    if view is None or thumbnails is None or view >= len(thumbnails):
+    if view is None or thumbnails is None or view >= len(thumbnails) or not np.diff(thumbnails.ends)[view]:
         return None
-    start, end = thumbnails.ends[view : view + 2]
-    return decoded(thumbnails.jpegs[start:end]) if end > start else None
+    return thumbnails.image(view)

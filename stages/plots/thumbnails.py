@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Value
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.values.image import Image, Panorama, Windows
@@ -97,12 +97,11 @@ class ViewThumbnails(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
         snapshots: Sequence[ReferenceThumbnails | None],
         map: TopologicalMap,
         known: TopologicalMap | None = None,
     ) -> Out:
-        """The whole tour at once; `ticks` are counted on from the known map's frames."""
+        """The whole tour at once, an entry of `snapshots` for each frame counted on from the known map's."""
         first = 0 if known is None or not len(known.frames) else 1 + int(known.frames.max())
         rows = (map.frames - first).tolist()
         found = [snapshots[row] if row >= 0 else None for row in rows]

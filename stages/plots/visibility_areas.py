@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visibility import VisibilityAreas
@@ -29,7 +29,6 @@ from .drawing import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 
 HUES = (ESTIMATE, MARK, ODOMETRY, "#CC79A7")
 """Colours of a view's areas, in turns."""
@@ -37,7 +36,7 @@ EXAMPLES = 5
 """Number of references that have a panel."""
 
 
-class ShowVisibilityAreas(Stage):
+class ShowVisibilityAreas(FigureStage):
     """Plots visibility areas of some references over the grid, and how many views' areas each free cell lies in.
 
     As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the image was taken, its axis, the point lambda and
@@ -47,11 +46,6 @@ class ShowVisibilityAreas(Stage):
 
     on_request = True
 
-    class Out(Outputs):
-        """`figure`: a panel for each example, and one for all."""
-
-        figure: Figure
-
     def step(
         self,
         ctx: Context,
@@ -59,8 +53,8 @@ class ShowVisibilityAreas(Stage):
         areas: VisibilityAreas,
         grid: OccupancyGrid,
         drive: Drive | None = None,
-    ) -> Out:
-        """Draw all panels."""
+    ) -> FigureStage.Out:
+        """Draw a panel for each example, and one for all."""
         seen = np.flatnonzero((areas.target >= 0).any(axis=1))
         chosen = seen[np.unique(np.linspace(0, len(seen) - 1, EXAMPLES + 2)[1:-1].astype(np.int64))]
         counts = views_by_cell(areas)

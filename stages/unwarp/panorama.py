@@ -2,11 +2,14 @@
 
 from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.camera.model import Camera
-from omninav.stages.values.image import Image, Panorama
+import numpy as np
 
-from .table import PanoramaTable
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.values.image import Image, Panorama, column_azimuths
+
+from .table import remap_table
 
 
 class UnwarpPanorama(Stage):
@@ -28,8 +31,24 @@ class UnwarpPanorama(Stage):
 
     def setup(self, ctx: Context) -> None:
         """No table yet: the camera comes with the first image."""
-        self._table = PanoramaTable(self.columns, self.rows)
+        self._camera: Camera | None = None
 
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
         """Remap one image."""
-        return self.Out(panorama=self._table.panorama(image, camera))
+        if camera is not self._camera:
+            self._build(camera)
+        return self.Out(panorama=Panorama(self._table.remap(image.pixels), *self._edges))
+
+    def _build(self, camera: Camera) -> None:
+        """Make the table, once per camera: columns are equal steps of azimuth."""
+        seen = camera.elevations
+        if seen is None:
+            raise BadInput(
+                f"camera: a {camera.projection} camera does not see the full circle, so that it makes no panorama; "
+                "type unwarp=window (its images as they are), or take an omnidirectional one"
+            )
+        top, bottom = seen
+        elevations = top + (bottom - top) * (np.arange(self.rows) + 0.5) / self.rows
+        self._table, _ = remap_table(camera, unit_vectors(column_azimuths(self.columns), elevations[:, None]))
+        self._edges = seen if camera.elevations_known else (None, None)
+        self._camera = camera

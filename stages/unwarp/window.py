@@ -1,21 +1,18 @@
 """Cuts perspective windows from an omnidirectional image: what ordinary cameras in its place would see."""
 
 import math
-from typing import Annotated, NamedTuple, cast
+from typing import Annotated, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.camera.model import Camera, require_elevations
+from omninav.stages.camera.model import Array, Camera, require_elevations
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Image, Pixels, Windows
 
-from .table import RemapTable, remap_table
-
-Array = npt.NDArray[np.float64]
+from .table import remap_table
 
 
 def window_rays(heading: float, pitch: float, field: float, columns: int, rows: int) -> Array:
@@ -32,21 +29,6 @@ def window_rays(heading: float, pitch: float, field: float, columns: int, rows: 
     left = -right + 0.0 * up[:, None]
     cos, sin = math.cos(heading), math.sin(heading)
     return np.stack([cos * ahead - sin * left, sin * ahead + cos * left, high], axis=-1)
-
-
-class WindowTable(NamedTuple):
-    """A camera's windows, one below the other as one remap `table`; `seen` (W, rows, columns) or None: all is seen."""
-
-    table: RemapTable
-    seen: npt.NDArray[np.bool_] | None
-
-    def windows(self, pixels: Pixels, headings: Array, field: float, rows: int) -> Windows:
-        """Windows of an image; black where the camera sees nothing."""
-        cut = self.table.remap(pixels)
-        cut = cut.reshape(len(headings), rows, *cut.shape[1:])
-        if self.seen is not None:
-            cut[~self.seen] = 0
-        return Windows(cut, headings, field, self.seen)
 
 
 class PerspectiveWindow(Stage):
@@ -77,18 +59,22 @@ class PerspectiveWindow(Stage):
     def setup(self, ctx: Context) -> None:
         """No table yet: the camera comes with the first image."""
         self._camera: Camera | None = None
-        self._table: WindowTable | None = None
 
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
         """Cut the windows of one image."""
         if isinstance(camera, Perspective):
             return self.Out(panorama=self._of_perspective(image, camera))
         headings = wrap(2.0 * math.pi * np.arange(self.directions) / self.directions)
-        if self._table is None or camera is not self._camera:
-            self._table, self._camera = self._built(ctx, camera, headings), camera
-        return self.Out(panorama=self._table.windows(image.pixels, headings, math.radians(self.field_deg), self.rows))
+        if camera is not self._camera:
+            self._build(ctx, camera, headings)
+        cut = self._table.remap(image.pixels)
+        cut = cut.reshape(len(headings), self.rows, *cut.shape[1:])
+        if self._seen is not None:
+            cut[~self._seen] = 0
+        return self.Out(panorama=Windows(cut, headings, math.radians(self.field_deg), self._seen))
 
-    def _built(self, ctx: Context, camera: Camera, headings: Array) -> WindowTable:
+    def _build(self, ctx: Context, camera: Camera, headings: Array) -> None:
+        """Make the remap table of all windows, one below the other, once per camera."""
         size = math.radians(self.pitch_deg), math.radians(self.field_deg), self.columns, self.rows
         require_elevations(camera)
         table, seen = remap_table(camera, np.concatenate([window_rays(float(h), *size) for h in headings]))
@@ -104,7 +90,8 @@ class PerspectiveWindow(Stage):
                 detail=f"unwarp: {100 * dark:.1f} % of the windows lie outside of what the camera sees, and are black; "
                 "nodes.unwarp.pitch_deg or a smaller field_deg moves them inside",
             )
-        return WindowTable(table, None if dark == 0.0 else seen.reshape(len(headings), self.rows, self.columns))
+        self._seen = None if dark == 0.0 else seen.reshape(len(headings), self.rows, self.columns)
+        self._table, self._camera = table, camera
 
     def _of_perspective(self, image: Image, camera: Perspective) -> Windows:
         if self.directions > 1:

@@ -2,6 +2,8 @@
 
 from typing import Annotated
 
+import cv2
+
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape, Starts
 from omninav.stages.geometry.arrays import Bytes, Ints
@@ -25,6 +27,11 @@ class Thumbnails(Value):
     def image(self, reference: int) -> Pixels:
         """The thumbnail of a reference: (rows, columns, 3), blue-green-red."""
         return decoded(self.jpegs[self.ends[reference] : self.ends[reference + 1]])
+
+
+def encoded(pixels: Pixels, quality: int = 80) -> bytes:
+    """JPEG bytes of an image (rows, columns, 3), blue-green-red; `quality` in per cent."""
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
 def decoded(jpeg: bytes | Bytes) -> Pixels:

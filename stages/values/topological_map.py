@@ -151,6 +151,11 @@ class TopologicalMap(Value):
         """The path images of a link, from its first place to its second: views."""
         return self.ways[self.way_starts[link] : self.way_starts[link + 1]]
 
+    def whole_way(self, link: int) -> Ints:
+        """The views of a link: the medoid of its first place, its path images, and the medoid of its second place."""
+        first, second = self.places[self.links[link]]
+        return np.array([first, *self.path_of(link), second], np.int64)
+
     def link(self, one: int, other: int) -> int | None:
         """The link between two places, in whichever order it was driven; None where there is none."""
         found = np.flatnonzero((np.sort(self.links, axis=1) == sorted((one, other))).all(axis=1))
@@ -166,9 +171,8 @@ class TopologicalMap(Value):
         for one, other in pairwise(places.tolist()):
             link = self.link(one, other)
             assert link is not None, f"places {one} and {other} are not linked"
-            between: list[int] = self.path_of(link).tolist()
-            views += between if int(self.links[link, 0]) == one else between[::-1]
-            views.append(int(self.places[other]))
+            way: list[int] = self.whole_way(link).tolist()
+            views += (way if int(self.links[link, 0]) == one else way[::-1])[1:]
             ends.append(len(views))
         return np.array(views, np.int64), np.array(ends, np.int64)
 

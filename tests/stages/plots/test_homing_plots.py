@@ -167,12 +167,9 @@ def test_thumbnails_are_of_the_maps_views_and_not_of_a_known_maps(monkeypatch):
     for shade in range(40):  # the map's views are every tenth picture of the tour
         pixels = np.full((48, 64, 3), 6 * shade, np.uint8)
         images.append(TourSnapshot().step(CTX, Image(pixels)).snapshots)
-    ticks = [Tick(k, k) for k in range(40)]
-    thumbnails = ViewThumbnails().step(CTX, ticks, images, MAP).thumbnails
+    thumbnails = ViewThumbnails().step(CTX, images, MAP).thumbnails
     assert [round(image_of(view, thumbnails).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
-    grown = (
-        ViewThumbnails().step(CTX, ticks, images, MAP, known=made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0})).thumbnails
-    )
+    grown = ViewThumbnails().step(CTX, images, MAP, known=made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0})).thumbnails
     assert [image_of(view, grown) is None for view in range(4)] == [True, True, False, False]
     assert image_of(2, grown).mean() == pytest.approx(6 * (20 - 11), abs=2)
     assert image_of(None, thumbnails) is None

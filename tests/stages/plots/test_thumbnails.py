@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_places import made_map
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.plots.thumbnails import (
     CollectThumbnails,
     ReferenceSnapshot,
@@ -79,5 +79,5 @@ def test_a_topological_map_has_those_of_the_frames_that_it_keeps(grows: bool) ->
         snapshots[9] = ReferenceThumbnails((b"here",))
     else:
         snapshots[10] = None  # type: ignore[call-overload]
-    found = ViewThumbnails().step(CTX, [Tick(0, 0)], snapshots, map, known).thumbnails
+    found = ViewThumbnails().step(CTX, snapshots, map, known).thumbnails
     assert parts(found) == ([b"", b"", b"here"] if grows else [b"00", b"", b"20"])
