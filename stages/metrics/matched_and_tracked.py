@@ -12,11 +12,10 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
 from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 
-Array = npt.NDArray[np.float64]
 QUANTITIES = {
     "pairs.kept": Quantity(title="Right tracks / right matches", better="higher"),
     "pairs.matched.right": Quantity(title="Right matches of a local map", better="higher"),
