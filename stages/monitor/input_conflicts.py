@@ -277,11 +277,8 @@ with which images are said to fit no place of the map."""
 
 def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
     """The first conflict that is found, by its kind and in a sentence; ("", "") where there is none."""
-    for kind, finding in JUDGEMENTS.items():
-        sentence = finding(watched, length_scale_m)
-        if sentence:
-            return kind, sentence
-    return "", ""
+    found = ((kind, finding(watched, length_scale_m)) for kind, finding in JUDGEMENTS.items())
+    return next((each for each in found if each[1]), ("", ""))
 
 
 def frozen(watched: Watched, length_scale_m: float) -> str:
