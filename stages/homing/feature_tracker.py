@@ -22,22 +22,6 @@ EDGE_PX = 2.0
 """Points closer to the image's edge are not tracked."""
 MAX_PIXELS = 76800
 """Pixels of the image that is tracked in, larger ones are made smaller: 320 x 240, the paper's size."""
-START_RADIUS_PX = 3
-"""Radius around a feature within which the most trackable point is chosen, pixels."""
-WINDOW_PX = 15
-"""Side of the window that Lucas and Kanade's method compares, pixels."""
-PYRAMID_LEVELS = 3
-"""Times that the image is halved for large displacements."""
-MAX_FORWARD_BACKWARD_PX = 1.0
-"""Largest distance from where it began of a point that is tracked forward and backward again, pixels."""
-SEARCH_RADIUS_PX = 8.0
-"""Radius around its expected position in which a lost point is searched, pixels."""
-PATCH_RADIUS_PX = 5
-"""Radius of the disc whose intensity histogram describes a point, pixels."""
-MAX_HISTOGRAM_DIFFERENCE = 0.25
-"""Half the sum of absolute differences up to which a lost point is recognised."""
-MIN_TRACKABILITY = 0.01
-"""Smallest trackability at which a lost point is searched, as a share of the image's largest."""
 
 
 class FeatureTrackerState(State):
@@ -105,19 +89,10 @@ class FeatureTracker(Stage):
         strength = trackability(before)
         self._start(state, before, strength, local_map, np.flatnonzero(kinds == MATCHED))
         steady = np.flatnonzero(state.alive)
-        state.histograms[steady] = histograms(before, state.points[steady], PATCH_RADIUS_PX)
+        state.histograms[steady] = histograms(before, state.points[steady])
         expected = _expected(state, before, local_map)
         lost = np.flatnonzero(~state.alive & before.inside(expected, EDGE_PX))
-        points, found = find_again(
-            before,
-            strength,
-            expected[lost],
-            state.histograms[lost],
-            SEARCH_RADIUS_PX,
-            PATCH_RADIUS_PX,
-            MAX_HISTOGRAM_DIFFERENCE,
-            MIN_TRACKABILITY,
-        )
+        points, found = find_again(before, strength, expected[lost], state.histograms[lost])
         state.points[lost[found]], state.alive[lost[found]] = points[found], True
         return lost[found]
 
@@ -130,7 +105,7 @@ class FeatureTracker(Stage):
             expected = before.from_original(local_map.points[rows])
         inside = before.inside(expected, EDGE_PX)
         rows, expected = rows[inside], expected[inside]
-        points = best_nearby(strength, before, expected, START_RADIUS_PX)
+        points = best_nearby(strength, before, expected)
         bearings = before.bearings(points)
         usable = np.isfinite(bearings).all(axis=1) & before.inside(points, EDGE_PX)
         rows, points, bearings = rows[usable], points[usable], bearings[usable]
@@ -144,15 +119,7 @@ class FeatureTracker(Stage):
         points = _expected(state, seen, predicted)
         old = np.flatnonzero(state.alive)
         guesses = np.where(np.isfinite(points[old]), points[old], state.points[old])
-        found, kept = track(
-            state.image,
-            seen,
-            state.points[old],
-            guesses,
-            WINDOW_PX,
-            PYRAMID_LEVELS,
-            MAX_FORWARD_BACKWARD_PX,
-        )
+        found, kept = track(state.image, seen, state.points[old], guesses)
         rows = old[kept]
         points[rows] = state.points[rows] = found[kept]
         state.alive[:] = False

@@ -19,6 +19,22 @@ Bools = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float32]
 HISTOGRAM_BINS = 16
 """Bins of the histogram of the intensities around a point."""
+START_RADIUS_PX = 3
+"""Radius around a feature within which the most trackable point is chosen, pixels."""
+WINDOW_PX = 15
+"""Side of the window that Lucas and Kanade's method compares, pixels."""
+PYRAMID_LEVELS = 3
+"""Times that the image is halved for large displacements."""
+MAX_FORWARD_BACKWARD_PX = 1.0
+"""Largest distance from where it began of a point that is tracked forward and backward again, pixels."""
+SEARCH_RADIUS_PX = 8.0
+"""Radius around its expected position in which a lost point is searched, pixels."""
+PATCH_RADIUS_PX = 5
+"""Radius of the disc whose intensity histogram describes a point, pixels."""
+MAX_HISTOGRAM_DIFFERENCE = 0.25
+"""Half the sum of absolute differences up to which a lost point is recognised."""
+MIN_TRACKABILITY = 0.01
+"""Smallest trackability at which a lost point is searched, as a share of the image's largest."""
 
 
 def trackability(image: WorkingImage) -> Floats:
@@ -26,11 +42,10 @@ def trackability(image: WorkingImage) -> Floats:
     return cast(Floats, cv2.cornerMinEigenVal(image.grey, blockSize=5, ksize=3))
 
 
-def best_nearby(strength: Floats, image: WorkingImage, points: Array, radius: int) -> Array:
-    """For points (N, 2) the most trackable pixels (N, 2) at most `radius` rows and columns away, if inside."""
-    offsets = np.stack(np.meshgrid(np.arange(-radius, radius + 1), np.arange(-radius, radius + 1)), axis=-1).reshape(
-        -1, 2
-    )
+def best_nearby(strength: Floats, image: WorkingImage, points: Array) -> Array:
+    """For points (N, 2) the most trackable pixels (N, 2) at most `START_RADIUS_PX` rows and columns away, if inside."""
+    steps = np.arange(-START_RADIUS_PX, START_RADIUS_PX + 1)
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     near = np.rint(points).astype(np.int64)[:, None, :] + offsets
     rows, columns = strength.shape
     x, y = near[..., 0] + image.seam, near[..., 1]
@@ -40,14 +55,14 @@ def best_nearby(strength: Floats, image: WorkingImage, points: Array, radius: in
     return best
 
 
-def histograms(image: WorkingImage, points: Array, radius: int) -> Floats:
-    """Intensity histograms (N, 16), each of sum 1, of the discs of `radius` pixels around points (N, 2) in the image.
+def histograms(image: WorkingImage, points: Array) -> Floats:
+    """Intensity histograms (N, 16), each of sum 1, of the discs around points (N, 2) in the image.
 
     Their parts outside `grey` repeat its edge.
     """
-    grid = np.arange(-radius, radius + 1)
+    grid = np.arange(-PATCH_RADIUS_PX, PATCH_RADIUS_PX + 1)
     dx, dy = (d.ravel() for d in np.meshgrid(grid, grid))
-    disc = dx * dx + dy * dy <= (radius + 0.5) ** 2
+    disc = dx * dx + dy * dy <= (PATCH_RADIUS_PX + 0.5) ** 2
     near = np.rint(points).astype(np.int64)
     rows, columns = image.grey.shape
     x = np.clip(near[:, :1] + image.seam + dx[disc], 0, columns - 1)
@@ -57,13 +72,10 @@ def histograms(image: WorkingImage, points: Array, radius: int) -> Floats:
     return (counts / np.count_nonzero(disc)).astype(np.float32)
 
 
-def track(
-    before: Grey, image: WorkingImage, points: Array, guesses: Array, window: int, levels: int, max_error: float
-) -> tuple[Array, Bools]:
+def track(before: Grey, image: WorkingImage, points: Array, guesses: Array) -> tuple[Array, Bools]:
     """Tracks points (N, 2) of the image before: where they are now, and whether they were tracked: (N, 2) and (N,).
 
-    Forward from `guesses` (N, 2) by Lucas and Kanade in windows of `window` pixels over `levels` halvings, and backward
-    again: a point that does not come back within `max_error` pixels is lost.
+    Forward from `guesses` (N, 2) by Lucas and Kanade, and backward again: a point that does not come back is lost.
     """
     if not len(points):
         return points, np.zeros(0, np.bool_)
@@ -71,8 +83,8 @@ def track(
     old = np.ascontiguousarray((points + seam)[:, None], np.float32)
     guess = np.ascontiguousarray((guesses + seam)[:, None], np.float32)
     options: dict[str, Any] = {
-        "winSize": (window, window),
-        "maxLevel": levels,
+        "winSize": (WINDOW_PX, WINDOW_PX),
+        "maxLevel": PYRAMID_LEVELS,
         "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.02),
         "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
     }
@@ -83,30 +95,21 @@ def track(
     found = new[:, 0].astype(np.float64) - seam
     if image.seam:
         found[:, 0] = np.mod(found[:, 0] + 0.5, image.columns) - 0.5
-    kept = (forward.ravel() > 0) & (backward.ravel() > 0) & (missed <= max_error) & image.inside(found, 2.0)
-    return found, np.asarray(kept)
+    kept = (forward.ravel() > 0) & (backward.ravel() > 0) & (missed <= MAX_FORWARD_BACKWARD_PX)
+    return found, np.asarray(kept & image.inside(found, 2.0))
 
 
 def find_again(
-    image: WorkingImage,
-    strength: Floats,
-    expected: Array,
-    histograms_before: Floats,
-    search_radius: float,
-    patch_radius: int,
-    max_difference: float,
-    min_trackability: float,
+    image: WorkingImage, strength: Floats, expected: Array, histograms_before: Floats
 ) -> tuple[Array, Bools]:
     """Lost points (N, 2) around where they are `expected` (N, 2), and which were found (N,).
 
-    Of the local maxima of trackability at most `search_radius` pixels away and above `min_trackability` of the image's
-    strongest, the one whose histogram differs least from `histograms_before` (N, 16), if by at most `max_difference`
-    (half the sum of differences, 0 to 1).
+    Of the local maxima of trackability around it, the one whose histogram differs least from `histograms_before`
+    (N, 16), if by little enough.
     """
     points, found = np.full_like(expected, np.nan), np.zeros(len(expected), np.bool_)
-    peaks = (strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (
-        strength > min_trackability * strength.max()
-    )
+    peaks = strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))
+    peaks &= strength > MIN_TRACKABILITY * strength.max()
     y, x = np.nonzero(peaks[:, image.seam : peaks.shape[1] - image.seam])
     if not len(x) or not len(expected):
         return points, found
@@ -115,14 +118,14 @@ def find_again(
     if image.seam:
         gap[..., 0] = np.minimum(gap[..., 0], image.columns - gap[..., 0])
     with np.errstate(invalid="ignore"):
-        close = np.hypot(gap[..., 0], gap[..., 1]) <= search_radius
+        close = np.hypot(gap[..., 0], gap[..., 1]) <= SEARCH_RADIUS_PX
     compared = np.flatnonzero(close.any(axis=0))
     if not len(compared):
         return points, found
-    around = histograms(image, candidates[compared], patch_radius)
+    around = histograms(image, candidates[compared])
     difference = 0.5 * np.abs(around[None] - histograms_before[:, None]).sum(axis=2)
     difference = np.where(close[:, compared], difference, np.inf)
     best = np.argmin(difference, axis=1)
-    found = difference[np.arange(len(expected)), best] <= max_difference
+    found = difference[np.arange(len(expected)), best] <= MAX_HISTOGRAM_DIFFERENCE
     points[found] = candidates[compared][best[found]]
     return points, np.asarray(found)

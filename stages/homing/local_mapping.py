@@ -174,9 +174,11 @@ class LocalMapping(Stage):
         local_map = self._resection(ctx, local_map, tracks, fresh)
         if local_map.state != "tracking":
             return replace(local_map, why=f"{local_map.why}; ")
-        if self._could_be_better(local_map, len(fresh.rows)):
-            more = round(REBUILD_RATIO * local_map.first_inliers)
-            new, _ = self._made(ctx, state, local_map, fresh, more)
+        # Closer to the target more is matched with it; at the target the baseline is too short.
+        far = local_map.distance() > MIN_REBUILD_DISTANCE * local_map.depth()
+        more = REBUILD_RATIO * local_map.first_inliers
+        if far and len(fresh.rows) > more:
+            new, _ = self._made(ctx, state, local_map, fresh, round(more))
             if new is not None:
                 return new
         if not self._contradicted(local_map, matches if self.verify else fresh):
@@ -252,11 +254,6 @@ class LocalMapping(Stage):
             translation=found.translation,
             metres=metres,
         )
-
-    def _could_be_better(self, local_map: LocalMap, matches: int) -> bool:
-        # Closer to the target more is matched with it; at the target the baseline is too short.
-        far = local_map.distance() > MIN_REBUILD_DISTANCE * local_map.depth()
-        return far and matches > REBUILD_RATIO * local_map.first_inliers
 
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn and what is left of the way.

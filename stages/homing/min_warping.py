@@ -27,10 +27,15 @@ INVERSE_DEPTH_RATIOS = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 
 """The way to the target over a column's distance: what is tried. Each stands for what is closest to it."""
 PRIOR = np.gradient(INVERSE_DEPTH_RATIOS) / np.gradient(INVERSE_DEPTH_RATIOS).sum()
 """All alike up to the largest."""
+HALF_WINDOW = 1
+"""Columns on both sides of one that are compared together with it."""
+DIRECTION_STEP = 2
+"""Columns from one direction to the next that is tried, a divisor of their number."""
 NO_MATCH = 0.85
 """Share of columns that are taken to have no match: they are hidden in one of the views."""
-
-
+NOISE = (14.0 / 255.0) ** 2
+"""Mean squared difference at which a match is a third as likely: that of 14 of 255 levels of intensity, which the same
+thing may have in two views."""
 NOISE_FACTORS = (0.01, 0.03, 0.1, 0.3, 1.0)
 """Multiples of the noise that may be a column's own: of the variance, so 1.4 to 14 of 14 levels."""
 
@@ -78,10 +83,10 @@ def column_distances(first: Columns, second: Columns) -> Floats:
     return out
 
 
-def _varied(first: Columns, second: Columns, noise: float) -> tuple[Columns, Columns]:
+def _varied(first: Columns, second: Columns) -> tuple[Columns, Columns]:
     """The views without a side of the horizon that looks the same all around: bare ground only dilutes the rest."""
     kept = [
-        all(view[side].shape[1] and view[side].var(axis=0).mean() > noise for view in (first, second))
+        all(view[side].shape[1] and view[side].var(axis=0).mean() > NOISE for view in (first, second))
         for side in (0, 1)
     ]
     if not any(kept):
@@ -93,25 +98,25 @@ def _varied(first: Columns, second: Columns, noise: float) -> tuple[Columns, Col
     return one, other
 
 
-def averaged_beside(distances: Floats, half_window: int) -> Floats:
-    """Each distance (C, C, planes) averaged with those of as many columns on both sides in both views."""
+def averaged_beside(distances: Floats) -> Floats:
+    """Each distance (C, C, planes) averaged with those of `HALF_WINDOW` columns on both sides in both views."""
     count = len(distances)
     skewed = (np.arange(count)[:, None] + np.arange(count)) % count
     along = np.take_along_axis(distances, skewed[:, :, None], axis=1)  # [i, k]: columns i and i + k
-    total = sum((np.roll(along, step, axis=0) for step in range(-half_window, half_window + 1)), np.zeros_like(along))
+    total = sum((np.roll(along, step, axis=0) for step in range(-HALF_WINDOW, HALF_WINDOW + 1)), np.zeros_like(along))
     back = (np.arange(count) - np.arange(count)[:, None]) % count
-    averaged: Floats = np.take_along_axis(total / np.float32(2 * half_window + 1), back[:, :, None], axis=1)
+    averaged: Floats = np.take_along_axis(total / np.float32(2 * HALF_WINDOW + 1), back[:, :, None], axis=1)
     return averaged
 
 
-def likelihood_ratios(distances: Floats, noise: float) -> Floats:
-    """exp(-d / noise) over its mean for the same column of the first view: (C, C, planes).
+def likelihood_ratios(distances: Floats) -> Floats:
+    """exp(-d / NOISE) over its mean for the same column of the first view: (C, C, planes).
 
     Averaged over `NOISE_FACTORS`, since some columns repeat better than others.
     """
     total = np.zeros_like(distances)
     for factor in NOISE_FACTORS:
-        likely = np.exp(np.maximum(-distances / np.float32(noise * factor), np.float32(-60.0)))
+        likely = np.exp(np.maximum(-distances / np.float32(NOISE * factor), np.float32(-60.0)))
         total += likely / likely.mean(axis=(1, 2), keepdims=True)
     return total / np.float32(len(NOISE_FACTORS))
 
@@ -156,34 +161,31 @@ def _score(ratios: Floats, places: Ints, planes: Ints, prior: Floats, directions
                 out[k, p] += math.log(likely[p])
 
 
-def _scores(distances: Floats, noise: float, directions: Ints) -> tuple[Floats, Floats]:
+def _scores(distances: Floats, directions: Ints) -> tuple[Floats, Floats]:
     """Log likelihood ratios of directions (D,) and all turns: (D, C); and of single matches, (C, planes, C)."""
     count = len(distances)
-    ratios = np.ascontiguousarray(likelihood_ratios(distances, noise).transpose(0, 2, 1))
+    ratios = np.ascontiguousarray(likelihood_ratios(distances).transpose(0, 2, 1))
     out = np.zeros((len(directions), count), np.float32)
     prior = (PRIOR * (1.0 - NO_MATCH)).astype(np.float32)
     _score(ratios, *places_of_columns(count), prior, directions, out)
     return out, ratios
 
 
-def warped(
-    first: Columns, second: Columns, noise: float, half_window: int, step: int, max_turn: float = math.pi
-) -> Warp:
+def warped(first: Columns, second: Columns, max_turn: float = math.pi) -> Warp:
     """The direction and turn from the first view to the second for which the columns of both match best.
 
-    `noise`: the mean squared difference at which a match is a third as likely; `half_window`: columns on both sides
-    that are compared together; `step`: columns from one direction to the next that is tried, a divisor of their number;
     `max_turn`: rad, to both sides. Both views are warped to the other, and the scores added (double search, Möller et
     al. 2010).
     """
     count = len(first.above)
-    directions = np.arange(0, count, step)
-    distances = averaged_beside(column_distances(*_varied(first, second, noise)), half_window)
-    there, ratios = _scores(distances, noise, directions)
+    directions = np.arange(0, count, DIRECTION_STEP)
+    distances = averaged_beside(column_distances(*_varied(first, second)))
+    there, ratios = _scores(distances, directions)
     swapped = np.ascontiguousarray(distances.transpose(1, 0, 2)[:, :, ::-1])
-    back, _ = _scores(swapped, noise, directions)
+    back, _ = _scores(swapped, directions)
     turns = np.arange(count)
-    seen_back = np.rint((directions[:, None] + count // 2 - turns) % count / step).astype(np.int64) % len(directions)
+    back_steps = (directions[:, None] + count // 2 - turns) % count / DIRECTION_STEP
+    seen_back = np.rint(back_steps).astype(np.int64) % len(directions)
     scores = there + back[seen_back, -turns % count]
     allowed = np.abs((turns + count // 2) % count - count // 2) <= max(max_turn, 0.0) * count / (2.0 * math.pi)
     row, turn = np.unravel_index(int(np.argmax(np.where(allowed, scores, -np.inf))), scores.shape)

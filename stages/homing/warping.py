@@ -14,10 +14,6 @@ from omninav.stages.values.image import Image, Panorama
 from .column_table import ColumnTable
 from .min_warping import Columns, warped
 
-NOISE_LEVELS = 14.0
-"""Difference of intensity (of 255) that the same thing may have in two views; smaller ones count for more."""
-HALF_WINDOW = 1
-"""Columns on both sides of one that are compared together with it."""
 MIN_FEATURES = 18
 """Features that must agree with a vector of two views alone; with fewer, whole images decide."""
 COLUMNS = 180
@@ -78,8 +74,7 @@ class MinWarping(Stage):
         if self._target is None or self._target[0] is not target:
             self._target = target, self._columns(target, camera)
         here = self._columns(image, camera)
-        noise = (NOISE_LEVELS / 255.0) ** 2
-        found = warped(here, self._target[1], noise, HALF_WINDOW, 2, math.radians(self.max_turn_deg))
+        found = warped(here, self._target[1], math.radians(self.max_turn_deg))
         if found.columns < MIN_COLUMNS:
             ctx.count("too_few_columns")
             if not vector.is_found:

@@ -50,7 +50,7 @@ class Confidence(MetricStage):
         """The whole run at once."""
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
-        values = confidence_of(drive.last_log, MIN_WEIGHT, MAX_SIGMA_M)
+        values = confidence_of(drive.last_log)
         shown = (
             "probability",
             "doubtful_share",
@@ -72,29 +72,24 @@ def sigmas_of(drive: Drive) -> Array:
     return found
 
 
-def confident(drive: Drive, min_weight: float = MIN_WEIGHT, max_sigma_m: float = MAX_SIGMA_M) -> npt.NDArray[np.bool_]:
+def confident(drive: Drive) -> npt.NDArray[np.bool_]:
     """Which of the frames have a confident estimate, see `Confidence`: (N,)."""
-    sure: npt.NDArray[np.bool_] = known(drive.estimate) & (drive.mode_weight >= min_weight)
-    return sure & (np.nan_to_num(sigmas_of(drive), nan=np.inf) <= max_sigma_m)
+    sure: npt.NDArray[np.bool_] = known(drive.estimate) & (drive.mode_weight >= MIN_WEIGHT)
+    return sure & (sigmas_of(drive) <= MAX_SIGMA_M)
 
 
-def has_doubt(drive: Drive) -> bool:
-    """Whether the belief is ever anything but one pose without uncertainty."""
-    there = known(drive.estimate)
-    return bool((drive.mode_weight[there] < 1.0).any() or (sigmas_of(drive)[there] > 0.0).any())
-
-
-def confidence_of(drive: Drive, min_weight: float, max_sigma_m: float) -> dict[str, Any]:
+def confidence_of(drive: Drive) -> dict[str, Any]:
     """The figures of one log, named as in metrics.json."""
     there = known(drive.estimate)
+    weights, sigmas = drive.mode_weight[there], sigmas_of(drive)[there]
     values: dict[str, Any] = {}
-    if has_doubt(drive):
-        sure = np.flatnonzero(confident(drive, min_weight, max_sigma_m))
+    if (weights < 1.0).any() or (sigmas > 0.0).any():  # not always one pose without uncertainty
+        sure = np.flatnonzero(confident(drive))
         values["confident_share"] = len(sure) / len(drive)
         values["first_confident_frame"] = int(sure[0]) if len(sure) else None
-        values["weight"] = float(np.median(drive.mode_weight[there]))
-        if (sigmas_of(drive)[there] > 0.0).any():
-            values["spread_m"] = float(np.nanmedian(sigmas_of(drive)[there]))
+        values["weight"] = float(np.median(weights))
+        if (sigmas > 0.0).any():
+            values["spread_m"] = float(np.nanmedian(sigmas))
     stated = drive.confidence[np.isfinite(drive.confidence)]
     if len(stated):
         values["probability"] = float(np.median(stated))

@@ -31,17 +31,13 @@ class ErrorCurves(MetricStage):
     Odometry alone starts at the first true pose and is not aligned. Nothing without ground truth.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-    ) -> MetricStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
-        return self.Out(metrics=Metrics(error_curves(logs[-1], HOME_M, POINTS, STEP_M) if logs else {}))
+        return self.Out(metrics=Metrics(error_curves(logs[-1]) if logs else {}))
 
 
-def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) -> dict[str, Any]:
+def error_curves(drive: Drive) -> dict[str, Any]:
     """Curves of one drive with ground truth by their names in metrics.json; empty where nothing was estimated."""
     scored = known(drive.truth) & known(drive.estimate)
     if not scored.any():
@@ -51,10 +47,10 @@ def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) ->
     path = drive.odometry_alone()
     odometry = np.full(len(metres), np.nan) if path is None else position_errors(path[scored], truth)
     start = drive.truth[np.argmax(known(drive.truth))]
-    laps = np.split(np.arange(len(truth)), lap_ends(truth, start, home_m))
-    shares = [share for share in np.array_split(np.arange(len(truth)), min(points, len(truth))) if len(share)]
+    laps = np.split(np.arange(len(truth)), lap_ends(truth, start, HOME_M))
+    shares = [share for share in np.array_split(np.arange(len(truth)), min(POINTS, len(truth))) if len(share)]
     away = np.hypot(*(truth[:, :2] - start[:2]).T)
-    rings = (away // distance_m).astype(np.int64)
+    rings = (away // STEP_M).astype(np.int64)
     by_ring = [np.flatnonzero(rings == ring) for ring in range(int(rings.max()) + 1)]
     return {
         "laps": [
@@ -76,7 +72,7 @@ def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) ->
             "odometry_error_m": [_mean(odometry, share) for share in shares],
         },
         "over_distance": {
-            "distance_m": [(ring + 0.5) * distance_m for ring in range(len(by_ring))],
+            "distance_m": [(ring + 0.5) * STEP_M for ring in range(len(by_ring))],
             "position_error_m": [_mean(metres, ring) for ring in by_ring],
             "first_lap_odometry_error_m": [_mean(odometry, ring[ring <= laps[0][-1]]) for ring in by_ring],
         },

@@ -1,8 +1,9 @@
 """Counts matches of two views that are right before the first wrong one."""
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,6 @@ from omninav.stages.values.pose import Pose
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
-Each = TypeVar("Each")
 
 COLUMN_RATIO = 0.8
 """Largest ratio of the nearest to the second nearest distance of vertical segments that match."""
@@ -112,7 +112,7 @@ class FirstMatches(MetricStage):
 
         def seen(*described: Sequence[Any]) -> list[Seen]:
             rows = zip(poses, there, strict=True)
-            return [Seen(pose, *(_at(values, row) for values in described)) for pose, row in rows]
+            return [Seen(pose, *(each[row] if row < len(each) else None for each in described)) for pose, row in rows]
 
         views = seconds = seen(features, vertical_segments, depths)
         if other_features or other_segments:
@@ -126,24 +126,23 @@ class FirstMatches(MetricStage):
 
     def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> Judged:
         x, y, turn = (float(number) for number in between(one.pose, other.pose))
-        moved, ratios, rights, chances, features = (x, y, turn), [], [], [], 0
+        moved, features = (x, y, turn), 0
+        kinds: list[tuple[Pairs, Callable[[Pairs], Bools]]] = []
         if self.by != "columns" and one.patches is not None and other.patches is not None:
             pairs = self._patches(one.patches, other.patches)
-            rights.append(self._right_patches(one, other, pairs, moved, lens))
-            ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
-            chances.append(self._right_patches(one, other, shifted(pairs), moved, lens))
+            kinds.append((pairs, partial(self._right_patches, one, other, moved, lens)))
             features += len(one.patches)
         if self.by != "patches" and one.columns is not None and other.columns is not None:
             pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, COLUMN_RATIO)
-            rights.append(self._right_columns(one, other, pairs, moved))
-            ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
-            chances.append(self._right_columns(one, other, shifted(pairs), moved))
+            kinds.append((pairs, partial(self._right_columns, one, other, moved)))
             features += len(one.columns)
-        if not ratios:
+        if not kinds:
             return Judged(np.zeros(0, np.bool_), math.nan, 0)
+        ratios = [pairs.distance if self.best == "nearest" else pairs.ratio for pairs, _ in kinds]
         order = np.argsort(np.concatenate(ratios), kind="stable")
-        chance = np.concatenate(chances)
-        return Judged(np.concatenate(rights)[order], float(chance.mean()) if len(chance) else math.nan, features)
+        rights = np.concatenate([is_right(pairs) for pairs, is_right in kinds])
+        chance = np.concatenate([is_right(shifted(pairs)) for pairs, is_right in kinds])
+        return Judged(rights[order], float(chance.mean()) if len(chance) else math.nan, features)
 
     def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
         if self.search == "both_ways":
@@ -156,7 +155,7 @@ class FirstMatches(MetricStage):
         apart = np.linalg.norm(one.colours[pairs.first] - other.colours[pairs.second], axis=1)
         return pairs.chosen(apart <= self.colour)
 
-    def _right_patches(self, one: Seen, other: Seen, pairs: Pairs, moved: Motion, lens: Camera | None) -> Bools:
+    def _right_patches(self, one: Seen, other: Seen, moved: Motion, lens: Camera | None, pairs: Pairs) -> Bools:
         assert one.patches is not None
         assert other.patches is not None
         first, second = one.patches.bearings[pairs.first], other.patches.bearings[pairs.second]
@@ -168,7 +167,7 @@ class FirstMatches(MetricStage):
         near, far = one.depths.patches[pairs.first], other.depths.patches[pairs.second]
         return right_by_depth(first, second, near, far, moved, limit)
 
-    def _right_columns(self, one: Seen, other: Seen, pairs: Pairs, moved: Motion) -> Bools:
+    def _right_columns(self, one: Seen, other: Seen, moved: Motion, pairs: Pairs) -> Bools:
         assert one.columns is not None
         assert other.columns is not None
         right = np.ones(len(pairs.first), np.bool_)
@@ -182,10 +181,6 @@ class FirstMatches(MetricStage):
                 limit = math.radians(COLUMN_WITHIN_DEG)
                 right &= right_by_depth(first[:, end], second[:, end], near, far, moved, limit)
         return right
-
-
-def _at(values: Sequence[Each | None], row: int) -> Each | None:
-    return values[row] if row < len(values) else None
 
 
 def pairs_apart(poses: Array, metres: float, number: int) -> list[tuple[int, int]]:

@@ -6,17 +6,13 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.values.drive import pose_rows
+from omninav.stages.values.drive import Array, pose_rows
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.homing_field import HomingField
 from omninav.stages.values.pose import Pose
-
-Array = npt.NDArray[np.float64]
-
 
 QUANTITIES = {
     "homing_field.views": Quantity(title="Views", context=True),
@@ -53,8 +49,7 @@ class HomingFieldErrors(Stage):
         rows = [row for row in range(1, len(poses)) if np.isfinite(poses[[0, row]]).all()]
         if not rows:
             return self.Out()
-        found = field_of(poses, rows, [vectors[row] for row in rows])
-        turns = np.array([_turn_error(poses, row, vectors[row]) for row in rows])
+        found, turns = field_of(poses[rows], poses[0], [vectors[row] for row in rows])
         edges = WIDTH_M * np.arange(self.rings + 1)
         metres = found.metres - 1e-9
         rings = [(metres >= low) & (metres < high) for low, high in pairwise(edges)]
@@ -69,25 +64,21 @@ class HomingFieldErrors(Stage):
         return self.Out(metrics=Metrics({"homing_field": values}, QUANTITIES, headlines), field=found)
 
 
-def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:
-    """The field over poses (N, 3) of `rows`, towards the first of all."""
-    directions = np.array(
-        [math.nan if vector is None or not vector.is_found else vector.direction for vector in vectors]
-    )
-    targets = between(poses[list(rows)], poses[0])
-    return HomingField(
-        poses[0],
-        poses[list(rows)],
-        np.asarray(wrap(directions + poses[list(rows), 2])),
-        np.abs(wrap(directions - np.arctan2(targets[:, 1], targets[:, 0]))),
+def field_of(poses: Array, target: Array, vectors: Sequence[HomingVector | None]) -> tuple[HomingField, Array]:
+    """The field over poses (N, 3) towards a target (3,), and the errors of the turns (N,), rad."""
+    found = [vector if vector is not None and vector.is_found else None for vector in vectors]
+    directions, turns = np.array(
+        [(math.nan, math.nan) if vector is None else (vector.direction, vector.turn) for vector in found]
+    ).T
+    true = between(poses, target)
+    field = HomingField(
+        target,
+        poses,
+        wrap(directions + poses[:, 2]),
+        np.abs(wrap(directions - np.arctan2(true[:, 1], true[:, 0]))),
         np.array([0 if vector is None else vector.inliers for vector in vectors], np.int64),
     )
-
-
-def _turn_error(poses: Array, row: int, vector: HomingVector | None) -> float:
-    if vector is None or not vector.is_found:
-        return math.nan
-    return abs(float(wrap(vector.turn - between(poses[row], poses[0])[2])))
+    return field, np.abs(wrap(turns - true[:, 2]))
 
 
 def summary(errors: Array, turns: Array) -> dict[str, float | int | None]:

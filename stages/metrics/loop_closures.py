@@ -13,6 +13,7 @@ from omninav.stages.geometry.probability.dempster_shafer import support, unknown
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 
 QUANTITIES = {
@@ -73,21 +74,22 @@ class LoopClosures(Stage):
         if len(steps):
             held["step_m"] = {"median": float(np.median(steps)), "p90": float(np.quantile(steps, 0.9)),
                               "max": float(steps.max())}  # fmt: skip
-        gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
+        right = hypothesis_gaps(hypotheses) <= NEAR_M if hypotheses.pose_source == "truth" else None
         far = np.abs(hypotheses.pairs[:, 1] - hypotheses.pairs[:, 0]) >= MIN_IMAGES_BETWEEN
         one, other = hypotheses.place[hypotheses.pairs].T
-        supports, near = support(hypotheses.masses), None if gaps is None else gaps[far]
+        supports, closed = support(hypotheses.masses)[far], None if right is None else right[far]
+        some = closed if closed is not None and closed.any() else None
         loops = {
-            **counted(hypotheses.accepted, gaps, NEAR_M),
+            **counted(hypotheses.accepted, right),
             "loop_closures": {
-                **counted(hypotheses.accepted[far], near, NEAR_M),
-                "average_precision": None if near is None else average_precision(supports[far], near <= NEAR_M),
+                **counted(hypotheses.accepted[far], closed),
+                "average_precision": None if some is None else average_precision(supports, some),
             },
-            "merged": counted((one == other)[far], near, NEAR_M),
-            "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], near, NEAR_M),
-            "at_supports": at_supports(supports[far], near, NEAR_M),
+            "merged": counted((one == other)[far], closed),
+            "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], closed),
+            "at_supports": at_supports(supports, closed),
         }
-        figure = None if near is None else _drawn(supports[far], near <= NEAR_M)
+        figure = None if some is None else _drawn(supports, some)
         return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), figure=figure)
 
 
@@ -98,19 +100,18 @@ def parts_of(map: TopologicalMap) -> int:
     return int(networkx.number_connected_components(graph))
 
 
-def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) -> dict[str, float | int | None]:
-    """Numbers of hypotheses, accepted, rejected and wrongly accepted ones, precision and recall.
+def counted(accepted: Bools, right: Bools | None) -> dict[str, float | int | None]:
+    """Numbers of hypotheses (H,), accepted, rejected and wrongly accepted ones, precision and recall.
 
-    `gaps` (H,): metres between the two, None where it is not known.
+    `right` (H,): None where it is not known.
     """
     known: dict[str, float | int | None] = {
         "hypotheses": len(accepted),
         "accepted": int(accepted.sum()),
         "rejected": int((~accepted).sum()),
     }
-    if gaps is None:
+    if right is None:
         return {**known, "wrong": None, "precision": None, "recall": None}
-    right = gaps <= near
     found = int((accepted & right).sum())
     return {
         **known,
@@ -120,33 +121,30 @@ def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) ->
     }
 
 
-def neighbours(initial: Array, masses: Array, gaps: Array | None, near: float) -> dict[str, float | None]:
+def neighbours(initial: Array, masses: Array, right: Bools | None) -> dict[str, float | None]:
     """Gain by the evidence of neighbouring hypotheses, of masses (H, 3) before it and after.
 
     `area_gain`: by how much the area under the precision-recall curve grows; `wrong_without`: how many wrong ones have
     a support above one half before; `right_alone`: the share of right ones of which no neighbour has spoken. None where
-    no hypothesis is right, or `gaps` (H,) in metres are not known.
+    no hypothesis is `right` (H,), or it is not known which are.
     """
-    if gaps is None or not (gaps <= near).any():
+    if right is None or not right.any():
         return {"area_gain": None, "wrong_without": None, "right_alone": None}
-    right, before = gaps <= near, support(initial)
-    areas = [_area(*precision_recall(supports, right)) for supports in (before, support(masses))]
+    before = support(initial)
     return {
-        "area_gain": areas[1] - areas[0],
+        "area_gain": average_precision(support(masses), right) - average_precision(before, right),
         "wrong_without": float(np.count_nonzero((before > 0.5) & ~right)),
         "right_alone": float((unknown(masses) >= unknown(initial))[right].mean()),
     }
 
 
-def average_precision(support: Array, right: npt.NDArray[np.bool_]) -> float | None:
-    """Area under the precision-recall curve of hypotheses (H,) accepted by falling support; None where none is right.
-
-    The sum of precision times the increase of recall, with hypotheses of equal support accepted together.
-    """
-    return _area(*precision_recall(support, right)) if right.any() else None
+def average_precision(support: Array, right: Bools) -> float:
+    """Area under the curve of `precision_recall`: the sum of precision times the increase of recall."""
+    precision, recall = precision_recall(support, right)
+    return float((precision * np.diff(recall, prepend=0.0)).sum())
 
 
-def precision_recall(support: Array, right: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+def precision_recall(support: Array, right: Bools) -> tuple[Array, Array]:
     """Precision and recall of hypotheses (H,) accepted by falling support, after each of its values; one must be right.
 
     Hypotheses of equal support are accepted together.
@@ -158,34 +156,26 @@ def precision_recall(support: Array, right: npt.NDArray[np.bool_]) -> tuple[Arra
     return found / accepted, found / right.sum()
 
 
-def _area(precision: Array, recall: Array) -> float:
-    return float((precision * np.diff(recall, prepend=0.0)).sum())
-
-
-def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
-    if not right.any():
-        return None
+def _drawn(support: Array, right: Bools) -> Figure:
     precision, recall = precision_recall(support, right)
     chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", height=(260.0, 260.0))
-    ends = np.column_stack([recall, precision])  # each step is as high as the precision where it ends
-    begins = np.column_stack([np.append(0.0, recall[:-1]), precision])
-    points = np.stack([begins, ends], axis=1).reshape(-1, 2)
-    chart.base.line(points, "blue", 1.8)
+    edges = np.repeat(np.append(0.0, recall), 2)[1:-1]
+    chart.base.line(np.column_stack([edges, np.repeat(precision, 2)]), "blue", 1.8)  # as high as where a step ends
     return Figure(
         name="precision_recall",
         title="Precision and recall of loop closures",
         caption=f"Loop closures accepted by falling support, {int(right.sum())} of {len(right)} right. The area below "
-        f"the line, the sum of Pₙ (Rₙ - Rₙ₋₁), is {100 * _area(precision, recall):.1f} %.",
+        f"the line, the sum of Pₙ (Rₙ - Rₙ₋₁), is {100 * average_precision(support, right):.1f} %.",
         content=chart.svg(),
         media_type="image/svg+xml",
         order=31,
     )
 
 
-def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, list[float | int | None]]:
+def at_supports(support: Array, right: Bools | None) -> dict[str, list[float | int | None]]:
     """Figures of `counted` for hypotheses with `support` (H,) above each of 0.05, 0.1 … 0.95: a list for each."""
     thresholds = [round(0.05 * k, 2) for k in range(1, 20)]
-    counts = [counted(support > threshold, gaps, near) for threshold in thresholds]
+    counts = [counted(support > threshold, right) for threshold in thresholds]
     return {"support": list(thresholds), **{name: [count[name] for count in counts] for name in counts[0]}}
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import pose_rows
@@ -12,8 +11,6 @@ from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Pose
 
 from .relative_errors import absolute_trajectory_errors
-
-Array = npt.NDArray[np.float64]
 
 QUANTITIES = {
     "map_error.as_driven_m": Quantity(title="Map: error of the positions by odometry", better="lower"),

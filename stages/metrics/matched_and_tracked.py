@@ -12,11 +12,10 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
 from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 
-Array = npt.NDArray[np.float64]
 QUANTITIES = {
     "pairs.kept": Quantity(title="Right tracks / right matches", better="higher"),
     "pairs.matched.right": Quantity(title="Right matches of a local map", better="higher"),
@@ -96,7 +95,7 @@ class MatchedAndTracked(MetricStage):
             tracked.append(self._tracked(span, poses, maps, tracks, len(made)))
         if not matched:
             return self.Out()
-        right, still = sum(_count(each.right) for each in matched), sum(_count(each.right) for each in tracked)
+        right, still = sum(int(each.right.sum()) for each in matched), sum(int(each.right.sum()) for each in tracked)
         both = np.concatenate([one.right & other.right for one, other in zip(matched, tracked, strict=True)])
         values: dict[str, Any] = {
             "maps": len(matched),
@@ -158,16 +157,12 @@ def metres(motion: Array) -> float:
     return math.hypot(motion[0], motion[1])
 
 
-def _count(which: npt.NDArray[np.bool_]) -> int:
-    return int(np.count_nonzero(which))
-
-
 def _summary(judged: Sequence[Judged], both: npt.NDArray[np.bool_]) -> dict[str, float | None]:
     angles = np.concatenate([each.angles for each in judged])
     apart = [each.metres for each in judged if math.isfinite(each.metres)]
     return {
-        "used": _count(np.isfinite(angles)) / len(judged),
-        "right": sum(_count(each.right) for each in judged) / len(judged),
+        "used": int(np.isfinite(angles).sum()) / len(judged),
+        "right": sum(int(each.right.sum()) for each in judged) / len(judged),
         "noise_deg": float(np.median(angles[both])) if both.any() else None,
         "apart_m": float(np.mean(apart)) if apart else None,
     }

@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
-Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 

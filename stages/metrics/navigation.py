@@ -10,12 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
-
-Array = npt.NDArray[np.float64]
 
 QUANTITIES = {
     "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),

@@ -18,6 +18,17 @@ WITHIN_M = 2.0
 """Largest position error of a good frame, metres."""
 WITHIN_DEG = 35.0
 """Largest heading error of a good frame, degrees."""
+QUANTITIES = {
+    "success.within_rate": Quantity(title=f"Frames within {WITHIN_M:g} m and {WITHIN_DEG:g}°", better="higher"),
+    "success.at_end": Quantity(title=f"Last pose within {WITHIN_M:g} m and {WITHIN_DEG:g}°", unit="%", better="higher"),
+    "success.unimodal_after_frames": Quantity(
+        title="Images until one hypothesis is left", unit="", better="lower", absent="never"
+    ),
+    "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
+    "success.recovered_after_frames": Quantity(
+        title="Images until found again after the kidnapping", unit="", better="lower", absent="never"
+    ),
+}
 
 
 class SuccessRate(MetricStage):
@@ -32,54 +43,36 @@ class SuccessRate(MetricStage):
     without ground truth.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-    ) -> MetricStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
         if not last.has_truth:
             return self.Out()
-        found = {"success": self._of(last)}
-        return self.Out(metrics=Metrics(found, self._quantities(), ("success.recovered_after_frames",)))
-
-    def _quantities(self) -> dict[str, Quantity]:
-        return {
-            "success.within_rate": Quantity(title=f"Frames within {WITHIN_M:g} m and {WITHIN_DEG:g}°", better="higher"),
-            "success.at_end": Quantity(
-                title=f"Last pose within {WITHIN_M:g} m and {WITHIN_DEG:g}°", unit="%", better="higher"
-            ),
-            "success.unimodal_after_frames": Quantity(
-                title="Images until one hypothesis is left", unit="", better="lower", absent="never"
-            ),
-            "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
-            "success.recovered_after_frames": Quantity(
-                title="Images until found again after the kidnapping", unit="", better="lower", absent="never"
-            ),
-        }
-
-    def _of(self, drive: Drive) -> dict[str, Any]:
-        scored = known(drive.truth)
-        truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
-        position, heading = position_errors(estimate, truth), heading_errors_deg(estimate, truth)
-        good = (position <= WITHIN_M) & (heading <= WITHIN_DEG)  # a frame without estimate is not
-        single = good & (drive.mode_weight[scored] >= UNIMODAL_SHARE)
-        result: dict[str, Any] = {
+        scored = last.at(known(last.truth))
+        good, frames = is_good(scored), np.flatnonzero(known(last.truth))
+        single = good & (scored.mode_weight >= UNIMODAL_SHARE)
+        found: dict[str, Any] = {
             "within_rate": float(good.mean()),
             "at_end": float(good[-1]),
             "unimodal_after_frames": int(frames[np.argmax(single)]) if single.any() else None,
         }
-        kidnapped = kidnapped_before(drive, KIDNAPPED_M)
+        kidnapped = kidnapped_before(last, KIDNAPPED_M)
         if len(kidnapped):
             at = int(kidnapped[-1])
             later = int(np.searchsorted(frames, at))
-            again = first_settled(position[later:], heading[later:], WITHIN_M, WITHIN_DEG)
-            result |= {
+            poses, truth = scored.estimate[later:], scored.truth[later:]
+            again = first_settled(position_errors(poses, truth), heading_errors_deg(poses, truth), WITHIN_M, WITHIN_DEG)
+            found |= {
                 "kidnapped_at": at,
                 "recovered_after_frames": None if again is None else int(frames[later + again]) - at,
             }
-        return result
+        return self.Out(metrics=Metrics({"success": found}, QUANTITIES, ("success.recovered_after_frames",)))
+
+
+def is_good(drive: Drive) -> npt.NDArray[np.bool_]:
+    """Which frames have an estimate close to the truth, (N,); without an estimate it is none."""
+    near = position_errors(drive.estimate, drive.truth) <= WITHIN_M
+    return near & (heading_errors_deg(drive.estimate, drive.truth) <= WITHIN_DEG)
 
 
 def kidnapped_before(drive: Drive, min_distance_m: float) -> npt.NDArray[np.int64]:

@@ -3,10 +3,9 @@
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
 
-from .success_rate import WITHIN_DEG, WITHIN_M
+from .success_rate import is_good
 
 QUANTITIES = {
     "tracking_success.after_frames": Quantity(
@@ -31,9 +30,7 @@ class TrackingSuccess(MetricStage):
         scored = known(last.truth)
         if not scored.any():
             return self.Out()
-        truth, estimate = last.truth[scored], last.estimate[scored]
-        near = position_errors(estimate, truth) <= WITHIN_M
-        right = near & (heading_errors_deg(estimate, truth) <= WITHIN_DEG)  # a frame without estimate is not
+        right = is_good(last.at(scored))
         first = int(np.argmax(right)) if right.any() else None
         found = {
             "after_frames": None if first is None else int(np.flatnonzero(scored)[first]),

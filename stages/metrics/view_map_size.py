@@ -3,14 +3,10 @@
 import dataclasses
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
-
-Array = npt.NDArray[np.float64]
-
 
 QUANTITIES = {
     "map.references": Quantity(title="References in the map", context=True),

@@ -7,12 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
-
-Array = npt.NDArray[np.float64]
-
 
 QUANTITIES = {
     "spacing.between_views.unevenness": Quantity(title="Unevenness of the map among views", better="lower"),

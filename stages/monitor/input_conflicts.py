@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -40,69 +40,34 @@ COLUMNS = 11
 """Numbers that are remembered of an image."""
 
 
-@dataclass(frozen=True)
 class Watched:
-    """The last images as `rows` (N, 11), each: its time (s), odometry (3) with a heading that is not wrapped, its best
-    match (3) in the map (NaN without one), whether that lies at the estimate (NaN without one), and against the image
-    before: the turn seen (rad), the correlation, and whether the images are the same."""
+    """The last N images, from rows of `COLUMNS` numbers: their `times` (N,) in s; `odometry` (N, 3) with a heading that
+    is not wrapped, and the path that it drove (`metres`) and turned, to either side (`radians`); best `matches` (N, 3)
+    in the map (NaN without one), and whether each lies `at_estimate` (N,) (NaN without one). Against the image before:
+    `correlation` (N,), whether it is the `same` (N,), and `sure_turns` (N - 1,) seen (rad), NaN in images unlike it."""
 
-    rows: Array
-
-    def last(self, number: int) -> "Watched":
-        """The last images alone."""
-        return Watched(self.rows[-number:])
-
-    @property
-    def times(self) -> Array:
-        """Seconds (N,)."""
-        return self.rows[:, 0]
-
-    @property
-    def odometry(self) -> Array:
-        """Poses (N, 3)."""
-        return self.rows[:, 1:4]
-
-    @property
-    def at_estimate(self) -> Array:
-        """Flags (N,): 1 where the match lies at the estimate."""
-        return self.rows[:, 7]
-
-    @property
-    def correlation(self) -> Array:
-        """Correlations with the images before (N,)."""
-        return self.rows[:, 9]
-
-    @property
-    def same(self) -> Array:
-        """Flags (N,): 1 where the image equals the one before."""
-        return self.rows[:, 10]
+    def __init__(self, rows: Array) -> None:
+        self.times, self.odometry, self.matches = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
+        self.at_estimate, turns, self.correlation, self.same = rows[:, 7:].T
+        self.sure_turns = np.where(self.correlation[1:] > SURE_CORRELATION, turns[1:], np.nan)
+        self.metres, self.radians = driven(self.odometry)
 
     @property
     def placed(self) -> tuple[Array, Array]:
         """Odometry's poses and the best matches, of images that have one: (M, 3), (M, 3)."""
-        matches = self.rows[:, 4:7]
-        known = np.isfinite(matches).all(axis=1)
-        return self.odometry[known], matches[known]
-
-    @cached_property
-    def metres(self) -> float:
-        """The path that odometry drove."""
-        return float(np.hypot(*np.diff(self.odometry[:, :2], axis=0).T).sum())
-
-    @cached_property
-    def radians(self) -> float:
-        """How much odometry turned, to either side."""
-        return float(np.abs(np.diff(self.odometry[:, 2])).sum())
-
-    @cached_property
-    def sure_turns(self) -> Array:
-        """Turns (N - 1,) that are seen in images that are like the ones before; else NaN."""
-        return np.where(self.correlation[1:] > SURE_CORRELATION, self.rows[1:, 8], np.nan)
+        known = np.isfinite(self.matches).all(axis=1)
+        return self.odometry[known], self.matches[known]
 
     @cached_property
     def turn_fit(self) -> TurnFit:
         """Fit of the turns seen in images to those of odometry."""
         return turn_fit(self.times, self.odometry[:, 2], self.sure_turns)
+
+
+def driven(odometry: Array) -> tuple[float, float]:
+    """How far (m) and how much, to either side (rad), poses (N, 3) drive and turn."""
+    steps = np.diff(odometry, axis=0)
+    return float(np.hypot(steps[:, 0], steps[:, 1]).sum()), float(np.abs(steps[:, 2]).sum())
 
 
 class InputConflictsState(State):
@@ -201,7 +166,7 @@ def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     seconds = (tick.stamp - recent.stamp) / 1e9
     if 0.0 <= seconds < MIN_LEAP_S:
         return ""
-    before = Watched(recent.rows).last(MIN_BEFORE_LEAP)
+    before = Watched(recent.rows[-MIN_BEFORE_LEAP:])
     usual = float(np.median(np.diff(before.times)))
     if 0.0 <= seconds < LEAP_INTERVALS * usual:
         return ""
@@ -312,28 +277,25 @@ with which images are said to fit no place of the map."""
 
 def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
     """The first conflict that is found, by its kind and in a sentence; ("", "") where there is none."""
-    for kind, finding in JUDGEMENTS.items():
-        sentence = finding(watched, length_scale_m)
-        if sentence:
-            return kind, sentence
-    return "", ""
+    found = ((kind, finding(watched, length_scale_m)) for kind, finding in JUDGEMENTS.items())
+    return next((each for each in found if each[1]), ("", ""))
 
 
 def frozen(watched: Watched, length_scale_m: float) -> str:
     """The camera gives one image again and again."""
     number = int(np.argmin(watched.same[::-1])) if not watched.same.all() else len(watched.same)
-    run = watched.last(number + 1)
-    if number < MIN_FROZEN or (run.metres < FROZEN_M and run.radians < FROZEN_RAD):
+    metres, radians = driven(watched.odometry[-number - 1 :])
+    if number < MIN_FROZEN or (metres < FROZEN_M and radians < FROZEN_RAD):
         return ""
     return (
-        f"the camera is frozen: its last {number} images are one and the same, while odometry drove {run.metres:.1f} m "
-        f"and turned {math.degrees(run.radians):.0f} degrees; check the camera's driver, and that each image is new"
+        f"the camera is frozen: its last {number} images are one and the same, while odometry drove {metres:.1f} m "
+        f"and turned {math.degrees(radians):.0f} degrees; check the camera's driver, and that each image is new"
     )
 
 
 def blind(watched: Watched, length_scale_m: float) -> str:
     """Images that show nothing."""
-    recent = watched.last(MIN_BLIND).correlation
+    recent = watched.correlation[-MIN_BLIND:]
     if len(recent) < MIN_BLIND or not np.nanmedian(recent) < BLIND_CORRELATION:
         return ""
     return (

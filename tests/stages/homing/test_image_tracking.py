@@ -44,8 +44,8 @@ def test_an_image_without_its_camera_is_refused():
 def test_points_are_followed_through_a_turn_also_across_the_edge():
     before, after = panorama(), panorama(6)
     strength = trackability(before)
-    points = best_nearby(strength, before, np.array([[40.0, 45.0], [180.0, 30.0], [357.0, 50.0]]), 4)
-    found, kept = track(before.grey, after, points, points, 15, 3, 0.5)
+    points = best_nearby(strength, before, np.array([[40.0, 45.0], [180.0, 30.0], [357.0, 50.0]]))
+    found, kept = track(before.grey, after, points, points)
     assert kept.all()
     np.testing.assert_allclose(found[:, 1], points[:, 1], atol=0.1)
     np.testing.assert_allclose((found[:, 0] - points[:, 0]) % 360, 6.0, atol=0.1)
@@ -55,7 +55,7 @@ def test_a_point_whose_surroundings_are_gone_is_lost():
     before, other = panorama(), panorama()
     other = other._replace(grey=np.full_like(other.grey, 128))
     points = np.array([[100.0, 45.0]])
-    assert not track(before.grey, other, points, points, 15, 3, 0.5)[1].any()
+    assert not track(before.grey, other, points, points)[1].any()
 
 
 def test_a_lost_point_is_found_again_by_its_intensities_and_another_is_not():
@@ -63,24 +63,24 @@ def test_a_lost_point_is_found_again_by_its_intensities_and_another_is_not():
     strength = trackability(image)
     place = np.array([[120.0, 40.0]])
     for _ in range(5):  # uphill to a local maximum
-        place = best_nearby(strength, image, place, 5)
-    seen = histograms(image, place, 4)
+        place = best_nearby(strength, image, place)
+    seen = histograms(image, place)
     np.testing.assert_allclose(seen.sum(axis=1), 1.0, rtol=1e-6)
-    found, there = find_again(image, strength, place + np.array([3.0, -2.0]), seen, 8.0, 4, 0.2, 0.01)
+    found, there = find_again(image, strength, place + np.array([3.0, -2.0]), seen)
     assert there.all()
     np.testing.assert_allclose(found, place, atol=1.0)
-    assert not find_again(image, strength, place, np.zeros_like(seen), 8.0, 4, 0.2, 0.01)[1].any()
+    assert not find_again(image, strength, place, np.zeros_like(seen))[1].any()
 
 
 @pytest.mark.parametrize(("column", "expected"), [(2, 357.0), (357, 2.0)])
 def test_a_lost_point_is_found_again_across_the_edge_of_the_circle(column: int, expected: float):
     image = panorama()
-    place = best_nearby(trackability(image), image, np.array([[120.0, 40.0]]), 5)
+    place = best_nearby(trackability(image), image, np.array([[120.0, 40.0]]))
     for _ in range(5):
-        place = best_nearby(trackability(image), image, place, 5)
+        place = best_nearby(trackability(image), image, place)
     image = panorama(column - int(place[0, 0]))
     there = np.array([[float(column), place[0, 1]]])
     searched = np.array([[expected, place[0, 1]]])
-    found, kept = find_again(image, trackability(image), searched, histograms(image, there, 4), 8.0, 4, 0.1, 0.01)
+    found, kept = find_again(image, trackability(image), searched, histograms(image, there))
     assert kept.all()
     np.testing.assert_allclose(found, there, atol=1.0)

@@ -16,7 +16,7 @@ from omninav.stages.camera.donut import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.homing.feature_tracker import MAX_PIXELS, PATCH_RADIUS_PX, FeatureTracker, FeatureTrackerState
+from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
 from omninav.stages.homing.local_mapping import MIN_VERIFIED_INLIERS, LocalMapping, LocalMappingState, Matches
@@ -330,7 +330,7 @@ def test_a_tracked_feature_is_known_by_how_it_looked_last() -> None:
     homing.at(poses[4], matches=False)
     still = last[1] & (homing.tracks.kinds == 1)
     assert still.sum() >= 15
-    looks = histograms(seen, last[0][still], PATCH_RADIUS_PX)
+    looks = histograms(seen, last[0][still])
     np.testing.assert_array_equal(homing.tracked.histograms[still], looks)
 
 

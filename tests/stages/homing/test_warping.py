@@ -103,7 +103,7 @@ def test_views_that_differ_by_a_turn_alone_give_the_turn():
     rng = np.random.default_rng(0)
     above = np.repeat(rng.random((60, 30, 3)), 3, axis=0).astype(np.float32)
     nothing = np.zeros((180, 0, 3), np.float32)
-    found = warped(Columns(above, nothing), Columns(np.roll(above, -40, axis=0), nothing), 0.003, 2, 2)
+    found = warped(Columns(above, nothing), Columns(np.roll(above, -40, axis=0), nothing))
     assert math.degrees(found.turn) == pytest.approx(80.0)
     assert found.nearness < 0.05
 

@@ -41,7 +41,7 @@ def test_a_robot_that_was_never_right_has_no_share() -> None:
 
 
 def test_an_estimate_at_the_limits_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("omninav.stages.metrics.tracking_success.WITHIN_DEG", 90.0)
+    monkeypatch.setattr("omninav.stages.metrics.success_rate.WITHIN_DEG", 90.0)
     out = TrackingSuccess().step(Context("tracking_success"), believed([(2.0, 90.0), (2.0, -91.0)]))
     assert out.metrics is not None
     assert out.metrics.values["tracking_success"] == {"after_frames": 0, "right_rate": 0.5}

@@ -34,7 +34,7 @@ Array = npt.NDArray[np.float64]
 SCALE_M = 0.4
 
 
-def watched(
+def rows_of(
     number: int,
     step: float = 0.2,
     turn: float = 0.0,
@@ -42,8 +42,8 @@ def watched(
     correlation: float = 0.9,
     same: int = 0,
     seconds: float = 1.0,
-) -> Watched:
-    """Images of a robot that drives `step` metres and turns by `turn` between two, of which the last are the `same`."""
+) -> Array:
+    """Rows of images of a robot that drives `step` metres and turns by `turn` between two; the last are the `same`."""
     rows = np.full((number, COLUMNS), np.nan)
     rows[:, 0] = seconds * np.arange(number)
     rows[:, 1], rows[:, 2], rows[:, 3] = step * np.arange(number), 0.0, turn * np.arange(number)
@@ -51,7 +51,12 @@ def watched(
     rows[0, 8:10] = math.nan
     if same:
         rows[-same:, 10] = 1.0
-    return Watched(rows)
+    return rows
+
+
+def watched(number: int, **options: Any) -> Watched:
+    """The images of `rows_of`."""
+    return Watched(rows_of(number, **options))
 
 
 def sentence_of_leap(
@@ -64,8 +69,8 @@ def sentence_of_leap(
     side: float = 0.0,
 ) -> str:
     """The warning at an image so long after the last, of a robot that drove on and is so far `off` its way."""
-    before = watched(number, step, seconds=usual_s)
-    recent = InputConflictsState(rows=before.rows, stamp=int(before.times[-1] * 1e9))
+    before = rows_of(number, step, seconds=usual_s)
+    recent = InputConflictsState(rows=before, stamp=int(before[-1, 0] * 1e9))
     tick = Tick(9, recent.stamp + int(after_s * 1e9), 0, 9, False)
     return leap(recent, tick, Pose(step * number + off, side, turn))
 
@@ -103,7 +108,7 @@ def test_a_leap_is_said_with_what_is_more_than_usual_and_how_the_robot_drove() -
     assert said.startswith(
         "the clock leaps by 59 s at image 9, while odometry drives on, 0.20 m, as in the 1.00 s before"
     )
-    recent = InputConflictsState(rows=watched(8).rows, stamp=7 * 10**9)
+    recent = InputConflictsState(rows=rows_of(8), stamp=7 * 10**9)
     tick = Tick(9, 67 * 10**9, 0, 9, False)
     assert leap(recent, tick, AssumedPose(1.6, 0.0, 0.0)) == ""
     assert leap(recent, tick, None) == ""
@@ -164,10 +169,10 @@ def test_turns_that_are_seen_and_not_measured_are_said(given: dict[str, Any], sa
 
 @pytest.mark.parametrize(("to_and_fro", "said"), [(0.208, False), (0.22, True)])
 def test_odometry_that_turns_wildly_and_not_with_the_images_is_in_another_unit(to_and_fro: float, said: bool) -> None:
-    wild = watched(60)
-    wild.rows[1:, 8] = np.where(np.arange(59) < 20, 0.1, 0.0)  # 2 rad, a sixth of 12; 4 pi are 12.6
-    wild.rows[:, 3] = np.cumsum(to_and_fro * (-1.0) ** np.arange(60))
-    found = turned(wild, SCALE_M)
+    wild = rows_of(60)
+    wild[1:, 8] = np.where(np.arange(59) < 20, 0.1, 0.0)  # 2 rad, a sixth of 12; 4 pi are 12.6
+    wild[:, 3] = np.cumsum(to_and_fro * (-1.0) ** np.arange(60))
+    found = turned(Watched(wild), SCALE_M)
     assert bool(found) == said
     if said:
         assert "odometry turns by 744 degrees over 59 images, the images by 115 degrees, and not together" in found
@@ -176,7 +181,7 @@ def test_odometry_that_turns_wildly_and_not_with_the_images_is_in_another_unit(t
 @pytest.mark.parametrize(("correlation", "said"), [(0.98, False), (0.96, True)])
 def test_the_best_match_of_a_standing_robot_goes_back_and_forth(correlation: float, said: bool) -> None:
     going = placed(WINDOW, 0, 2.0)
-    going.rows[1:, 9] = correlation
+    going.correlation[1:] = correlation
     assert bool(tracked(going, SCALE_M)) == said
 
 
@@ -215,7 +220,7 @@ def test_reversed_turns_are_said_and_are_no_delay() -> None:
 
 def placed(number: int, at_estimate: int, scale: float = 1.0, angle: float = 0.0, scattered: bool = False) -> Watched:
     """Best matches of a robot on a winding way, where it is, `scale` times as far or anywhere."""
-    rng, all_of = np.random.default_rng(3), watched(number)
+    rng, rows = np.random.default_rng(3), rows_of(number)
     times = 0.1 * np.arange(number)
     way = np.column_stack([6.0 * np.sin(times), 9.0 * np.sin(0.7 * times), np.zeros(number)])
     ahead = np.gradient(way[:, :2], axis=0)
@@ -223,9 +228,9 @@ def placed(number: int, at_estimate: int, scale: float = 1.0, angle: float = 0.0
     matches = way * (scale, scale, 1.0) + (0.0, 0.0, angle)
     if scattered:
         matches = rng.uniform((-20.0, -20.0, -3.0), (20.0, 20.0, 3.0), (number, 3))
-    all_of.rows[:, 1:4], all_of.rows[:, 4:7] = way, matches
-    all_of.rows[:, 7] = np.arange(number) < at_estimate
-    return all_of
+    rows[:, 1:4], rows[:, 4:7] = way, matches
+    rows[:, 7] = np.arange(number) < at_estimate
+    return Watched(rows)
 
 
 @pytest.mark.parametrize(

@@ -41,16 +41,15 @@ def test_hypotheses_and_map_are_drawn_the_same_every_time(made: TopologicalMappi
 
 
 def test_precision_and_recall_are_shares_of_what_was_accepted_and_of_what_is_right() -> None:
-    accepted, gaps = np.array([True, True, True, False, False]), np.array([0.1, 2.0, 9.0, 1.0, 30.0])
-    found = counted(accepted, gaps, 2.5)
-    right = {"precision": 2 / 3, "recall": 2 / 3}
-    assert found == {"hypotheses": 5, "accepted": 3, "rejected": 2, "wrong": 1} | right
-    assert counted(accepted, None, 2.5)["recall"] is None
-    assert counted(accepted[:0], gaps[:0], 2.5)["precision"] is None
+    accepted, right = np.array([True, True, True, False, False]), np.array([True, True, False, True, False])
+    shares = {"precision": 2 / 3, "recall": 2 / 3}
+    assert counted(accepted, right) == {"hypotheses": 5, "accepted": 3, "rejected": 2, "wrong": 1} | shares
+    assert counted(accepted, None)["recall"] is None
+    assert counted(accepted[:0], right[:0])["precision"] is None
 
 
 def test_what_another_threshold_of_support_would_accept_is_told() -> None:
-    found = at_supports(np.array([0.9, 0.62, 0.3]), np.array([1.0, 9.0, 2.0]), 2.5)
+    found = at_supports(np.array([0.9, 0.62, 0.3]), np.array([True, False, True]))
     at = {support: k for k, support in enumerate(found["support"])}
     assert [found["accepted"][at[s]] for s in (0.05, 0.3, 0.6, 0.65, 0.95)] == [3, 2, 2, 1, 0]
     assert [found["wrong"][at[s]] for s in (0.05, 0.65)] == [1, 0]
