@@ -20,7 +20,7 @@ HELP = (ROOT / "conf" / "help.txt").read_text(encoding="utf-8")
 TOOLS = [f"{one} {other}" for one, other in re.findall(r"^  (camera|map) (\w+)", HELP, re.MULTILINE)]
 
 
-@pytest.mark.parametrize("words", [*COMMANDS, *learnable(), *TOOLS])
+@pytest.mark.parametrize("words", sorted({*COMMANDS, *learnable(), *tools()}))
 def test_every_command_explains_itself(words, capsys):
     main([*words.split(), "--help"])
     told = capsys.readouterr().out

@@ -21,7 +21,7 @@ from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
-NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate", "explain", "video"}
+NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate"}
 """Commands that compose no configuration."""
 OWN = {"experiment", "profile", "runs", "cache"}
 """What is typed for an experiment and not for its conditions."""
@@ -61,9 +61,10 @@ def command_composes(line: str) -> None:
         return
     if words[:1] and words[0] in learnable() and not any(word.isidentifier() for word in words[1:2]):
         words[0] = f"learn={words[0]}"
-    tool = command if command in tools() and not is_live(words) else " ".join(words[:2])
-    if tool in tools():
-        arguments = words if tool == command else words[2:]
+    typed = [command, *words] if command and not is_live(words) else words
+    tool = next((one for one in (" ".join(typed[:1]), " ".join(typed[:2])) if one in tools()), None)
+    if tool is not None:
+        arguments = typed[len(tool.split()) :]
         if arguments:  # else a page speaks of it
             tool_from(tool_class(tool), arguments)
         return
