@@ -7,11 +7,9 @@ loop that it follows from, drew random numbers.
 """
 
 import shutil
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
@@ -158,17 +156,8 @@ def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None
         return
     sequence = engine.sequences[SEQUENCE]
     sequence.flush()
-    names = sorted(lineage(engine.graph, prefix.nodes))
-    with cache.unless_full():
-        _keep(
-            prefix, cache, engine.options.seed, sequence.path, {name: engine.calls[name].ctx.notes() for name in names}
-        )
-
-
-def _keep(
-    prefix: CachedPrefix, cache: Cache, seed: int, sequence: Path, notes: Mapping[str, Mapping[str, Any]]
-) -> None:
+    notes = {name: engine.calls[name].ctx.notes() for name in sorted(lineage(engine.graph, prefix.nodes))}
     drew = any(note["drew"] for note in notes.values())
-    key = seeded(prefix.key, seed) if drew else prefix.key
-    with cache.keep(key, ".prefix", dict(notes)) as part:
-        shutil.copyfile(sequence, part)
+    key = seeded(prefix.key, engine.options.seed) if drew else prefix.key
+    with cache.unless_full(), cache.keep(key, ".prefix", notes) as part:
+        shutil.copyfile(sequence.path, part)
