@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -23,10 +22,9 @@ from omninav.pipeline.run.artifact_specification import ArtifactSpecification, r
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
-from .composition_cache import compose
 from .config_groups import config_file, listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
-from .overrides import invalid_overrides, with_unlisted_parameters
+from .overrides import composed_of
 from .stand_ins import contradictions, take_stand_ins
 from .words import read_flags
 
@@ -64,11 +62,7 @@ def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
     if offer:
         offer_plugins()
     with hydra_started(folders):
-        try:
-            config = compose(with_unlisted_parameters(words, folders))
-        except HydraException as error:
-            raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
-        yield config
+        yield composed_of(words, folders)
 
 
 def offer_plugins() -> None:
@@ -174,12 +168,11 @@ def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
 def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> tuple[dict[str, Any], set[str]]:
     """The graph that makes an artifact, and the settings that it reads."""
     spec = specs[name]
-    words = words_of_graph(str(config.variant), spec.choices or {})
     try:
-        other = compose(words)
-    except HydraException as error:
-        problems = invalid_overrides(words, (), str(error))
-        raise ProblemsFound([Problem(f"artifacts.{name}.choices", p.what, p.hint) for p in problems]) from None
+        other = composed_of(words_of_graph(str(config.variant), spec.choices or {}))
+    except ProblemsFound as found:
+        where = f"artifacts.{name}.choices"
+        raise ProblemsFound(Problem(where, problem.what, problem.hint) for problem in found.problems) from None
     OmegaConf.set_struct(other, False)
     given: Any = OmegaConf.to_container(config, resolve=False)
     own: Any = OmegaConf.to_container(other, resolve=False)
