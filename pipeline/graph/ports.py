@@ -87,8 +87,7 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
                 raise _unfit(value, expected, where) from None  # so that the bounds are named too
             raise
         for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
-            broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
-            if broken:
+            if isinstance(converted, int | float) and bounds.violated_by(converted):
                 raise _Unfit([Problem(where, f"{cut(converted)} is out of bounds, expected {type_name(expected)}")])
         return converted
     if origin is Literal:
