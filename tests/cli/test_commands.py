@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from omninav.pipeline.cli.commands.tool import tool_from
 from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.main import COMMANDS, main
-from omninav.pipeline.cli.tool_words import tool_from
 from omninav.pipeline.cli.tools import tool_class, tools
 from omninav.pipeline.graph.parameters import read_parameters
 
