@@ -79,21 +79,12 @@ def frontier_of(graph: Graph, nodes: frozenset[str], wanted: Collection[str] = (
 
 
 def _draws_on_artifacts(graph: Graph, name: str) -> bool:
-    return any(
-        wire.from_node == ARTIFACTS or _draws_on_artifacts(graph, wire.from_node) for wire in graph.inputs_of(name)
-    )
+    return any(wire.from_node == ARTIFACTS for wire in graph.leading_to([name]).wires)
 
 
 def lineage(graph: Graph, nodes: frozenset[str]) -> frozenset[str]:
     """The nodes of a prefix and those before the loop that they follow from."""
-    before = {node.name for node in graph.of_lifetime("before")}
-    closure, waiting = set(nodes), list(nodes)
-    while waiting:
-        for wire in graph.inputs_of(waiting.pop()):
-            if wire.from_node in before and wire.from_node not in closure:
-                closure.add(wire.from_node)
-                waiting.append(wire.from_node)
-    return frozenset(closure)
+    return frozenset(graph.leading_to(nodes).nodes)
 
 
 def following(graph: Graph, names: Collection[str]) -> frozenset[str]:
