@@ -28,11 +28,11 @@ SEQUENCE = "prefix"
 class CachedPrefix:
     """The prefix of a graph and its place in the cache. `replay` is None where it is still to be computed."""
 
-    nodes: frozenset[str]
-    frontier: tuple[str, ...]
-    key: str
-    """Cache key; '' where it is too large to be kept."""
-    reason: str
+    nodes: frozenset[str] = frozenset()
+    frontier: tuple[str, ...] = ()
+    key: str = ""
+    """Cache key; '' where there is nothing to keep, or too much."""
+    reason: str = "not cached: nothing in this graph follows from its log alone"
     """Why it was found, or why not."""
     replay: PrefixReplay | None = None
 
@@ -104,16 +104,14 @@ def prefix_key(graph: Graph, nodes: frozenset[str]) -> str:
 
 
 @contextmanager
-def cached_prefix(
-    graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()
-) -> Iterator[CachedPrefix | None]:
-    """The prefix of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile.
+def cached_prefix(graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()) -> Iterator[CachedPrefix]:
+    """The prefix of a graph, found in the cache or to be recorded, without nodes where there is none to keep.
 
-    `wanted`: outputs that are wanted of the graph's run.
+    Others who want the same one wait meanwhile. `wanted`: outputs that are wanted of the graph's run.
     """
     nodes = prefix_nodes(graph)
     if cache is None or not nodes or graph.source is None:
-        yield None
+        yield CachedPrefix()
         return
     frontier = tuple(frontier_of(graph, nodes, wanted))
     bulky = next((origin for origin in frontier if graph.is_marked(origin, "bulky")), None)
@@ -141,9 +139,9 @@ def _found(cache: Cache, key: str, nodes: frozenset[str]) -> PrefixReplay | None
     return None if found is None else PrefixReplay(nodes, DiskSequence(found[0], append=False), found[1], {})
 
 
-def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None) -> None:
+def keep_prefix(engine: Engine, prefix: CachedPrefix, cache: Cache | None) -> None:
     """Put the prefix that an engine has recorded into the cache, where it was not found there."""
-    if cache is None or prefix is None or not prefix.recorded():
+    if cache is None or not prefix.recorded():
         return
     sequence = engine.sequences[SEQUENCE]
     sequence.flush()

@@ -163,8 +163,7 @@ def _make(
     memory = execution.run.memory / artifact.name
     options = execution.options(artifact.variant, memory, identity(graph, execution.seed))
     with cached_prefix(graph, execution.cache, execution.seed, origins) as prefix:
-        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
-        engine = Engine(graph, {}, options, wanted=origins, replay=replay, recorded=recorded)
+        engine = Engine(graph, {}, options, wanted=origins, replay=prefix.replay, recorded=prefix.recorded())
         values = engine.run()
         keep_prefix(engine, prefix, execution.cache)
     if not isinstance(values[artifact.origin], Value):

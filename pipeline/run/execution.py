@@ -86,9 +86,9 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
     options = execution.options(planned.variant, run.memory, own, run.folder)
     wanted = sorted(set(planned.saves.values()))
     with cached_prefix(planned.graph, cache, planned.seed, {*wanted, *planned.record}) as prefix:
-        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+        graph, recorded = planned.graph, prefix.recorded()
         engine = Engine(
-            planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded, kept=planned.record
+            graph, artifacts, options, wanted=wanted, replay=prefix.replay, recorded=recorded, kept=planned.record
         )
         try:
             with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, planned.seed):
@@ -110,8 +110,7 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
         with whole_file(run.folder / recorded_name(origin)) as part:
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)
-    none = "not cached: nothing in this graph follows from its log alone"
-    _finish(run, engine, prefix.reason if prefix is not None else none)
+    _finish(run, engine, prefix.reason)
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
