@@ -140,11 +140,9 @@ def _load(module_name: str) -> ModuleType:
             return importlib.import_module(module_name)
         with _here_on_the_path():
             return importlib.import_module(module_name)
-    except UnknownStage:
+    except (UnknownStage, KeyboardInterrupt):
         raise
     except BaseException as error:  # a plugin may raise anything while it is imported
-        if isinstance(error, KeyboardInterrupt):
-            raise
         raise UnknownStage(f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from None
 
 
