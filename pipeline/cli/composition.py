@@ -197,9 +197,8 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
             for node, change in changes.items():
                 block[node] = OmegaConf.merge(block.get(node) or {}, change)
     graph = {key: OmegaConf.to_container(other[key], resolve=True) for key in ("nodes", "wires", "artifacts", "saves")}
-    made = dict(
-        without_absent(_without_unset(_without_taken_out(graph)))
-    )  # what makes an artifact begins without those it can do without
+    # What makes an artifact begins without those it can do without.
+    made = dict(without_absent(_without_unset(_without_taken_out(graph))))
     if absent:
         made["nodes"] = dict(sorted(made["nodes"].items(), key=lambda item: _place_in_groups(item[0])))
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}, settings_read(other)

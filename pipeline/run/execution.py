@@ -142,10 +142,7 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
     }
     for kind, entry in notes["dropped"].items():
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
-    graph_svg, config_yaml = (
-        (run.folder / "graph.svg").read_text(encoding="utf-8"),
-        (run.folder / CONFIG).read_text(encoding="utf-8"),
-    )
+    graph_svg, config_yaml = ((run.folder / name).read_text(encoding="utf-8") for name in ("graph.svg", CONFIG))
     done = {**run.manifest, "status": "complete"}
     write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph, run.shown_as)
     run.manifest = done | {"files": _digests(run.folder)}

@@ -73,9 +73,8 @@ def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[
             ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
             show_sweep(Path(page).parent)
-            optimum = (
-                Path(page).parent / "optimization_results.yaml"
-            )  # by Hydra's sweepers for Optuna, Ax and Nevergrad
+            # By Hydra's sweepers for Optuna, Ax and Nevergrad.
+            optimum = Path(page).parent / "optimization_results.yaml"
             if optimum.is_file():
                 print(f"optimum: {shown(optimum)}\n{optimum.read_text(encoding='utf-8').strip()}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)
