@@ -90,7 +90,9 @@ def complete(config: Any) -> dict[str, Any]:
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
         read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
-        problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
+        of_run = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
+        problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain)]
+        problems += convert_fields(of_run, RunSettings, "")[1]
         problems += [*contradictions(config), *_unknown_settings(config, read)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
@@ -158,11 +160,6 @@ class RunSettings:
     cache: str | None
     checkpoint_s: Annotated[float, Bounds(ge=0, le=1e6)]
     validate: bool
-
-
-def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
-    settings = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
-    return convert_fields(settings, RunSettings, "")[1]
 
 
 def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> tuple[dict[str, Any], set[str]]:
