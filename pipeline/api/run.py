@@ -11,7 +11,6 @@ from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.problems import BadInput, suggest
-from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.key_figures import key_figures
@@ -75,7 +74,7 @@ class Run:
     @property
     def metrics(self) -> Figures:
         """Its figures; `metrics["some_error_m.median"]`."""
-        return Figures(self._described().values)
+        return Figures(read_metrics(self.folder).values)
 
     @property
     def frames(self) -> Any:
@@ -122,9 +121,6 @@ class Run:
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(path.stem for path in self.folder.glob("*.omap"))]
 
-    def _described(self) -> Metrics:
-        return read_metrics(self.folder)
-
     def _file(self, name: str) -> Path:
         file = self.folder / name
         if not file.is_file():
@@ -142,18 +138,19 @@ class Run:
         from rich.console import Console
 
         text = io.StringIO()
-        Console(file=text, width=100, force_jupyter=False).print(key_table(self._described(), read_timing(self.folder)))
+        Console(file=text, width=100, force_jupyter=False).print(
+            key_table(read_metrics(self.folder), read_timing(self.folder))
+        )
         return text.getvalue()
 
     def _repr_html_(self) -> str:
-        head = (
-            f"<p><b>{escape(self.folder.name)}</b> {escape(self.status)}, <code>{escape(str(self.folder))}</code></p>"
-        )
+        name, folder = escape(self.folder.name), escape(str(self.folder))
+        head = f"<p><b>{name}</b> {escape(self.status)}, <code>{folder}</code></p>"
         if not (self.folder / "metrics.json").is_file():
             return head
         rows = (
             f'<tr><td style="text-align:left">{escape(figure.name)}</td><td>{escape(figure.text)}</td></tr>'
-            for figure in key_figures(self._described(), read_timing(self.folder))
+            for figure in key_figures(read_metrics(self.folder), read_timing(self.folder))
         )
         return f"{head}<table>{''.join(rows)}</table>"
 

@@ -7,7 +7,6 @@ over a log of its own; where the artifact is made on the way, `composition` comp
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.parameters import BadStage
@@ -15,6 +14,7 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import signature
 
+from .composition_cache import parsed
 from .config_groups import LEARN, node_option, option_content
 from .words import word_of
 
@@ -38,8 +38,7 @@ def learned(words: Sequence[str]) -> str | None:
 
 def words_of_variant(words: Sequence[str], groups: Collection[str]) -> list[str]:
     """Those of the words that choose one option, but for `learn`: what they give says how the artifact is made."""
-    parsed = OverridesParser.create().parse_overrides([*words])
-    one = [word for word in parsed if word.key_or_group in groups and not word.is_sweep_override()]
+    one = [word for word in parsed(words) if word.key_or_group in groups and not word.is_sweep_override()]
     return [str(word.input_line) for word in one if word.key_or_group != LEARN]
 
 
@@ -61,7 +60,8 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
         if other is not None and other.get("together_with") == name and {*MAKING} & {*other}
     }
     specs = (spec, *beside.values())
-    typed = [(key, text) for key, text in _keyed(words) if not _makes_artifact(key, text)]
+    keyed = [(word.key_or_group, str(word.input_line)) for word in parsed(words)]
+    typed = [(key, text) for key, text in keyed if not _makes_artifact(key, text)]
     set_by_hand = {key for key, _ in typed} - {"variant"}
     swapped = {key: node_option(key, text.partition("=")[2]) for key, text in typed}
     chosen = variant.hydra.runtime.choices
@@ -71,7 +71,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
     groups = words_of_graph(str(variant.variant), {**options, **spec["choices"]})
     return [
         *(word for word in groups if word.lstrip("+~").partition("=")[0] not in set_by_hand),
-        *(f"++nodes.{name}={_value(node)}" for name, node in shared.items()),
+        *(f"++nodes.{name}={word_of(OmegaConf.to_container(node, resolve=False))}" for name, node in shared.items()),
         *(change for each in specs for change in _changes(name, each, swapped)),
         *(f"++saves.{key}={each['output']}" for key, each in {name: spec, **beside}.items() if each.get("output")),
         *(text for key, text in typed if key not in (LEARN, "variant")),
@@ -90,15 +90,6 @@ def _changes(name: str, spec: Mapping[str, Any], swapped: Mapping[str, Any]) -> 
         for node, change in (spec.get(block) or {}).items():
             if block == "wires" or not unfit_changes(name, {node: change}, swapped):
                 yield f"++{block}.{node}={word_of(change)}"
-
-
-def _keyed(words: Sequence[str]) -> list[tuple[str, str]]:
-    parsed = OverridesParser.create().parse_overrides([*words])
-    return [(word.key_or_group, str(word.input_line)) for word in parsed]
-
-
-def _value(node: Any) -> str:
-    return word_of(OmegaConf.to_container(node, resolve=False))
 
 
 def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any]) -> list[Problem]:

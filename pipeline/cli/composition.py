@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -23,10 +22,9 @@ from omninav.pipeline.run.artifact_specification import ArtifactSpecification, r
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
-from .composition_cache import compose
 from .config_groups import config_file, listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
-from .overrides import invalid_overrides, with_unlisted_parameters
+from .overrides import composed_of
 from .stand_ins import contradictions, take_stand_ins
 from .words import read_flags
 
@@ -64,11 +62,7 @@ def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
     if offer:
         offer_plugins()
     with hydra_started(folders):
-        try:
-            config = compose(with_unlisted_parameters(words, folders))
-        except HydraException as error:
-            raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
-        yield config
+        yield composed_of(words, folders)
 
 
 def offer_plugins() -> None:
@@ -96,7 +90,9 @@ def complete(config: Any) -> dict[str, Any]:
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
         read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
-        problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
+        of_run = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
+        problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain)]
+        problems += convert_fields(of_run, RunSettings, "")[1]
         problems += [*contradictions(config), *_unknown_settings(config, read)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
@@ -166,20 +162,14 @@ class RunSettings:
     validate: bool
 
 
-def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
-    settings = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
-    return convert_fields(settings, RunSettings, "")[1]
-
-
 def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> tuple[dict[str, Any], set[str]]:
     """The graph that makes an artifact, and the settings that it reads."""
     spec = specs[name]
-    words = words_of_graph(str(config.variant), spec.choices or {})
     try:
-        other = compose(words)
-    except HydraException as error:
-        problems = invalid_overrides(words, (), str(error))
-        raise ProblemsFound([Problem(f"artifacts.{name}.choices", p.what, p.hint) for p in problems]) from None
+        other = composed_of(words_of_graph(str(config.variant), spec.choices or {}))
+    except ProblemsFound as found:
+        where = f"artifacts.{name}.choices"
+        raise ProblemsFound(Problem(where, problem.what, problem.hint) for problem in found.problems) from None
     OmegaConf.set_struct(other, False)
     given: Any = OmegaConf.to_container(config, resolve=False)
     own: Any = OmegaConf.to_container(other, resolve=False)
@@ -204,9 +194,8 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
             for node, change in changes.items():
                 block[node] = OmegaConf.merge(block.get(node) or {}, change)
     graph = {key: OmegaConf.to_container(other[key], resolve=True) for key in ("nodes", "wires", "artifacts", "saves")}
-    made = dict(
-        without_absent(_without_unset(_without_taken_out(graph)))
-    )  # what makes an artifact begins without those it can do without
+    # What makes an artifact begins without those it can do without.
+    made = dict(without_absent(_without_unset(_without_taken_out(graph))))
     if absent:
         made["nodes"] = dict(sorted(made["nodes"].items(), key=lambda item: _place_in_groups(item[0])))
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}, settings_read(other)

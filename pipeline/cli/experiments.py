@@ -16,13 +16,13 @@ from omninav.pipeline.experiment.result import ExperimentResult, read_result, re
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
 from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
 from omninav.pipeline.experiment.verdicts import Verdict
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound, counted
+from omninav.pipeline.graph.problems import BadInput, counted
 
 from .composition import complete, read_words
 from .composition_cache import compose
 from .config_groups import config_file, listed_groups
 from .hydra_session import hydra_started
-from .overrides import invalid_overrides, with_unlisted_parameters
+from .overrides import composed_of
 from .terminal import show, shown
 from .words import condition_words
 
@@ -98,12 +98,9 @@ def without_graph(words: Sequence[str], config_dirs: Sequence[str] = ()) -> Any:
     """The configuration of an experiment, without a variant's graph where it can be: that takes half of the time."""
     options = (item for item in config_file()["defaults"] if isinstance(item, dict))
     chosen = (name for option in options for name, value in option.items() if value and name in listed_groups())
-    try:
-        with suppress(HydraException):
-            return compose([*(f"~{name}" for name in chosen if name != "engine"), *words])
-        return compose(words)
-    except HydraException as error:
-        raise ProblemsFound(invalid_overrides(words, list(config_dirs), str(error))) from None
+    with suppress(HydraException):
+        return compose([*(f"~{name}" for name in chosen if name != "engine"), *words])
+    return composed_of(words, config_dirs)
 
 
 def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
@@ -112,11 +109,7 @@ def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     typed, folders = read_words(arguments)
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
-        try:
-            config = compose(with_unlisted_parameters(words, folders))
-        except HydraException as error:
-            raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
-        return complete(config)
+        return complete(composed_of(words, folders))
 
     words = [*condition_words(typed), f"cache={plain['cache'] or 'null'}"]
     return plan_experiment(plain, composed, words, ["omninav", *arguments])

@@ -25,10 +25,6 @@ def help_text(words: Sequence[str]) -> str:
     tool = " ".join(named[:2])
     of_group = [one for one in tools() if named and one.startswith(f"{named[0]} ")]
     if tool not in of_group and named and named[0] in texts:
-        found.append(re.sub(r"\{group:(\w+)\}", lambda match: _options(match[1]), texts[named[0]]))
+        found.append(re.sub(r"\{group:(\w+)\}", lambda match: ", ".join(group_options(match[1])), texts[named[0]]))
     found += map(tool_help, [tool] if tool in of_group else of_group)
     return "\n".join(found) or texts["omninav"]
-
-
-def _options(group: str) -> str:
-    return ", ".join(group_options(group))

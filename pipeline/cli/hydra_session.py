@@ -15,7 +15,6 @@ from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.plugins import Plugins
-from hydra.plugins.config_source import ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
 from omegaconf import MISSING, OmegaConf, open_dict
@@ -110,11 +109,14 @@ class _SearchPath(SearchPathPlugin):
             search_path.append("command-line", f"{CheckedFolder.scheme()}://{folder}")
 
 
-class CheckedLoader(ConfigLoader):
+class CheckedLoader:
     """Hydra's loader, which refuses whatever stands under `hydra.` beyond folders of jobs, launcher and sweeper."""
 
     def __init__(self, hydras: ConfigLoader) -> None:
         self._hydras = hydras
+        self.get_search_path, self.get_sources = hydras.get_search_path, hydras.get_sources
+        self.list_groups, self.get_group_options = hydras.list_groups, hydras.get_group_options
+        self.compute_defaults_list = hydras.compute_defaults_list
         self._kept: dict[tuple[str, ...], bytes] = {}
         self._own: Any = None
 
@@ -182,26 +184,6 @@ class CheckedLoader(ConfigLoader):
         problems = list(_foreign(config.hydra, self._own))
         if problems:
             raise ProblemsFound(dict.fromkeys(problems))
-
-    def get_search_path(self) -> ConfigSearchPath:
-        """As Hydra's."""
-        return self._hydras.get_search_path()
-
-    def get_sources(self) -> list[ConfigSource]:
-        """As Hydra's."""
-        return self._hydras.get_sources()
-
-    def list_groups(self, parent_name: str) -> list[str]:
-        """As Hydra's."""
-        return self._hydras.list_groups(parent_name)
-
-    def get_group_options(self, *args: Any, **kwargs: Any) -> list[str]:
-        """As Hydra's."""
-        return self._hydras.get_group_options(*args, **kwargs)
-
-    def compute_defaults_list(self, *args: Any, **kwargs: Any) -> Any:
-        """As Hydra's."""
-        return self._hydras.compute_defaults_list(*args, **kwargs)
 
 
 def _name(config: Any, variant: str, words: Sequence[str]) -> None:

@@ -59,29 +59,19 @@ class JobEnd:
     """Its number in the sweep."""
 
 
-def run_job(
-    config: Any,
-    arguments: Sequence[str],
-    run_experiment: Callable[[Any, Sequence[str]], int],
-    check: Callable[[Mapping[str, Any]], Plan] = plan,
-) -> float | None:
+def run_job(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> float | None:
     """Run what a configuration describes, say how it ended, and return its objective, if one is named (see `_run`).
 
     In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
     as a failed trial (NaN would end the whole sweep).
     """
-    end = ended(config, arguments, run_experiment, check)
+    end = ended(config, arguments, check)
     report_end(end)
     leave_outcome(end, write_page(Path(end.sweep)) if end.sweep else None)
     return end.objective
 
 
-def ended(
-    config: Any,
-    arguments: Sequence[str],
-    run_experiment: Callable[[Any, Sequence[str]], int],
-    check: Callable[[Mapping[str, Any]], Plan] = plan,
-) -> JobEnd:
+def ended(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> JobEnd:
     """Run what a configuration describes. How that ended stands in the manifest of a sweep's job by then."""
     sweep, folder = _sweep_job(), _folder()
     of_experiment = config.get("experiment") is not None
@@ -90,6 +80,8 @@ def ended(
         if of_experiment and sweep is not None:
             raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
         if of_experiment:
+            from .experiments import run_experiment  # with pages and plots, which no other job needs
+
             code = run_experiment(config, arguments)
         else:
             objective = _run(config, sweep, folder, check)

@@ -21,17 +21,14 @@ COMMANDS = (
     "simulate",
     "live",
     "report",
-    "explain",
-    "video",
     "compare",
     "resume",
     "experiments",
-    "data",
     "doctor",
 )
-"""Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
+"""Each is the function `command` of its module in `commands`; all else is a tool, or runs a variant or experiment."""
 
-WITHOUT_CONFIGURATION = ("stages", "report", "explain", "video", "compare", "resume", "experiments", "data", "doctor")
+WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "experiments", "doctor")
 """Those that compose none, and have no use for flags of it."""
 
 
@@ -70,7 +67,7 @@ def _run(arguments: list[str]) -> int:
     os.environ["PYTHONSAFEPATH"] = "1"  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
-    elif " ".join(arguments[:2]) in tools():
+    elif {*arguments[:1], " ".join(arguments[:2])} & {*tools()}:
         name = "tool"
     elif arguments[:1] and arguments[0] in learnable() and not any(word.isidentifier() for word in arguments[1:2]):
         name, arguments = "run", [f"{LEARN}={arguments[0]}", *arguments[1:]]

@@ -19,7 +19,7 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.parameters import BadStage
-from omninav.pipeline.graph.problems import BadInput, Problem, shown, suggest
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import signature
 
@@ -57,6 +57,14 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     if not problems and message.startswith(("Ambiguous value", "Sweep parameters")):
         problems = [_several_values(word) for word in parsed if word.is_sweep_override()]
     return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
+
+
+def composed_of(words: Sequence[str], folders: Sequence[str] = ()) -> Any:
+    """The configuration that words describe. Raises `ProblemsFound` with every word that does not fit."""
+    try:
+        return compose(with_unlisted_parameters(words, folders))
+    except HydraException as error:
+        raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
 
 
 def _several_values(word: Override) -> Problem:

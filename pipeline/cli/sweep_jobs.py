@@ -9,7 +9,6 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import OmegaConf, open_dict, read_write
 
-from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.jobs.executors import read_engine
 from omninav.pipeline.jobs.job import Job, Outcome, Send
 from omninav.pipeline.jobs.run import Workers
@@ -95,8 +94,4 @@ def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
         with read_write(config), open_dict(config):
             del config["hydra"]
         (Path(given["sweep"]) / LOGS / f"{given['number']}.folder").write_text(str(folder), encoding="utf-8")
-        return asdict(ended(config, [], _no_experiment))
-
-
-def _no_experiment(config: Any, arguments: Sequence[str]) -> int:
-    raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
+        return asdict(ended(config, []))

@@ -253,9 +253,7 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
             raise BadInput(f"{path}: {unfit}; make it again") from None
         except BadInput:
             raise
-        except (
-            Exception
-        ) as error:  # a sum that is right says nothing of the content: it raises whatever it makes readers raise
+        except Exception as error:  # a sum that is right says nothing of what the content makes readers raise
             said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
             raise BadInput(f"{path}: no sound artifact ({said:.160}); make it again") from None
 

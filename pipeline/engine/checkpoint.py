@@ -58,19 +58,12 @@ def save(path: Path, checkpoint: Checkpoint, rows: GrownRows) -> None:
 
     content = {
         "format": FORMAT,
-        "identity": checkpoint.identity,
-        "ticks": checkpoint.ticks,
-        "ended": checkpoint.ended,
-        "replayed": checkpoint.replayed,
+        **vars(checkpoint),
         "channels": {
             key: [number(value, key.partition("@")[0]) for value in values]
             for key, values in checkpoint.channels.items()
         },
         "held": {key: number(value, key) for key, value in checkpoint.held.items()},
-        "states": checkpoint.states,
-        "generators": checkpoint.generators,
-        "notes": checkpoint.notes,
-        "sequences": checkpoint.sequences,
         "objects": objects,
         "grown": grown,
     }

@@ -7,11 +7,9 @@ loop that it follows from, drew random numbers.
 """
 
 import shutil
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
@@ -30,11 +28,11 @@ SEQUENCE = "prefix"
 class CachedPrefix:
     """The prefix of a graph and its place in the cache. `replay` is None where it is still to be computed."""
 
-    nodes: frozenset[str]
-    frontier: tuple[str, ...]
-    key: str
-    """Cache key; '' where it is too large to be kept."""
-    reason: str
+    nodes: frozenset[str] = frozenset()
+    frontier: tuple[str, ...] = ()
+    key: str = ""
+    """Cache key; '' where there is nothing to keep, or too much."""
+    reason: str = "not cached: nothing in this graph follows from its log alone"
     """Why it was found, or why not."""
     replay: PrefixReplay | None = None
 
@@ -81,21 +79,12 @@ def frontier_of(graph: Graph, nodes: frozenset[str], wanted: Collection[str] = (
 
 
 def _draws_on_artifacts(graph: Graph, name: str) -> bool:
-    return any(
-        wire.from_node == ARTIFACTS or _draws_on_artifacts(graph, wire.from_node) for wire in graph.inputs_of(name)
-    )
+    return any(wire.from_node == ARTIFACTS for wire in graph.leading_to([name]).wires)
 
 
 def lineage(graph: Graph, nodes: frozenset[str]) -> frozenset[str]:
     """The nodes of a prefix and those before the loop that they follow from."""
-    before = {node.name for node in graph.of_lifetime("before")}
-    closure, waiting = set(nodes), list(nodes)
-    while waiting:
-        for wire in graph.inputs_of(waiting.pop()):
-            if wire.from_node in before and wire.from_node not in closure:
-                closure.add(wire.from_node)
-                waiting.append(wire.from_node)
-    return frozenset(closure)
+    return frozenset(graph.leading_to(nodes).nodes)
 
 
 def following(graph: Graph, names: Collection[str]) -> frozenset[str]:
@@ -115,16 +104,14 @@ def prefix_key(graph: Graph, nodes: frozenset[str]) -> str:
 
 
 @contextmanager
-def cached_prefix(
-    graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()
-) -> Iterator[CachedPrefix | None]:
-    """The prefix of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile.
+def cached_prefix(graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()) -> Iterator[CachedPrefix]:
+    """The prefix of a graph, found in the cache or to be recorded, without nodes where there is none to keep.
 
-    `wanted`: outputs that are wanted of the graph's run.
+    Others who want the same one wait meanwhile. `wanted`: outputs that are wanted of the graph's run.
     """
     nodes = prefix_nodes(graph)
     if cache is None or not nodes or graph.source is None:
-        yield None
+        yield CachedPrefix()
         return
     frontier = tuple(frontier_of(graph, nodes, wanted))
     bulky = next((origin for origin in frontier if graph.is_marked(origin, "bulky")), None)
@@ -152,23 +139,14 @@ def _found(cache: Cache, key: str, nodes: frozenset[str]) -> PrefixReplay | None
     return None if found is None else PrefixReplay(nodes, DiskSequence(found[0], append=False), found[1], {})
 
 
-def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None) -> None:
+def keep_prefix(engine: Engine, prefix: CachedPrefix, cache: Cache | None) -> None:
     """Put the prefix that an engine has recorded into the cache, where it was not found there."""
-    if cache is None or prefix is None or not prefix.recorded():
+    if cache is None or not prefix.recorded():
         return
     sequence = engine.sequences[SEQUENCE]
     sequence.flush()
-    names = sorted(lineage(engine.graph, prefix.nodes))
-    with cache.unless_full():
-        _keep(
-            prefix, cache, engine.options.seed, sequence.path, {name: engine.calls[name].ctx.notes() for name in names}
-        )
-
-
-def _keep(
-    prefix: CachedPrefix, cache: Cache, seed: int, sequence: Path, notes: Mapping[str, Mapping[str, Any]]
-) -> None:
+    notes = {name: engine.calls[name].ctx.notes() for name in sorted(lineage(engine.graph, prefix.nodes))}
     drew = any(note["drew"] for note in notes.values())
-    key = seeded(prefix.key, seed) if drew else prefix.key
-    with cache.keep(key, ".prefix", dict(notes)) as part:
-        shutil.copyfile(sequence, part)
+    key = seeded(prefix.key, engine.options.seed) if drew else prefix.key
+    with cache.unless_full(), cache.keep(key, ".prefix", notes) as part:
+        shutil.copyfile(sequence.path, part)

@@ -5,6 +5,7 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,44 +63,27 @@ class ConditionRun:
 
 def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[ConditionRun]:
     """A run for each condition in each scenario. `overrides`: what was typed after the experiment's name."""
-    number = experiment.repetitions
+    run, number = partial(_run, experiment, folder, overrides), experiment.repetitions
+    # Each scenario has seeds of its own, so that draws of stages differ, too.
+    seeds = [tuple(range(begin, begin + number)) for begin in range(0, experiment.runs_of_a_condition, number)]
     return [
-        _run(
-            experiment,
-            folder,
-            overrides,
-            condition,
-            scenario,
-            (experiment.set, condition.overrides, own),
-            seeds=tuple(range(index * number, (index + 1) * number)),  # draws of stages differ, too
-        )
+        run(condition, scenario, (experiment.set, condition.overrides, own), seeds=of_scenario)
         for condition in experiment.conditions()
-        for index, (scenario, own) in enumerate(experiment.all_scenarios.items())
+        for of_scenario, (scenario, own) in zip(seeds, experiment.all_scenarios.items(), strict=True)
     ]
 
 
 def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[list[ConditionRun]]:
     """For each sentence of the file about reference runs: a run for each label of its factor in each scenario."""
-    found = []
-    for reference in experiment.reference_runs:
-        labels = experiment.sweep[reference.over].items()
-        conditions = [Condition({reference.over: str(label)}, str(own or "")) for label, own in labels]
-        found.append(
-            [
-                _run(
-                    experiment,
-                    folder,
-                    overrides,
-                    condition,
-                    scenario,
-                    (reference.set, condition.overrides, own),
-                    variant=reference.variant,
-                )
-                for condition in conditions
-                for scenario, own in experiment.all_scenarios.items()
-            ]
-        )
-    return found
+    run = partial(_run, experiment, folder, overrides)
+    return [
+        [
+            run(Condition({each.over: str(label)}, words), scenario, (each.set, words, own), variant=each.variant)
+            for label, words in experiment.sweep[each.over].items()
+            for scenario, own in experiment.all_scenarios.items()
+        ]
+        for each in experiment.reference_runs
+    ]
 
 
 def _run(

@@ -2,59 +2,29 @@
 
 import base64
 import math
-import shlex
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from omninav.pipeline.files import write_whole
-from omninav.pipeline.graph.problems import counted
-from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.report.rendering import render
 
-from .conditions import ConditionRun
 from .intervals import share_interval
 from .plots import PagePlot, plots_of
-from .result import SUFFIX, Cell, ConditionRow, ExperimentResult, figures_of, result_text, rows_of
-from .specification import Claim, Experiment, Measure, figure_of
-from .verdicts import RUNS_SHARE, Case, Results, Verdict, in_words
+from .result import SUFFIX, Cell, ExperimentResult, result_text, rows_of
+from .specification import Claim, Experiment, Measure
+from .verdicts import RUNS_SHARE, Case, Verdict, in_words
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """The CSS class of a verdict."""
 
 
-@dataclass(frozen=True)
-class PageContent:
-    """An experiment as far as it has run."""
-
-    experiment: Experiment
-    profile: str
-    argv: Sequence[str]
-    conditions: Sequence[ConditionRun]
-    references: Sequence[Sequence[ConditionRun]]
-    """The runs of each of the file's `reference_runs`."""
-    recordings: Sequence[tuple[str, Mapping[str, Any]]]
-    """Names of recordings, and what was stated of them."""
-    made_with: str
-    """Version and commit."""
-
-    @property
-    def all_runs(self) -> list[ConditionRun]:
-        """Conditions and reference runs."""
-        return [*self.conditions, *(run for several in self.references for run in several)]
-
-
-def write_page(content: PageContent, results: Results, development: Results, folder: Path) -> Path:
+def write_page(experiment: Experiment, result: ExperimentResult, folder: Path) -> Path:
     """Write `<name>.md`, `<name>.html`, its plots and `<name>.result.json` into the experiment's folder.
 
-    All of it follows from the results as they stand; conditions that failed or are still to run are named. Those of
-    `development` stand in the tables, and nothing else is made of them.
+    All of it follows from the result as it stands; conditions that failed or are still to run are named.
     """
-    experiment = content.experiment
-    result = experiment_result(content, results, development)
     write_whole(folder / f"{experiment.name}{SUFFIX}", result_text(result))
     for file, written in markdown_page(experiment, result).items():
         write_whole(folder / file, written)
@@ -67,44 +37,11 @@ def write_page(content: PageContent, results: Results, development: Results, fol
     return path
 
 
-def experiment_result(content: PageContent, results: Results, development: Results) -> ExperimentResult:
-    """Collects the results of an experiment as far as it has run."""
-    experiment, conditions = content.experiment, content.conditions
-    common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
-    verdicts, cells, curves = figures_of(experiment, results, development)
-    return ExperimentResult(
-        name=experiment.name,
-        command=shlex.join(content.argv),
-        profile=content.profile,
-        made_with=content.made_with,
-        repeated=_repeated(experiment),
-        verdicts=verdicts,
-        cells=cells,
-        curves=curves,
-        reference_runs=tuple(reference_text(content, number) for number in range(len(experiment.reference_runs))),
-        recordings={name: _facts(facts) for name, facts in content.recordings},
-        conditions=tuple(_condition(run, common) for run in conditions),
-        failures={run.name: run.error for run in content.all_runs if run.error},
-        missing=sum(len(run.missing) for run in content.all_runs if not run.error),
-        common_overrides=tuple(common),
-    )
-
-
 def markdown_page(experiment: Experiment, result: ExperimentResult) -> dict[str, str | bytes]:
     """The page as Markdown, and its plots, by the names of their files."""
     plots = plots_of(experiment, result)
     page = render("experiment.md", **_values(experiment, result, plots))
     return {f"{experiment.name}.md": page, **{plot.file: plot.content for plot in plots}}
-
-
-def _repeated(experiment: Experiment) -> str:
-    runs, seeds = experiment.runs_of_a_condition, experiment.repetitions
-    scenarios = experiment.named_scenarios
-    named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
-    several = (
-        f", {seeds} in each of {counted(len(scenarios), 'scenario')} ({', '.join(scenarios)})" if scenarios else ""
-    )
-    return f"{runs} repetitions of each condition with {named}{several}"
 
 
 def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]) -> dict[str, Any]:
@@ -128,13 +65,6 @@ def number(value: float | None, digits: int) -> str:
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.1g}" if 0.0 < abs(value) <= 0.5 * 10.0**-digits else f"{value:.{digits}f}"
-
-
-def made_with(version: str, commit: str | None) -> str:
-    """Version and commit at which a page was made: in 12 digits, and whether it had changes."""
-    known, dirty, _ = (commit or "").partition("-dirty")
-    at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
-    return f"Made with omninav {version}{at}"
 
 
 def summary(measure: Measure, cell: Cell) -> str:
@@ -214,27 +144,6 @@ def figure_table(experiment: Experiment, result: ExperimentResult, name: str) ->
     }
 
 
-def reference_text(content: PageContent, index: int) -> str:
-    """A sentence with the figures of its reference runs."""
-    reference = content.experiment.reference_runs[index]
-    measure = Measure("", (reference.measure,), reference.scale)
-    parts = []
-    for label in content.experiment.labels(reference.over):
-        runs = [run for run in content.references[index] if run.condition.labels[reference.over] == label]
-        found = [figure_of(measure, result) for run in runs for result in run.results.values()]
-        known = [figure for figure in found if figure is not None]
-        parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
-    return reference.text.replace("{}", "; ".join(parts))
-
-
-def _facts(facts: Mapping[str, Any]) -> str:
-    return ", ".join(_in_words(key, value) for key, value in facts.items())
-
-
-def _in_words(name: str, value: Any) -> str:
-    return f"{title(name).lower()} {value} {unit(name)}".rstrip()
-
-
 def _tiles(experiment: Experiment, result: ExperimentResult, verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
     """Tiles: how many claims hold, and how much has run."""
     done, total = (sum(int(row.done.split("/")[part]) for row in result.conditions) for part in (0, 1))
@@ -248,9 +157,3 @@ def _tiles(experiment: Experiment, result: ExperimentResult, verdicts: Sequence[
         {"value": str(done), "of": f"of {total}", "name": "repetitions done"},
         {"value": result.profile, "of": "", "name": "profile"},
     ]
-
-
-def _condition(run: ConditionRun, common: Sequence[str]) -> ConditionRow:
-    first: Mapping[str, Any] = next(iter(run.results.values()), {})
-    own = shlex.join(word for word in run.overrides if word not in common)
-    return ConditionRow(run.name, f"{len(run.results)}/{len(run.seeds)}", first.get("context", {}), own)

@@ -203,10 +203,9 @@ def run_repetition(
         engine.run()
         return engine, None
     with cached_prefix(graph, cache, seed) as prefix:
-        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
         wanted = _recordable(graph, prefix) if record else []
-        recorded = recorded | ({SHARED: wanted} if wanted else {})
-        engine = Engine(graph, artifacts, options, replay=replay, recorded=recorded)
+        recorded = prefix.recorded() | ({SHARED: wanted} if wanted else {})
+        engine = Engine(graph, artifacts, options, replay=prefix.replay, recorded=recorded)
         engine.run()
         keep_prefix(engine, prefix, cache)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
@@ -228,14 +227,14 @@ def _grows(node: Node) -> bool:
     return any(getattr(port.type, "in_place", False) for port in node.signature.outputs.values())
 
 
-def _recordable(graph: Graph, known: CachedPrefix | None) -> list[str]:
+def _recordable(graph: Graph, known: CachedPrefix) -> list[str]:
     """What may have to be shared: all that nodes read of the prefix, but what is too large to keep over a log.
 
     Of the part that comes from the cache there is only its frontier.
     """
     nodes = prefix_nodes(graph, artifacts=True)
-    inside = known.nodes if known is not None and known.replay is not None else frozenset()
+    inside = known.nodes if known.replay is not None else frozenset()
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside} | graph.reported(nodes - inside)
     small = {origin for origin in read if not graph.is_marked(origin, "bulky")}
     tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
-    return sorted(small | tick | set(known.frontier if known is not None and inside else ()))
+    return sorted(small | tick | set(known.frontier if inside else ()))

@@ -2,23 +2,26 @@
 
 import math
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.jobs.executors import EngineSettings, read_engine
 from omninav.pipeline.jobs.job import Job, Outcome
 from omninav.pipeline.jobs.progress import JobProgress
 from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.run.provenance import git_commit
 
 from .conditions import (
@@ -31,10 +34,11 @@ from .conditions import (
     results_by_condition,
     timed_groups,
 )
-from .page import PageContent, made_with, write_page
+from .page import number, write_page
 from .repetition import finished
+from .result import ConditionRow, ExperimentResult, figures_of
 from .shared_inputs import Recording, artifacts_of, recordings_of
-from .specification import FULL, Experiment, read_experiment
+from .specification import FULL, Experiment, Measure, ReferenceRun, figure_of, read_experiment
 from .verdicts import Verdict, judge
 
 STATE = "experiment.json"
@@ -88,12 +92,31 @@ class ExperimentRun:
 
     def write_page(self) -> Path:
         """The page as things stand."""
-        results, beside = results_by_condition(self.conditions), results_by_condition(self.conditions, development=True)
-        recordings = [(each.name, each.facts) for each in self.recordings]
-        page = PageContent(
-            self.experiment, self.profile, self.argv, self.conditions, self.references, recordings, self._made_with()
+        return write_page(self.experiment, self.result(), self.folder)
+
+    def result(self) -> ExperimentResult:
+        """The results as things stand. Those of development stand in the tables, and nothing else is made of them."""
+        experiment, conditions = self.experiment, self.conditions
+        results, beside = results_by_condition(conditions), results_by_condition(conditions, development=True)
+        verdicts, cells, curves = figures_of(experiment, results, beside)
+        common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
+        references = zip(experiment.reference_runs, self.references, strict=True)
+        return ExperimentResult(
+            name=experiment.name,
+            command=shlex.join(self.argv),
+            profile=self.profile,
+            made_with=self._made_with(),
+            repeated=_repeated(experiment),
+            verdicts=verdicts,
+            cells=cells,
+            curves=curves,
+            reference_runs=tuple(reference_text(experiment, reference, runs) for reference, runs in references),
+            recordings={each.name: _facts(each.facts) for each in self.recordings},
+            conditions=tuple(_condition(run, common) for run in conditions),
+            failures={run.name: run.error for run in self.all_runs if run.error},
+            missing=sum(len(run.missing) for run in self.all_runs if not run.error),
+            common_overrides=tuple(common),
         )
-        return write_page(page, results, beside, self.folder)
 
     def _record(self, workers: Workers) -> None:
         self.recordings = recordings_of(self.all_runs, self.folder)
@@ -208,12 +231,46 @@ class ExperimentRun:
         write_json(self.folder / STATE, manifest)
 
     def _made_with(self) -> str:
-        """The version and commit that experiment.json states."""
+        """The version and commit that experiment.json states: in 12 digits, and whether it had changes."""
         try:
             stated = read_json(self.folder / STATE)
         except Damaged:
             return ""
-        return made_with(str(stated["omninav"]), stated.get("git_commit"))
+        known, dirty, _ = (stated.get("git_commit") or "").partition("-dirty")
+        at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
+        return f"Made with omninav {stated['omninav']}{at}"
+
+
+def _repeated(experiment: Experiment) -> str:
+    runs, seeds = experiment.runs_of_a_condition, experiment.repetitions
+    scenarios = experiment.named_scenarios
+    named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
+    several = (
+        f", {seeds} in each of {counted(len(scenarios), 'scenario')} ({', '.join(scenarios)})" if scenarios else ""
+    )
+    return f"{runs} repetitions of each condition with {named}{several}"
+
+
+def reference_text(experiment: Experiment, reference: ReferenceRun, runs: Sequence[ConditionRun]) -> str:
+    """A sentence with the figures of its reference runs."""
+    measure = Measure("", (reference.measure,), reference.scale)
+    parts = []
+    for label in experiment.labels(reference.over):
+        own = [run for run in runs if run.condition.labels[reference.over] == label]
+        found = [figure_of(measure, result) for run in own for result in run.results.values()]
+        known = [figure for figure in found if figure is not None]
+        parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
+    return reference.text.replace("{}", "; ".join(parts))
+
+
+def _facts(facts: Mapping[str, Any]) -> str:
+    return ", ".join(f"{title(name).lower()} {value} {unit(name)}".rstrip() for name, value in facts.items())
+
+
+def _condition(run: ConditionRun, common: Sequence[str]) -> ConditionRow:
+    first: Mapping[str, Any] = next(iter(run.results.values()), {})
+    own = shlex.join(word for word in run.overrides if word not in common)
+    return ConditionRow(run.name, f"{len(run.results)}/{len(run.seeds)}", first.get("context", {}), own)
 
 
 def plan_experiment(

@@ -199,17 +199,13 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
 
 def make_artifact(given: Mapping[str, Any], send: Send) -> None:
     """Make an artifact, as a job: the one called `name` of the plain configuration `config`, into `folder`."""
-    with locked(Path(given["folder"]).with_suffix(".lock")):  # a job whose experiment was killed lives on for a moment
-        _make_artifact(given, send)
-
-
-def _make_artifact(given: Mapping[str, Any], send: Send) -> None:
-    planned = plan(given["config"])
-    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     run = RunFolder(Path(given["folder"]))
-    execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
-    run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
-    for artifact in planned.artifacts:
-        if artifact.name == given["name"]:
-            obtain(execution, artifact)
-    shutil.rmtree(run.memory, ignore_errors=True)
+    with locked(run.folder.with_suffix(".lock")):  # a job whose experiment was killed lives on for a moment
+        planned = plan(given["config"])
+        cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
+        execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
+        run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
+        for artifact in planned.artifacts:
+            if artifact.name == given["name"]:
+                obtain(execution, artifact)
+        shutil.rmtree(run.memory, ignore_errors=True)

@@ -103,14 +103,8 @@ def samples(experiment: Experiment, results: Results, measure: str, labels: Labe
 
 def over_runs(measure: Measure, figures: Iterable[float]) -> float:
     """One figure of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
-    found = np.fromiter(figures, dtype=np.float64)
-    match measure.over_runs:
-        case "largest":
-            return float(found.max())
-        case "smallest":
-            return float(found.min())
-        case _:
-            return float(found.mean())
+    name = {"mean": "mean", "largest": "max", "smallest": "min"}[measure.over_runs]
+    return float(getattr(np, name)(np.fromiter(figures, dtype=np.float64)))
 
 
 def pooled(experiment: Experiment, results: Results, measure: str, labels: Labels) -> float | None:

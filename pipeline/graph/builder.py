@@ -12,8 +12,7 @@ from .parameters import BadStage
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
 from .registry import UnknownStage, entries, resolve
-from .signature import Port, Signature, signature
-from .stage import Stage
+from .signature import Port, signature
 from .value import Tick
 
 
@@ -108,12 +107,9 @@ class _Builder:
         path = where if name in self.shared else self.prefix + where
         parameters, found = convert_fields(spec, cls, path, skip=("_target_",))
         self.problems += found
-        if found:
-            return (
-                None
-                if any(p.default is dataclasses.MISSING for p in read.parameters.values())
-                else _unset(name, target, cls, read)
-            )
+        if found:  # with default parameters, where each has one, so that its wires are checked too
+            needed = any(parameter.default is dataclasses.MISSING for parameter in read.parameters.values())
+            return None if needed else Node(name, target, cls(), read, {})
         try:
             stage = cls(**parameters)
         except (ValueError, TypeError) as error:  # what __post_init__ says of parameters that do not go together
@@ -191,13 +187,8 @@ class _Builder:
                 where, f"{spec!r} is no wire", "write node.port, or {from: node.port, delay: 1, initial: node.port}"
             )
             return
-        unknown = [key for key in options if key not in WIRE_OPTIONS]
-        for key in unknown:
-            self._problem(
-                f"{where}.{key}",
-                "a wire has no such option",
-                suggest(str(key), WIRE_OPTIONS, "options"),
-            )
+        for key in (key for key in options if key not in WIRE_OPTIONS):
+            self._problem(f"{where}.{key}", "a wire has no such option", suggest(str(key), WIRE_OPTIONS, "options"))
         delay, initial = options.get("delay", 0), options.get("initial")
         hold, collect = options.get("hold", False), options.get("collect", False)
         if not isinstance(delay, int) or isinstance(delay, bool) or delay < 0:
@@ -441,11 +432,6 @@ def stages_that_give(kind: Any) -> list[str]:
             if any(compatible(port.type, kind) for port in given):
                 found.add(entry.name)
     return sorted(found)
-
-
-def _unset(name: str, target: str, cls: type[Stage], read: Signature) -> Node:
-    """A stand-in with default parameters for a node whose parameters are wrong, so that its wires are checked too."""
-    return Node(name, target, cls(), read, {})
 
 
 def _is_optional(spec: Any) -> bool:

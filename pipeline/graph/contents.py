@@ -84,11 +84,8 @@ def wrong_output(thing: Any, kind: Any, optional: bool) -> str | None:
 
 def _wrong_fields(value: Value) -> Iterator[str]:
     sizes: dict[str, int] = {}
-    fields = []
     cls: Any = type(value)
-    for name, annotation in _annotations(cls).items():
-        kind, marks = _split(annotation)
-        fields.append((name, kind, marks, getattr(value, name)))
+    fields = [(name, *_split(annotation), getattr(value, name)) for name, annotation in _annotations(cls).items()]
     for name, kind, marks, thing in fields:
         if not _is(thing, kind):
             yield f"'{name}' is {_shown(thing)}, not {type_name(kind)}"

@@ -1,8 +1,8 @@
 """Orders nodes by what they wait for: what follows from a node, circles, and the order in which they run."""
 
 import heapq
-import itertools
 from collections.abc import Callable, Iterable, Iterator
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 
@@ -33,20 +33,10 @@ class Following:
 
     def circle(self) -> list[str] | None:
         """Names that wait for each other, one behind the other; None where there are none."""
-        done: set[str] = set()
-        for root in self._later:
-            path: dict[str, Iterator[str]] = {} if root in done else {root: iter(self._later[root])}
-            while path:
-                last = next(reversed(path))
-                later = next(path[last], None)
-                if later is None:
-                    done.add(last)
-                    del path[last]
-                elif later in path:
-                    names = [*path]
-                    return names[names.index(later) :]
-                elif later not in done:
-                    path[later] = iter(self._later[later])
+        try:
+            self._sorter().prepare()
+        except CycleError as error:
+            return [*error.args[1][:-1]]  # its last is its first again
         return None
 
     def ordered(self, key: Callable[[str], Any]) -> Iterator[str]:
@@ -54,15 +44,18 @@ class Following:
 
         Keys differ, and there is no circle.
         """
-        waits_for = dict.fromkeys(self._later, 0)
-        for name in itertools.chain(*self._later.values()):
-            waits_for[name] += 1
-        ready = [(key(name), name) for name, number in waits_for.items() if not number]
-        heapq.heapify(ready)
-        while ready:
+        sorter, ready = self._sorter(), list[tuple[Any, str]]()
+        sorter.prepare()
+        while sorter.is_active():
+            for name in sorter.get_ready():
+                heapq.heappush(ready, (key(name), name))
             name = heapq.heappop(ready)[1]
             yield name
-            for later in self._later[name]:
-                waits_for[later] -= 1
-                if not waits_for[later]:
-                    heapq.heappush(ready, (key(later), later))
+            sorter.done(name)
+
+    def _sorter(self) -> TopologicalSorter[str]:
+        sorter: TopologicalSorter[str] = TopologicalSorter(dict.fromkeys(self._later, ()))
+        for first, names in self._later.items():
+            for later in names:
+                sorter.add(later, first)
+        return sorter

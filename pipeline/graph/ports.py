@@ -87,8 +87,7 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
                 raise _unfit(value, expected, where) from None  # so that the bounds are named too
             raise
         for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
-            broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
-            if broken:
+            if isinstance(converted, int | float) and bounds.violated_by(converted):
                 raise _Unfit([Problem(where, f"{cut(converted)} is out of bounds, expected {type_name(expected)}")])
         return converted
     if origin is Literal:
@@ -121,30 +120,20 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
     return _convert_plain(value, expected, where)
 
 
+PLAIN: dict[Any, Any] = {
+    **{kind: kind for kind in (type(None), bool, int, str, dict, list)},
+    float: (int, float),
+    Path: (str, Path),
+}
+"""What passes as a plain type; a bool passes as nothing else."""
+
+
 def _convert_plain(value: Any, expected: Any, where: str) -> Any:
-    if expected is type(None):
-        if value is None:
-            return None
-    elif expected is bool:
-        if isinstance(value, bool):
-            return value
-    elif expected is int:
-        if isinstance(value, int) and not isinstance(value, bool):
-            return value
-    elif expected is float:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            if not -sys.float_info.max <= value <= sys.float_info.max:
-                raise _unfit(value, expected, where, "write a finite number")
-            return float(value)
-    elif expected is str:
-        if isinstance(value, str):
-            return value
-    elif expected is Path:
-        if isinstance(value, str | Path):
-            return Path(value)
-    elif expected in (dict, list) and isinstance(value, expected):
-        return value
-    raise _unfit(value, expected, where)
+    if not isinstance(value, PLAIN.get(expected, ())) or (isinstance(value, bool) and expected is not bool):
+        raise _unfit(value, expected, where)
+    if expected is float and not -sys.float_info.max <= value <= sys.float_info.max:
+        raise _unfit(value, expected, where, "write a finite number")
+    return expected(value) if expected in (float, Path) else value
 
 
 def _convert_union(value: Any, expected: Any, where: str) -> Any:

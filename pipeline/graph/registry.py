@@ -140,11 +140,9 @@ def _load(module_name: str) -> ModuleType:
             return importlib.import_module(module_name)
         with _here_on_the_path():
             return importlib.import_module(module_name)
-    except UnknownStage:
+    except (UnknownStage, KeyboardInterrupt):
         raise
     except BaseException as error:  # a plugin may raise anything while it is imported
-        if isinstance(error, KeyboardInterrupt):
-            raise
         raise UnknownStage(f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from None
 
 
@@ -215,18 +213,14 @@ def offered(role: str) -> list[Entry]:
     return [_imported(entry) for entry in plugins() if entry.role == role]
 
 
-def _is_value(thing: Any) -> bool:
-    """Tells whether a plugin is a class of values, as a folder of omninav may hold in place of stages."""
-    return inspect.isclass(thing) and issubclass(thing, Value)
-
-
 def _imported(entry: Entry) -> Entry:
     """A plugin with what its class says of itself, or with its problem."""
     if entry.problem:
         return entry
     try:
         thing = _thing(entry.target)
-        summary = first_line(thing if _is_value(thing) else resolve(entry.target))
+        is_value = inspect.isclass(thing) and issubclass(thing, Value)  # as a folder may hold in place of stages
+        summary = first_line(thing if is_value else resolve(entry.target))
         return Entry(entry.name, entry.target, entry.origin, summary)
     except UnknownStage as error:
         return Entry(entry.name, entry.target, entry.origin, problem=str(error))

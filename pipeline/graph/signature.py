@@ -124,14 +124,11 @@ def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port
     hints = type_hints(returned, cls)
     ports = {}
     for field in dataclasses.fields(returned):  # type: ignore[arg-type]  # Outputs makes it a dataclass
-        annotation, *marks = get_args(hints[field.name]) if _is_annotated(hints[field.name]) else (hints[field.name],)
+        hint = hints[field.name]
+        annotation, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
         annotation, optional = split_optional(annotation)
         truth = Truth in marks or bool(getattr(annotation, "is_truth", False))
         truth = truth or (field.name == "truth" and issubclass(cls, Source))
         optional = optional or field.default is not dataclasses.MISSING
         ports[field.name] = Port(field.name, annotation, optional, truth=truth)
     return ports
-
-
-def _is_annotated(annotation: Any) -> bool:
-    return get_origin(annotation) is Annotated

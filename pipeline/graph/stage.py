@@ -1,6 +1,7 @@
 """A stage: a typed function with parameters."""
 
 import dataclasses
+import operator
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -21,21 +22,16 @@ class Bounds:
     le: float | None = None
     lt: float | None = None
 
-    def violated_by(self, number: float) -> str | None:
-        """The broken limit as text, or None."""
-        for sign, limit, ok in (
-            (">=", self.ge, self.ge is None or number >= self.ge),
-            (">", self.gt, self.gt is None or number > self.gt),
-            ("<=", self.le, self.le is None or number <= self.le),
-            ("<", self.lt, self.lt is None or number < self.lt),
-        ):
-            if not ok:
-                return f"{sign} {limit:g}"
-        return None
+    def violated_by(self, number: float) -> bool:
+        """Tells whether a number breaks a limit; NaN breaks any."""
+        return not all(getattr(operator, name)(number, limit) for name, limit in self._limits())
 
     def __str__(self) -> str:
-        limits = ((">=", self.ge), (">", self.gt), ("<=", self.le), ("<", self.lt))
-        return " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
+        signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+        return " and ".join(f"{signs[name]} {limit:g}" for name, limit in self._limits())
+
+    def _limits(self) -> list[tuple[str, float]]:
+        return [(name, limit) for name, limit in vars(self).items() if limit is not None]
 
 
 class Truth:
@@ -101,12 +97,8 @@ class Context:
     @property
     def rng(self) -> "np.random.Generator":
         """The node's own generator. Touching it marks the run as one whose results depend on the seed."""
-        if self._rng is None:
-            import numpy as np
-
-            self._rng = np.random.default_rng(0)
         self.drew = True
-        return self._rng
+        return self.rng_unmarked()
 
     def count(self, kind: str, number: int = 1, detail: str = "") -> None:
         """Count something dropped or odd; the first `detail` of a kind is kept."""
@@ -132,10 +124,11 @@ class Context:
 
     def rng_unmarked(self) -> "np.random.Generator":
         """The generator, for the engine's own bookkeeping."""
-        drew = self.drew
-        rng = self.rng
-        self.drew = drew
-        return rng
+        if self._rng is None:
+            import numpy as np
+
+            self._rng = np.random.default_rng(0)
+        return self._rng
 
     def notes(self) -> dict[str, Any]:
         """Counts, details and facts so far, as plain data."""

@@ -39,7 +39,7 @@ class EngineSettings:
 Factory = Callable[[EngineSettings], Executor]
 
 
-def read_engine(plain: Any, where: str = "engine") -> EngineSettings:
+def read_engine(plain: Any) -> EngineSettings:
     """The settings of an engine, as a configuration has them. Raises `ProblemsFound`."""
     given: dict[str, Any] = {"name": plain} if isinstance(plain, str) else dict(plain or {})
     name, workers, memory = (given.pop(key, None) for key in ("name", "workers", "memory"))
@@ -47,14 +47,14 @@ def read_engine(plain: Any, where: str = "engine") -> EngineSettings:
     problems = []
     known = _factories()
     if name not in known:
-        problems.append(Problem(where, f"there is no engine '{name!s:.40}'", suggest(str(name), known, "engines")))
+        problems.append(Problem("engine", f"there is no engine '{name!s:.40}'", suggest(str(name), known, "engines")))
     if workers is not None and (not isinstance(workers, int) or isinstance(workers, bool) or not 1 <= workers <= 1e5):
-        hint = f"type {where}.workers=4"
-        problems.append(Problem(f"{where}.workers", f"{workers!r:.40}, expected a whole number >= 1", hint))
+        what = f"{workers!r:.40}, expected a whole number >= 1"
+        problems.append(Problem("engine.workers", what, "type engine.workers=4"))
     size = None if memory is None else _bytes(memory)
     if memory is not None and size is None:
-        hint = f"type {where}.memory=4GB"
-        problems.append(Problem(f"{where}.memory", f"{memory!r:.40}, expected a size with its unit", hint))
+        what = f"{memory!r:.40}, expected a size with its unit"
+        problems.append(Problem("engine.memory", what, "type engine.memory=4GB"))
     if problems:
         raise ProblemsFound(problems)
     return EngineSettings(name, workers, size, given)
@@ -91,13 +91,8 @@ def cores() -> int:
 
 def local(settings: EngineSettings) -> Executor:
     """Threads of this process, each of which waits for the process of one job."""
+    what, known = f"the engine '{settings.name}' has no such setting", ("workers", "memory")
     if settings.options:
-        raise ProblemsFound([_unknown(name, settings) for name in settings.options])
+        unknown = settings.options
+        raise ProblemsFound(Problem(f"engine.{name}", what, suggest(name, known, "settings")) for name in unknown)
     return ThreadPoolExecutor(settings.workers or cores(), "job")
-
-
-def _unknown(name: str, settings: EngineSettings) -> Problem:
-    known = [each for each in ("workers", "memory") if each not in settings.options]
-    return Problem(
-        f"engine.{name}", f"the engine '{settings.name}' has no such setting", suggest(name, known, "settings")
-    )

@@ -92,9 +92,9 @@ def obtain(
     cache = execution.cache or Cache(run.memory / "artifacts")
     key = _key(artifact)
     with cache.lock(key):
-        found = _found(cache, key, seed)
+        found = found_value(cache, key, ".omap", seed)
         if found is not None:
-            file, value = found
+            file, value, _ = found
             reason = "found: the same graph over the same log had made it before"
         else:
             own, every = Cache(run.memory / "artifacts"), list(_make(execution, [artifact, *together]))
@@ -108,14 +108,15 @@ def obtain(
     return value, {**made, **read_header(target)["facts"]}
 
 
-def _found(cache: Cache, key: str, seed: int) -> tuple[Path, Value] | None:
+def found_value(cache: Cache, key: str, suffix: str, seed: int) -> tuple[Path, Value, Any] | None:
+    """A value's file in the cache, the value and its notes; None where there is none, or no sound one."""
     for candidate in (key, seeded(key, seed)):
-        found = cache.find(candidate, ".omap")
+        found = cache.find(candidate, suffix)
         if found is not None:
             try:
-                return found[0], read_artifact(found[0])
+                return found[0], read_artifact(found[0]), found[1]
             except BadInput as unfit:
-                cache.discard(candidate, ".omap", str(unfit))
+                cache.discard(candidate, suffix, str(unfit))
     return None
 
 
@@ -162,8 +163,7 @@ def _make(
     memory = execution.run.memory / artifact.name
     options = execution.options(artifact.variant, memory, identity(graph, execution.seed))
     with cached_prefix(graph, execution.cache, execution.seed, origins) as prefix:
-        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
-        engine = Engine(graph, {}, options, wanted=origins, replay=replay, recorded=recorded)
+        engine = Engine(graph, {}, options, wanted=origins, replay=prefix.replay, recorded=prefix.recorded())
         values = engine.run()
         keep_prefix(engine, prefix, execution.cache)
     if not isinstance(values[artifact.origin], Value):

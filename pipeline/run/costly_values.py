@@ -3,15 +3,15 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 
-from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.engine.cache import Cache, seeded
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
-from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import Value
 
+from .artifacts import found_value
 from .plan import digests_of
 
 SUFFIX = ".value"
@@ -30,8 +30,11 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
             assert cache is not None
             key = _key(engine.graph, origin, artifacts)
             held.enter_context(cache.lock(key))
-            if not _give(engine, origin, cache, key, seed):
+            found = found_value(cache, key, SUFFIX, seed)
+            if found is None:
                 made[origin] = key
+            else:
+                engine.give(origin, found[1], found[2])
         yield
         for origin, key in made.items():
             value, ctx = engine.values.get(origin), engine.calls[origin.partition(".")[0]].ctx
@@ -54,17 +57,3 @@ def _key(graph: Graph, origin: str, artifacts: Mapping[str, str]) -> str:
     read = {wire.from_port for wire in part.wires if wire.from_node == ARTIFACTS}
     contents = [f"{name} {artifacts[name]}" for name in sorted(read)]
     return digest_text("value", graph_digest(part), origin, *digests_of(part).values(), *contents)
-
-
-def _give(engine: Engine, origin: str, cache: Cache, key: str, seed: int) -> bool:
-    """Give the engine a value from the cache. False where there is none, or no sound one."""
-    for candidate in (key, seeded(key, seed)):
-        found = cache.find(candidate, SUFFIX)
-        if found is None:
-            continue
-        try:
-            engine.give(origin, read_artifact(found[0]), found[1])
-            return True
-        except BadInput as unfit:
-            cache.discard(candidate, SUFFIX, str(unfit))
-    return False

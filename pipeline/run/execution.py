@@ -86,9 +86,9 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
     options = execution.options(planned.variant, run.memory, own, run.folder)
     wanted = sorted(set(planned.saves.values()))
     with cached_prefix(planned.graph, cache, planned.seed, {*wanted, *planned.record}) as prefix:
-        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+        graph, recorded = planned.graph, prefix.recorded()
         engine = Engine(
-            planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded, kept=planned.record
+            graph, artifacts, options, wanted=wanted, replay=prefix.replay, recorded=recorded, kept=planned.record
         )
         try:
             with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, planned.seed):
@@ -110,8 +110,7 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
         with whole_file(run.folder / recorded_name(origin)) as part:
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)
-    none = "not cached: nothing in this graph follows from its log alone"
-    _finish(run, engine, prefix.reason if prefix is not None else none)
+    _finish(run, engine, prefix.reason)
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
@@ -143,10 +142,7 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
     }
     for kind, entry in notes["dropped"].items():
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
-    graph_svg, config_yaml = (
-        (run.folder / "graph.svg").read_text(encoding="utf-8"),
-        (run.folder / CONFIG).read_text(encoding="utf-8"),
-    )
+    graph_svg, config_yaml = ((run.folder / name).read_text(encoding="utf-8") for name in ("graph.svg", CONFIG))
     done = {**run.manifest, "status": "complete"}
     write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph, run.shown_as)
     run.manifest = done | {"files": _digests(run.folder)}

@@ -107,10 +107,8 @@ def start(
     config = planned.config
     refuse_missing(config)
     inputs = input_digests(planned)
-    root, named = (
-        Path(str(config.get("runs", "runs"))).absolute(),
-        f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}",
-    )
+    root = Path(str(config.get("runs", "runs"))).absolute()
+    named = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}"
     beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder.absolute()
     beginning.mkdir(parents=True, exist_ok=True)
     run = RunFolder(beginning)

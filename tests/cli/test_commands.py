@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from omninav.pipeline.cli.commands.tool import tool_from
 from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.main import COMMANDS, main
-from omninav.pipeline.cli.tool_words import tool_from
 from omninav.pipeline.cli.tools import tool_class, tools
 from omninav.pipeline.graph.parameters import read_parameters
 
@@ -20,7 +20,7 @@ HELP = (ROOT / "conf" / "help.txt").read_text(encoding="utf-8")
 TOOLS = [f"{one} {other}" for one, other in re.findall(r"^  (camera|map) (\w+)", HELP, re.MULTILINE)]
 
 
-@pytest.mark.parametrize("words", [*COMMANDS, *learnable(), *TOOLS])
+@pytest.mark.parametrize("words", sorted({*COMMANDS, *learnable(), *tools()}))
 def test_every_command_explains_itself(words, capsys):
     main([*words.split(), "--help"])
     told = capsys.readouterr().out

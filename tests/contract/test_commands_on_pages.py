@@ -8,6 +8,7 @@ import pytest
 from offenders import assert_each
 
 from omninav.pipeline.cli.commands.simulate import LIVE, is_live
+from omninav.pipeline.cli.commands.tool import tool_from
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import learnable
@@ -15,13 +16,12 @@ from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
-from omninav.pipeline.cli.tool_words import tool_from
 from omninav.pipeline.cli.tools import tool_class, tools
 from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
-NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate", "explain", "video"}
+NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate"}
 """Commands that compose no configuration."""
 OWN = {"experiment", "profile", "runs", "cache"}
 """What is typed for an experiment and not for its conditions."""
@@ -61,9 +61,10 @@ def command_composes(line: str) -> None:
         return
     if words[:1] and words[0] in learnable() and not any(word.isidentifier() for word in words[1:2]):
         words[0] = f"learn={words[0]}"
-    tool = command if command in tools() and not is_live(words) else " ".join(words[:2])
-    if tool in tools():
-        arguments = words if tool == command else words[2:]
+    typed = [command, *words] if command and not is_live(words) else words
+    tool = next((one for one in (" ".join(typed[:1]), " ".join(typed[:2])) if one in tools()), None)
+    if tool is not None:
+        arguments = typed[len(tool.split()) :]
         if arguments:  # else a page speaks of it
             tool_from(tool_class(tool), arguments)
         return

@@ -6,6 +6,7 @@ from omninav.pipeline.cli.jobs import show_sweep
 from omninav.pipeline.cli.terminal import show, shown
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.registry import only_listed
+from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.metrics_files import read_metrics
 
@@ -19,8 +20,10 @@ def command(arguments: list[str]) -> int:
     named = [word for word in arguments if not word.startswith("plots=")]
     folder = Path(named[0] if named else "runs/latest").absolute()
     if plots:
-        with only_listed(named[1:]):
-            _redraw(folder, plots[-1])
+        from omninav.pipeline.run.redraw import redraw
+
+        with only_listed(named[1:]), Progress() as progress:
+            redraw(folder, plots[-1], progress)
     if (folder / "sweep.html").is_file():
         show_sweep(folder)
         return 0
@@ -33,11 +36,3 @@ def command(arguments: list[str]) -> int:
     show(results_table(read_metrics(folder)))
     print(f"report: {shown(folder / 'report.html')}")
     return 0
-
-
-def _redraw(folder: Path, plots: str) -> None:
-    from omninav.pipeline.report.progress import Progress
-    from omninav.pipeline.run.redraw import redraw
-
-    with Progress() as progress:
-        redraw(folder, plots, progress)

@@ -43,7 +43,7 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
-            return run_job(config, arguments, _run_experiment, check)
+            return run_job(config, arguments, check)
 
         of_conditions = condition_words(listed)
         typed = [word for word in listed if word not in of_conditions]
@@ -52,12 +52,6 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
             return _handed_over(hydra, flags, typed, job)
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
-
-
-def _run_experiment(config: Any, arguments: Sequence[str]) -> int:
-    from omninav.pipeline.cli.experiments import run_experiment  # with pages and plots, which no other job needs
-
-    return run_experiment(config, arguments)
 
 
 def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
@@ -79,9 +73,8 @@ def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[
             ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
             show_sweep(Path(page).parent)
-            optimum = (
-                Path(page).parent / "optimization_results.yaml"
-            )  # by Hydra's sweepers for Optuna, Ax and Nevergrad
+            # By Hydra's sweepers for Optuna, Ax and Nevergrad.
+            optimum = Path(page).parent / "optimization_results.yaml"
             if optimum.is_file():
                 print(f"optimum: {shown(optimum)}\n{optimum.read_text(encoding='utf-8').strip()}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)

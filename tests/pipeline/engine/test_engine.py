@@ -246,7 +246,6 @@ def cached_run(place: Path, cache: Cache) -> tuple[list, bool]:
     """What a graph with a prefix gave, and whether the prefix was replayed."""
     graph = graph_of(PREFIX, PREFIX_WIRES)
     with cached_prefix(graph, cache, 0) as prefix:
-        assert prefix is not None
         options = EngineOptions(0, place, place / "memory")
         engine = Engine(graph, {}, options, wanted=["all.metrics"], replay=prefix.replay, recorded=prefix.recorded())
         values = engine.run()["all.metrics"].values["numbers"]["all"]
@@ -272,7 +271,6 @@ def test_a_damaged_prefix_is_computed_again(tmp_path: Path):
 def test_what_leaves_a_prefix_may_be_small_where_what_is_in_it_is_bulky(tmp_path: Path):
     wires = {**PREFIX_WIRES, "enter": {"big": {"from": "source.big", "hold": True}}}
     with cached_prefix(graph_of({**PREFIX, "enter": "Swallow"}, wires), Cache(tmp_path), 0) as prefix:
-        assert prefix is not None
         assert "enter" in prefix.nodes  # only its number leaves the prefix
         assert prefix.recorded()
 
@@ -280,7 +278,6 @@ def test_what_leaves_a_prefix_may_be_small_where_what_is_in_it_is_bulky(tmp_path
 def test_a_prefix_whose_frontier_is_bulky_is_not_cached_and_says_why(tmp_path: Path):
     wires = {**PREFIX_WIRES, "enter": {"big": {"from": "source.big", "delay": 1, "initial": "source.big"}}}
     with cached_prefix(graph_of({**PREFIX, "enter": "Swallow"}, wires), Cache(tmp_path), 0) as prefix:
-        assert prefix is not None
         assert prefix.reason == "not cached: source.big is too large to keep and is read by enter"
         assert not prefix.recorded()
 
@@ -291,8 +288,8 @@ def test_a_result_that_is_given_every_tick_is_there_though_no_tick_runs_again(tm
     cache, found = Cache(tmp_path / "cache"), []
     for place in (tmp_path / "first", tmp_path / ("first" if again == "after its loop" else "second")):
         with cached_prefix(graph, cache if again == "from a cached prefix" else None, 0) as prefix:
-            replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
-            engine = Engine(graph, {}, EngineOptions(0, place, place / "memory"), replay=replay, recorded=recorded)
+            options, recorded = EngineOptions(0, place, place / "memory"), prefix.recorded()
+            engine = Engine(graph, {}, options, replay=prefix.replay, recorded=recorded)
             engine.run()
             keep_prefix(engine, prefix, cache)
         found.append(engine.last("latest.metrics").values)

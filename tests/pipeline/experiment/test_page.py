@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline.experiment.conditions import ConditionRun
-from omninav.pipeline.experiment.page import PageContent, number, reference_text
+from omninav.pipeline.experiment.page import number
+from omninav.pipeline.experiment.runner import reference_text
 from omninav.pipeline.experiment.specification import Condition, read_experiment
 
 
@@ -41,5 +42,5 @@ def test_a_sentence_about_reference_runs_has_the_mean_over_their_scenarios() -> 
         )
         for scenario, e in (("draw 101", 1.0), ("draw 102", 2.0))
     ]
-    content = PageContent(read_experiment(file, "full"), "full", [], [], [runs], [], "")
-    assert reference_text(content, 0) == "Without: one 1.5."
+    experiment = read_experiment(file, "full")
+    assert reference_text(experiment, experiment.reference_runs[0], runs) == "Without: one 1.5."
