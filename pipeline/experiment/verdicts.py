@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
+from omninav.stages.geometry.arrays import Array
+
+from .intervals import MIN_GROUPS, bootstrap_interval, share_interval
 from .series import figure_at, pooled_deviation
 from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of, space_of
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .model import Array
+from omninav.stages.geometry.arrays import Array
+
 from .strip import Strip
 
 

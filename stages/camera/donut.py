@@ -6,10 +6,11 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Pixels
 
 from .mirror_ring import RingNotFound, find_ring
-from .model import FAR_PX, Array, Bools, Camera, Key, Ring, Sense
+from .model import FAR_PX, Camera, Key, Ring, Sense
 from .rays import angles, unit_vectors
 
 

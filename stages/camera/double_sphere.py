@@ -5,8 +5,9 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import Array, Bools, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, Key, OuterRadius, Ring
+from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, Key, OuterRadius, Ring
 from .rays import normalised, turned
 
 

@@ -6,8 +6,9 @@ from typing import Annotated, Self
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import FAR_PX, Array, Bools, Camera, Key
+from .model import FAR_PX, Camera, Key
 from .rays import normalised, turned
 
 Place = Annotated[float, Bounds(ge=-FAR_PX, le=FAR_PX)]

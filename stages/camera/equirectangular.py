@@ -3,7 +3,8 @@
 import math
 from typing import Self
 
-from .model import Array
+from omninav.stages.geometry.arrays import Array
+
 from .strip import Strip
 
 

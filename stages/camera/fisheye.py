@@ -6,8 +6,9 @@ from typing import Annotated, Self
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import FAR_PX, Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring, Sense
+from .model import FAR_PX, Camera, InnerRadius, Key, OuterRadius, Ring, Sense
 from .rays import angles, unit_vectors
 
 

@@ -7,21 +7,9 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import (
-    Array,
-    Bools,
-    Camera,
-    CentreX,
-    CentreY,
-    FocalX,
-    FocalY,
-    InnerRadius,
-    Key,
-    OuterRadius,
-    Ring,
-    Skew,
-)
+from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, Key, OuterRadius, Ring, Skew
 from .rays import normalised, turned
 
 HalfAxis = Bounds(ge=1e-5, le=1e5)

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.image import Pixels
 
-from .model import Array, Ring
+from .model import Ring
 
 Grey = npt.NDArray[np.float32]
 

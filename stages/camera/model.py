@@ -13,16 +13,14 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Value
 from omninav.pipeline.graph.registry import offered
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Pixels
 
 from .rays import unit_vectors
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 Sense = Literal["clockwise", "counter_clockwise"]
 """In which sense azimuth grows in the image, seen on a screen (v down). A camera that looks up, by a lens or into a
 mirror, has u along x and v along y, so its bearings atan2(v, u) grow clockwise on the screen."""

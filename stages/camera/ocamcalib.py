@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import FAR_PX, Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring
+from .model import FAR_PX, Camera, InnerRadius, Key, OuterRadius, Ring
 from .rays import normalised, turned
 
 Affine = Bounds(ge=-10, le=10)

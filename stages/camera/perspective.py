@@ -6,7 +6,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from .model import Array, Bools, Camera, CentreX, CentreY, FocalX, FocalY, Skew
+from omninav.stages.geometry.arrays import Array, Bools
+
+from .model import Camera, CentreX, CentreY, FocalX, FocalY, Skew
 from .rays import normalised, turned
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
 
 
 def unit_vectors(azimuths: npt.ArrayLike, elevations: npt.ArrayLike) -> Array:

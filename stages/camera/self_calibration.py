@@ -8,9 +8,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from omninav.pipeline import BadInput
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.landmarks.adjustment import Lens
 
-from .model import Array, Camera
+from .model import Camera
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}

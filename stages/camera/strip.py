@@ -8,8 +8,9 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import FAR_PX, Array, Bools, Camera, Key, Sense
+from .model import FAR_PX, Camera, Key, Sense
 from .rays import angles, unit_vectors
 
 Elevation = Bounds(ge=-math.pi / 2 - 1e-6, le=math.pi / 2 + 1e-6)

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches, fitting_matches
 
 from .equirectangular import Equirectangular
-from .model import Array, Camera
+from .model import Camera
 from .strip import Strip
 
 STEPS = math.radians(2.5), math.radians(0.5)

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.thumbnails import encoded
 
-from .model import Array, Camera
+from .model import Camera
 
 
 class Thumbnail(NamedTuple):
@@ -20,9 +20,9 @@ class Thumbnail(NamedTuple):
     scale: float
     corner: tuple[int, int]
 
-    def points(self, points: Array) -> npt.NDArray[np.float32]:
+    def points(self, points: Array) -> Floats:
         """Points (N, 2) of the whole image, columns and rows, in this one's pixels."""
-        there: npt.NDArray[np.float32] = ((points - self.corner + 0.5) * self.scale - 0.5).astype(np.float32)
+        there: Floats = ((points - self.corner + 0.5) * self.scale - 0.5).astype(np.float32)
         return there
 
     def jpeg(self, quality: int) -> bytes:

@@ -3,12 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.segments import FeatureKind
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.maps import ReferenceGraph
-
-Floats = npt.NDArray[np.float32]
 
 SAMPLE = 1 << 14
 """References, evenly over the map, from which principal axes are learned."""

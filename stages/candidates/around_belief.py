@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.geometry.plane.point_cells import distinct, sort_into_cells, within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
@@ -14,8 +14,6 @@ from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 
 from .background import with_background
-
-Ints = npt.NDArray[np.int64]
 
 BACKGROUND_REFERENCES = 128
 """References compared of all that are neither near the belief nor similar, the same at each image."""

@@ -1,11 +1,9 @@
 """Samples the references that are not compared for themselves, so that they are represented."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.candidates import Candidates
-
-Ints = npt.NDArray[np.int64]
 
 
 def with_background(chosen: Ints, references: int, background: int) -> Candidates:

@@ -1,15 +1,12 @@
 """Finds the references most similar to a view by comparing the short vectors of all."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ShortVectors
 
 from .appearance_vectors import BLOCK, blocks, principal_axes, sample
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 
 def short_vectors(map: ReferenceGraph, references: int, dimensions: int) -> ShortVectors:

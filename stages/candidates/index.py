@@ -1,11 +1,11 @@
 """Selects the references that look like the view, anywhere in the map, and those near the belief."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import HEADINGS, turned_views
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
@@ -64,7 +64,7 @@ class IndexedCandidates(AroundBelief, Stage):
         chosen = distinct(np.concatenate([around, similar])) if known else similar
         return self.Out(candidates=self.with_others(chosen, map))
 
-    def _turned(self, features: SegmentFeatures, map: ReferenceGraph) -> npt.NDArray[np.float32]:
+    def _turned(self, features: SegmentFeatures, map: ReferenceGraph) -> Floats:
         windows = isinstance(features, SegmentHistograms) and features.directions is not None
         views = features.values[:, None] if windows else turned_views(features.values, HEADINGS)
         if views.shape[1:] != map.features.shape[1:]:

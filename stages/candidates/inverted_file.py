@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Bytes, Floats, Ints
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import InvertedLists
 
 from .appearance_vectors import blocks, principal_axes, sample
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 SEED = 1
 """Of the training of centroids and codebooks."""
@@ -105,7 +103,7 @@ class InvertedFile:
         return np.asarray((vectors - self.index.mean) @ self.index.axes, np.float32)
 
 
-def _split(encoded: npt.NDArray[np.uint8], width: int) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.uint8]]:
+def _split(encoded: Bytes, width: int) -> tuple[npt.NDArray[np.int32], Bytes]:
     # The number of the list in the first bytes, the lowest first, then the code.
     lists = np.zeros(len(encoded), np.int32)
     for byte in range(width):
@@ -113,6 +111,6 @@ def _split(encoded: npt.NDArray[np.uint8], width: int) -> tuple[npt.NDArray[np.i
     return lists, encoded[:, width:]
 
 
-def _joined(lists: npt.NDArray[np.int32], codes: npt.NDArray[np.uint8], width: int) -> npt.NDArray[np.uint8]:
+def _joined(lists: npt.NDArray[np.int32], codes: Bytes, width: int) -> Bytes:
     numbers = [(lists >> (8 * byte)).astype(np.uint8) for byte in range(width)]
     return np.column_stack([*numbers, codes])

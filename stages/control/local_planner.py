@@ -5,9 +5,9 @@ from dataclasses import field, replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.local_grid import (
     CELL_M,
     CELLS,
@@ -29,8 +29,6 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.scan import Scan
 
 from .clearance import free_ahead, free_direction
-
-Array = npt.NDArray[np.float64]
 
 RECENTRE_M = 1.5
 """Distance of the robot from the grid's middle at which the grid moves along, metres."""

@@ -5,13 +5,12 @@ from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Outputs
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.image import Panorama, Pixels
 from omninav.stages.values.views import Coefficients
 
-FloatArray = npt.NDArray[np.float32]
 Channels = Literal["brightness", "colour"]
 Contrast = Literal["none", "whole", "local"]
 
@@ -49,14 +48,12 @@ class AveragedStrip:
         if self.columns % self.headings:
             raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
 
-    def strip(self, panorama: Panorama) -> FloatArray:
+    def strip(self, panorama: Panorama) -> Floats:
         """One panorama averaged: (rows, columns, channels)."""
         return averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
 
 
-def averaged_strip(
-    pixels: Pixels, rows: int, columns: int, channels: Channels, contrast: Contrast = "none"
-) -> FloatArray:
+def averaged_strip(pixels: Pixels, rows: int, columns: int, channels: Channels, contrast: Contrast = "none") -> Floats:
     """Average a panorama over equal parts: (rows, columns, 1 or 3) float32, columns as in the panorama.
 
     `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. `contrast` none: grey levels, 0..255. whole:
@@ -66,20 +63,20 @@ def averaged_strip(
     """
     seen = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY) if channels == "brightness" else pixels
     small = cv2.resize(seen.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
-    strip = cast(FloatArray, small.reshape(rows, columns, -1))
+    strip = cast(Floats, small.reshape(rows, columns, -1))
     match contrast:
         case "none":
             return strip
         case "whole":
             deviation = np.sqrt(strip.var(axis=(0, 1)) + NOISE_GREY_LEVELS**2)
-            return cast(FloatArray, (strip - strip.mean(axis=(0, 1))) / deviation)
+            return cast(Floats, (strip - strip.mean(axis=(0, 1))) / deviation)
         case "local":
             return local_contrast(
                 strip, LOCAL_CONTRAST_SIGMA * columns, LOCAL_CONTRAST_SIGMA * pixels.shape[1] * rows / pixels.shape[0]
             )
 
 
-def local_contrast(strip: FloatArray, across: float, down: float) -> FloatArray:
+def local_contrast(strip: Floats, across: float, down: float) -> Floats:
     """Each value minus the mean of its surroundings, divided by their standard deviation: (rows, columns, channels).
 
     The surroundings are Gaussian, of `across` columns and `down` rows (standard deviations), and go around the circle.
@@ -91,11 +88,11 @@ def local_contrast(strip: FloatArray, across: float, down: float) -> FloatArray:
     return np.ascontiguousarray(contrast[:, columns : 2 * columns], dtype=np.float32)
 
 
-def _blurred(strip: FloatArray, across: float, down: float) -> FloatArray:
-    return cast(FloatArray, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))
+def _blurred(strip: Floats, across: float, down: float) -> Floats:
+    return cast(Floats, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))
 
 
-def turned_copies(rows: FloatArray, headings: int) -> FloatArray:
+def turned_copies(rows: Floats, headings: int) -> Floats:
     """Rows (D, P) that run column by column, turned: (headings, D, P).
 
     An image projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,

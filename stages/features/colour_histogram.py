@@ -4,18 +4,15 @@ from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
 from .segments import segment_edges
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 ColourSpace = Literal["rgb", "lab", "ycrcb", "hsv"]
 BinCount = Annotated[int, Bounds(ge=0, le=256)]

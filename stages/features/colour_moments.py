@@ -4,10 +4,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Bools, Floats
 from omninav.stages.values.image import Pixels
 
-Floats = npt.NDArray[np.float32]
-Bools = npt.NDArray[np.bool_]
 Sums = npt.NDArray[np.float64]
 
 PAIRS = ((2, 1), (2, 0), (1, 0))

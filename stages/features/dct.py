@@ -3,17 +3,13 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
 from .averaged_strip import AveragedStrip
-
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 
 def cosine_basis(size: int) -> Array:
@@ -70,5 +66,5 @@ class CosineTransform(AveragedStrip, Stage):
         columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
         waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)
         # In C order, as a cache gives it back: in another, products with it would differ in their last bit.
-        turned: FloatArray = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32, order="C")
+        turned: Floats = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32, order="C")
         return self.Out(view=Coefficients(turned[0].copy(), turned))

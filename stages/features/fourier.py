@@ -3,24 +3,22 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.spectra import packed
+from omninav.stages.geometry.arrays import Complex, Floats
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Spectrum
 
 from .averaged_strip import Channels, Contrast, averaged_strip
 
-FloatArray = npt.NDArray[np.float32]
-Complex = npt.NDArray[np.complex128]
 BANDS = 8
 """Bands from top to bottom; each band and channel is a signal of its own."""
 FREQUENCIES = 8
 """Coefficients kept of each signal, with the mean."""
 
 
-def spectrum_around(strip: FloatArray, frequencies: int, mean: bool = True) -> Complex:
+def spectrum_around(strip: Floats, frequencies: int, mean: bool = True) -> Complex:
     """The lowest coefficients of each row and channel of a strip (rows, columns, channels) around the robot.
 
     Gives (rows * channels, frequencies), divided by sqrt(columns) so that sums of squares are those of the strip

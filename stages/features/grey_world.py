@@ -5,9 +5,9 @@ from typing import Literal, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.image import Pixels
 
 GreyWorld = Literal["none", "whole", "local"]
@@ -20,8 +20,6 @@ LOCAL_WINDOW = 0.25
 
 MIN_MEAN = 1.0
 """Means below this (0..255) are of a black part, which stays black."""
-
-Floats = npt.NDArray[np.float32]
 
 
 @compiled(nogil=True)
@@ -43,7 +41,7 @@ def grey_world_pixels(pixels: Pixels, window: float) -> Pixels:
     also takes away light that comes from one side. What exceeds 255 is cut.
     """
     columns = pixels.shape[1]
-    means = cast(npt.NDArray[np.float64], cv2.reduce(pixels, 0, cv2.REDUCE_AVG, dtype=cv2.CV_64F)[0])
+    means = cast(Array, cv2.reduce(pixels, 0, cv2.REDUCE_AVG, dtype=cv2.CV_64F)[0])
     half = min(round(window * columns), columns) // 2
     if 2 * half + 1 >= columns:
         around = np.broadcast_to(means.mean(axis=0), means.shape)

@@ -4,22 +4,19 @@ from typing import Annotated, Literal, NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 
 from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float32]
 Radius = Annotated[float, Bounds(ge=0)]
 Scale = Annotated[float, Bounds(gt=0)]
 Borders = Literal["crop", "wrap"]

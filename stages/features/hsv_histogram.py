@@ -4,17 +4,15 @@ from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
 from .segments import segment_edges
-
-Floats = npt.NDArray[np.float32]
 
 HUE_BINS = 16
 """Bins of the hue, as in the paper (Gross & Koenig 2004, section 2)."""
@@ -23,9 +21,9 @@ HUE_BINS = 16
 @compiled(nogil=True)
 def _count(
     hsv: Pixels,
-    edges: npt.NDArray[np.int64],
-    hue_bin: npt.NDArray[np.int64],
-    value_bin: npt.NDArray[np.int64],
+    edges: Ints,
+    hue_bin: Ints,
+    value_bin: Ints,
     hues: int,
     values: int,
     joint: bool,

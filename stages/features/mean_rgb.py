@@ -3,9 +3,9 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.features import SegmentColours
 from omninav.stages.values.image import Panorama, Pixels
 
@@ -13,12 +13,12 @@ from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
 
-def mean_colours(pixels: Pixels, segments: int) -> npt.NDArray[np.float32]:
+def mean_colours(pixels: Pixels, segments: int) -> Floats:
     """Mean blue, green, red (0..255) of each segment's columns over all rows: (segments, 3) float32."""
     edges = segment_edges(pixels.shape[1], segments)
     columns = pixels.sum(axis=0, dtype=np.uint32)
     sums = np.add.reduceat(columns, edges[:-1], axis=0)
-    means: npt.NDArray[np.float32] = (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
+    means: Floats = (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
     return means
 
 

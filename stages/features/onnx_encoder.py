@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput, cut
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.encoded_image import MAX_PIXELS
 from omninav.stages.values.features import SegmentDescriptors
 from omninav.stages.values.image import Panorama, Pixels
@@ -17,7 +17,6 @@ from omninav.stages.values.image import Panorama, Pixels
 from .onnx_network import error_line, loaded, network_digest
 from .segments import segment_edges
 
-Floats = npt.NDArray[np.float32]
 PerChannel = tuple[float, float, float]
 MAX_SIDE = 4096
 Side = Annotated[int, Bounds(ge=1, le=MAX_SIDE)]

@@ -5,13 +5,13 @@ from typing import Annotated, Any, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput, cut
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.panorama import camera_behind
 from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -19,9 +19,6 @@ from .colour_moments import disc_colours
 from .onnx_network import error_line, loaded, network_digest
 from .prepared_image import PreparedImage, prepared_image
 from .rotation_reduced_sift import COLOUR_RADIUS, SEAM, none_found
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
 
 PARTS = {"scores": ("score",), "descriptors": ("desc", "feat"), "keypoints": ("keypoint", "kpt")}
 """Parts of an output's name that tell what it is."""
@@ -37,7 +34,7 @@ SHIFT = 2.0
 """Standard deviations within which angles between signed descriptors are kept exactly."""
 
 
-def signed_as_bytes(descriptors: Floats) -> npt.NDArray[np.uint8]:
+def signed_as_bytes(descriptors: Floats) -> Bytes:
     """Descriptors (N, D) with signs as bytes (N, 2D) that compare like them once `root_descriptors` has taken roots.
 
     Each number x, in standard deviations of a row of length 1, becomes the squares of 2 + x and 2 - x, or 0 where these

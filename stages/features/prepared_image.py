@@ -5,15 +5,12 @@ from typing import NamedTuple, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.model import Camera, Ring
 from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Image, Panorama, Pixels
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 class PreparedImage(NamedTuple):

@@ -5,17 +5,15 @@ from typing import Annotated, Any, Literal, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
 
 from .colour_moments import disc_colours
 from .prepared_image import PreparedImage, prepared_image
-
-Array = npt.NDArray[np.float64]
 
 SEAM = 48
 """Columns that are repeated beyond both edges of a full circle, so that what lies across the seam is found too."""
@@ -97,11 +95,11 @@ class RotationReducedSift(Stage):
             point.class_id = row
         return list(found)
 
-    def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> npt.NDArray[np.float32]:
+    def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> Floats:
         if self.orientation == "own":
-            described: npt.NDArray[np.float32] = self._rows[[point.class_id for point in found]].astype(np.float32)
+            described: Floats = self._rows[[point.class_id for point in found]].astype(np.float32)
             return described
-        return cast(npt.NDArray[np.float32], self._sift.compute(grey, found)[1])
+        return cast(Floats, self._sift.compute(grey, found)[1])
 
     def _strongest(self, found: list[cv2.KeyPoint], read: PreparedImage, seam: int) -> list[cv2.KeyPoint]:
         if not found:

@@ -5,21 +5,17 @@ from typing import Annotated, NamedTuple, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import spreads
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import VerticalSegments
 
 from .colour_moments import add_pixel, correlations
 from .prepared_image import PreparedImage, prepared_image
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 SAMPLES = 8
 """Samples of a segment's intensity profile: the paper's 8-point cosine transform."""

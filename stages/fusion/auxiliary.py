@@ -1,15 +1,13 @@
 """The auxiliary particle filter: particles are selected by how well their predicted poses fit the view."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.odometry_motion import move_poses
 from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
-
-Array = npt.NDArray[np.float64]
 
 
 def auxiliary_filter(

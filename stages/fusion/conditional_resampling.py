@@ -3,17 +3,15 @@
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.gaussians import density, drawn
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 
 from .auxiliary import auxiliary_filter
-
-Array = npt.NDArray[np.float64]
 
 
 class ConditionalResampling(Stage):

@@ -3,10 +3,10 @@
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.gaussians import (
     farther_apart,
     intersect_into,
@@ -16,7 +16,6 @@ from omninav.stages.geometry.probability.gaussians import (
 )
 from omninav.stages.values.belief import GaussianMixture
 
-Array = npt.NDArray[np.float64]
 Rule = Literal["det_ratio", "det_min"]
 MAX_DISTANCE = 7.81
 """Squared Mahalanobis distance below which two components correspond: 95 % with 3 degrees of freedom."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import drawn, floored, moments
 from omninav.stages.values.belief import GaussianMixture, Particles
@@ -15,7 +15,6 @@ from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.pose import Pose, StartPose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-Array = npt.NDArray[np.float64]
 Where = Literal["uniform", "truth", "origin"] | StartPose
 
 INITIAL_SIGMA_M, INITIAL_SIGMA_DEG = 0.01, 0.5

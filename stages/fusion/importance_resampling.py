@@ -4,13 +4,11 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import effective_size, is_narrow, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
-
-Array = npt.NDArray[np.float64]
 
 KLD_ERROR = 0.05
 """Kullback-Leibler distance allowed with `adapt: kld` (Fox 2001)."""

@@ -5,9 +5,9 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.geometry.probability.gaussians import intersected
@@ -26,8 +26,6 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.track import Track
 
 from .covariance_intersection import alpha_of_min_determinant
-
-Array = npt.NDArray[np.float64]
 
 LOCAL = (1.0, math.radians(30.0))
 """Distance (m) and turn (rad) from a pose within which the belief is taken for one Gaussian."""

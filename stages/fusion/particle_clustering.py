@@ -3,15 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.probability.clusters import clusters
 from omninav.stages.geometry.probability.gaussians import floored
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
-
-Array = npt.NDArray[np.float64]
 
 CELL_M = 0.5
 """Width of a cell, metres."""

@@ -4,9 +4,9 @@ import math
 from dataclasses import field
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array, Bools, Bytes
 from omninav.stages.geometry.landmarks.unbroken_view import Carried, carried
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.particles import share_within
@@ -17,9 +17,6 @@ from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.track import Track
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 NEAR = (0.3, math.radians(30.0))
 """Distance (m) and turn (rad) within which two poses are of one place: the next of shelves that look the same is 0.9 m
@@ -55,7 +52,7 @@ class UnbrokenTrackState(State):
     elsewhere: float = 0.0
     moved: Array = field(default_factory=lambda: np.zeros(3))
     bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
-    descriptors: npt.NDArray[np.uint8] = field(default_factory=lambda: np.empty((0, 0), np.uint8))
+    descriptors: Bytes = field(default_factory=lambda: np.empty((0, 0), np.uint8))
 
     def confirm(self, pose: Array, length: float) -> None:
         """Go on from a pose (3,) that was confirmed over a path of this length (m)."""

@@ -4,13 +4,11 @@ import math
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
-
-Array = npt.NDArray[np.float64]
 
 RANDOM_PARTICLES = 50
 """Particles drawn from the proposals at each image, as in the paper (section VI-C)."""

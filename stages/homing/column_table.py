@@ -4,14 +4,14 @@ import math
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.image import Pixels
 
-from .min_warping import LOG_STEP, Columns, Floats
+from .min_warping import LOG_STEP, Columns
 
 FINER = 4
 """Samples per column and per row, which are averaged."""
@@ -41,7 +41,7 @@ class ColumnTable:
             self._camera = camera
         return Columns(*(self._sampled(pixels, places, camera) for places in self._places))
 
-    def _sampled(self, pixels: Pixels, places: npt.NDArray[np.float32], camera: Camera) -> Floats:
+    def _sampled(self, pixels: Pixels, places: Floats, camera: Camera) -> Floats:
         rows = len(places) // FINER
         if not rows:
             return np.zeros((self._columns, 0, 3), np.float32)
@@ -51,7 +51,7 @@ class ColumnTable:
         return np.ascontiguousarray(mean.transpose(1, 0, 2) / 255.0, np.float32)
 
 
-def _places(camera: Camera, columns: int, side: float) -> npt.NDArray[np.float32]:
+def _places(camera: Camera, columns: int, side: float) -> Floats:
     """Pixels of the samples of the rows on one side of the horizon that are seen all around, outwards."""
     low, high = (math.log(math.tan(math.radians(degrees))) for degrees in (LOWEST_DEG, HIGHEST_DEG))
     rows = math.floor((high - low) / LOG_STEP) + 1

@@ -3,10 +3,10 @@
 from dataclasses import field
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, LocalMap, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.pose import Motion
@@ -14,10 +14,6 @@ from omninav.stages.values.pose import Motion
 from .image_tracking import HISTOGRAM_BINS, best_nearby, find_again, histograms, track, trackability
 from .working_image import WorkingImage, working_image
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 EDGE_PX = 2.0
 """Points closer to the image's edge are not tracked."""
 MAX_PIXELS = 76800
@@ -31,7 +27,7 @@ class FeatureTrackerState(State):
     (N, 16) of intensities.
     """
 
-    image: npt.NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
+    image: Bytes = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
     number: int = -1
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     points: Array = field(default_factory=lambda: np.zeros((0, 2)))

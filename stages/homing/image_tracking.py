@@ -10,13 +10,11 @@ from typing import Any, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 
 from .working_image import Grey, WorkingImage
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float32]
 HISTOGRAM_BINS = 16
 """Bins of the histogram of the intensities around a point."""
 START_RADIUS_PX = 3

@@ -5,10 +5,10 @@ from dataclasses import field, replace
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
 from omninav.stages.geometry.two_views.epipolar import yaw_of
@@ -19,8 +19,6 @@ from omninav.stages.values.homing import LOST, MATCHED, HomingTarget, LocalMap, 
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 MIN_MAP_MOTION, MIN_ODOMETRY_M = 0.1, 0.05
 """Distances since the map was made, in its unit and in metres, from which they are compared for the unit in metres."""
 MAX_EPIPOLAR_ERROR_DEG = 1.0

@@ -12,12 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Floats, Ints
 
 LOG_STEP = 0.112
 """Step of the logarithm of the tangent of elevation from row to row, and of the magnification from plane to plane."""

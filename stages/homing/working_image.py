@@ -10,9 +10,9 @@ import numpy.typing as npt
 from omninav.pipeline import BadInput
 from omninav.stages.camera.model import Camera, require_elevations, seen_at
 from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Image, Panorama
 
-Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
 SEAM = 32
 """Columns of a full circle that are repeated beyond both edges, so that features can be tracked across the seam."""
@@ -50,7 +50,7 @@ class WorkingImage(NamedTuple):
         """Points (N, 2) of the original in pixels of this one."""
         return (points + 0.5) / self.scale - 0.5
 
-    def inside(self, points: Array, margin: float) -> npt.NDArray[np.bool_]:
+    def inside(self, points: Array, margin: float) -> Bools:
         """Which points (N, 2) are finite and `margin` pixels from the edges of `grey`."""
         rows, columns = self.grey.shape
         x, y = points[:, 0] + self.seam, points[:, 1]

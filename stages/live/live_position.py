@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import State, Tick
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import Frame
 from omninav.stages.source.outputs import motion_of
@@ -29,7 +29,7 @@ class LiveSourceState(State):
     y: float = 0.0
     heading: float = 0.0
     unmeasured_s: float = 0.0
-    view: npt.NDArray[np.float32] | None = None
+    view: Floats | None = None
     first: int = 0
     ended: int = 0
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.plots.pose_messages import (
     BASE,
@@ -31,7 +31,6 @@ from omninav.stages.values.ros_messages import RosMessages
 from .transport import Transport, TransportError, TransportName, connect
 from .watchdog import Watchdog
 
-Array = npt.NDArray[np.float64]
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE_ARRAY = "geometry_msgs/msg/PoseArray"
 TF = "tf2_msgs/msg/TFMessage"

@@ -13,8 +13,9 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import interpolate
-from omninav.stages.plots.pose_messages import BASE, ODOM, Array, header, ros_pose, transform
+from omninav.stages.plots.pose_messages import BASE, ODOM, header, ros_pose, transform
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image

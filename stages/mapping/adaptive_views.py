@@ -3,11 +3,11 @@
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import (
     farther_apart,
@@ -26,8 +26,6 @@ from .pending_updates import PendingUpdates, ready_updates, start_over
 from .view_cap import within_cap
 from .view_events import view_event
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 DEFAULT_LENGTH_SCALE_M = 0.3
 """Distance over which views are similar where the threshold does not tell."""
 Forgetting = Literal["active", "passive", "none"]
@@ -239,7 +237,7 @@ def _update_weights(
     places: Array,
     spreads: Array,
     weights: Array,
-    matched: npt.NDArray[np.bool_],
+    matched: Bools,
     similarities: Array,
     turns: Array,
     beta: float,

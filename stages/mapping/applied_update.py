@@ -3,14 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 class AppliedUpdate(Value):

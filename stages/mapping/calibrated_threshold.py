@@ -5,15 +5,13 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold, WholeView
 
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
 MIN_MOVE_M = 0.01
 """Distance driven between two views that count, metres."""
 
@@ -26,7 +24,7 @@ class CalibratedThresholdState(State):
     """
 
     threshold: NoveltyThreshold | None = None
-    views: FloatArray = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    views: Floats = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     table: list[Array] = field(default_factory=list)
     gaps_m: list[float] = field(default_factory=list)
     since_m: float = 0.0

@@ -6,19 +6,16 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Quantity
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed
 from omninav.stages.camera.strip_elevations import with_elevations_found
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.local_features import LocalFeatures
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 CAMERA_QUANTITIES = {
     "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),

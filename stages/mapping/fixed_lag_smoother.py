@@ -6,9 +6,9 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.odometry_motion import motion_gaussian
 from omninav.stages.geometry.plane.path_reconstruction import reconstruct_path
 from omninav.stages.geometry.probability.gaussians import squared_distances
@@ -20,7 +20,6 @@ from omninav.stages.values.views import Neighbours, WholeView
 
 from .unimodality import unimodal_state
 
-Array = npt.NDArray[np.float64]
 Pose = tuple[Array, Array]
 
 MIN_IMPROVEMENT = 2.0

@@ -5,10 +5,10 @@ from dataclasses import field
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.view_similarity import similarity
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import merged
 from omninav.stages.values.belief import GaussianMixture
@@ -21,8 +21,6 @@ from .pending_updates import PendingUpdates, ready_updates, start_over
 from .view_cap import within_cap
 from .view_events import view_event
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Parts = tuple[Array, Array, Array, Array]
 Average = Literal["visits", "halves"]
 MERGE_BELOW = 7.81

@@ -4,9 +4,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
@@ -15,7 +15,6 @@ from omninav.stages.values.views import WholeView
 
 from .unimodality import unimodal_state
 
-Array = npt.NDArray[np.float64]
 MAX_SIGMA_DEG = 45.0
 """Largest standard deviation of a believed heading, degrees; an unknown one has 104."""
 MIN_MOVE_M = 0.01

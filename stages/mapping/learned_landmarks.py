@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import AdjustedMap, adjusted_drive, adjusted_to_given
 from omninav.stages.geometry.landmarks.map_making import (
@@ -126,7 +126,7 @@ class LearnLandmarks(Stage):
         return self.Out(map=replace(map, poses=poses, landmarks=landmarks), metrics=metrics)
 
 
-def _candidates(words: VisualWords) -> list[npt.NDArray[np.int64]]:
+def _candidates(words: VisualWords) -> list[Ints]:
     samples = samples_of(len(words))
     rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), samples)
     return [other_references(int(reference), row) for reference, row in zip(samples, rows, strict=True)]
@@ -137,7 +137,7 @@ def _views(found: Sequence[LocalFeatures | None]) -> LocalViews:
     return local_views(bearings, [each.descriptors for each in found if each is not None])
 
 
-def _rows(words: VisualWords) -> Iterator[npt.NDArray[np.float32]]:
+def _rows(words: VisualWords) -> Iterator[Floats]:
     return similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
 
 

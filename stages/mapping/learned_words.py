@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.visual_words import learned_words, root_descriptors
+from omninav.stages.geometry.arrays import Bytes
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
@@ -49,7 +49,7 @@ class LearnVisualWords(Stage):
         return self.Out(words=made)
 
 
-def vocabulary_and_words(views: Sequence[npt.NDArray[np.uint8]], words: int) -> VisualWords:
+def vocabulary_and_words(views: Sequence[Bytes], words: int) -> VisualWords:
     """A vocabulary of so many words, learned from the views' own descriptors (N, D), and the words of each view."""
     together = np.concatenate([view for view in views if len(view)] or [np.empty((0, 128), np.uint8)])
     rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * DESCRIPTORS_PER_WORD)).astype(np.int64)

@@ -4,15 +4,13 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance import place_clusters
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.geometry.probability import dempster_shafer
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.topological_map import LoopHypotheses
-
-Ints = npt.NDArray[np.int64]
 
 IGNORANCE = 0.25
 """Ignorance of a hypothesis before its neighbours have spoken (erratum 30 in docs/papers.md)."""

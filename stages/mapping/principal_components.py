@@ -4,17 +4,14 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.views import Coefficients
 
-Array = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.float32]
 
-
-def principal_components(images: FloatArray, number: int, headings: int = 1) -> tuple[Array, Array]:
+def principal_components(images: Floats, number: int, headings: int = 1) -> tuple[Array, Array]:
     """Directions of greatest variance of images (N, P), and their shares of it: (D, P) orthonormal, (D,).
 
     With `headings` H > 1 over all H turned copies of each: an image runs column by column around the robot, a turn

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.drive_graph import closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
@@ -16,9 +16,6 @@ from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.views import NoveltyThreshold
 
 from .session_closures import closures_between
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 QUANTITIES = {
     "straightened.sessions": Quantity(title="Drives that the map was learned from", context=True),

@@ -4,14 +4,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.appearance.visual_distance import compare
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.values.compared_views import ComparedViews
-
-Array = npt.NDArray[np.float64]
 
 MIN_GAP = 10
 """Views of one tour between the two of a closure."""

@@ -6,18 +6,16 @@ from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance import place_clusters
 from omninav.stages.geometry.appearance.visual_distance import Patches, compare, match_patches
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import LocalFeatures, view_features
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, TopologicalMap, stored
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 MAX_PATH_STEP = 5
 """Views of the drive from one path image to the next, the paper's 1 to 5 m."""
 WINDOW = 3

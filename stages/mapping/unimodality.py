@@ -1,12 +1,10 @@
 """Tests whether a state is unimodal."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.gaussians import moments, squared_distances
 from omninav.stages.values.belief import GaussianMixture
-
-Array = npt.NDArray[np.float64]
 
 
 def unimodal_state(

@@ -1,12 +1,12 @@
 """Limits the number of views of a map."""
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 
-def within_cap(map: ViewMixtures, max_views: int) -> npt.NDArray[np.bool_]:
+def within_cap(map: ViewMixtures, max_views: int) -> Bools:
     """Which views (R,) stay in a map of at most `max_views`; 0: all of them.
 
     The weakest go first: those with the smallest sum of weights, then the fewest observations, then the oldest. Views

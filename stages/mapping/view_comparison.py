@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
@@ -17,6 +16,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
     colour_distances,
     compare,
 )
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
@@ -25,7 +25,6 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 from .pose_of_view import Supervised
 
-Array = npt.NDArray[np.float64]
 ORDER_GAP = 1000
 """Gap between the numbers of the last view of a tour and the first of the next: they do not follow each other."""
 
@@ -175,7 +174,7 @@ def known_views(known: TopologicalMap) -> list[View]:
 def compare_all(
     ctx: Context,
     views: Sequence[ViewFeatures],
-    close: npt.NDArray[np.bool_],
+    close: Bools,
     known: int,
     options: ComparisonOptions,
 ) -> tuple[Array, Array]:

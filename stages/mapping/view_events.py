@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-
-Ints = npt.NDArray[np.int64]
 
 
 def view_event(

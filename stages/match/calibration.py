@@ -5,18 +5,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.likelihood_ratio import correlation_length, logistic_fit, standard_scores
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 Compare = Callable[[int, Ints], Floats]
 
 IMAGES, MAX_COMPARED = 200, 1000
@@ -95,9 +92,7 @@ def compared_with(poses: Array, view: int, near_m: float) -> tuple[Ints, Array]:
     return chosen[order], each[order]
 
 
-def right_and_wrong(
-    pose: Array, references: Array, headings: int, right_distance: float
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def right_and_wrong(pose: Array, references: Array, headings: int, right_distance: float) -> tuple[Bools, Bools]:
     """Which cells (C, headings) of references (C, 3) are the right place of a view at a pose, and which a wrong one.
 
     Right: within `right_distance` metres, at the compared heading nearest to the pose's. Wrong: well beyond, at any

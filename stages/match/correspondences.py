@@ -3,16 +3,13 @@
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, match_patches
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.local_features import LocalFeatures
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 class MatchFeatures(Stage):

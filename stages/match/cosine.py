@@ -1,10 +1,8 @@
 """Similarity by the angle between whole views."""
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Stage
 from omninav.stages.geometry.appearance.segments import cosine_similarities
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -17,7 +15,5 @@ class CosineMatch(ReferenceMatch, Stage):
     1 is the same direction; 0 a right angle or more. Raises BadInput where the map has other features.
     """
 
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         return cosine_similarities(map.features, features.values, self.headings, chosen)

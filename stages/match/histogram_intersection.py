@@ -1,10 +1,8 @@
 """Similarity as the mean intersection of the segments' histograms."""
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Context, Stage
 from omninav.stages.geometry.appearance.segments import similarities
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
@@ -34,9 +32,7 @@ class HistogramIntersection(ReferenceMatch, Stage):
         """Compare one view."""
         return super().step(ctx, features, map, candidates, words, length_scale, last)
 
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         return similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:

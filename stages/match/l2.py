@@ -1,10 +1,8 @@
 """Similarity by the Euclidean distance of whole views."""
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Stage
 from omninav.stages.geometry.appearance.segments import euclidean_similarities, max_distance_of
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -17,9 +15,7 @@ class L2Match(ReferenceMatch, Stage):
     The non-selective method of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[None, float]:

@@ -2,12 +2,8 @@
 
 from collections.abc import Callable
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Context, State
-
-Floats = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Floats
 
 
 class LastView(State):

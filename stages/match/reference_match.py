@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures
@@ -19,8 +19,6 @@ from omninav.stages.values.visual_words import WordSimilarities
 
 from .calibration import MapCalibration
 from .last_view import LastView
-
-Floats = npt.NDArray[np.float32]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -69,7 +67,7 @@ class ReferenceMatch(ABC):
         def of_one(view: Floats) -> Floats:
             return self.compare_view(map, features, view)
 
-        def of_view(view: int, chosen: npt.NDArray[np.int64]) -> Floats:
+        def of_view(view: int, chosen: Ints) -> Floats:
             return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
 
         weighed = words is not None and self.word_power > 0.0  # by words, which no last view has
@@ -78,7 +76,7 @@ class ReferenceMatch(ABC):
         return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
 
     @abstractmethod
-    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None) -> Floats:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         """Similarities to the chosen references, None for all: (chosen, headings)."""
 
     def compare_view(self, map: ReferenceGraph, features: SegmentFeatures, view: Floats) -> Floats:

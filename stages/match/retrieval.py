@@ -4,12 +4,12 @@ import math
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import Rows, turned_views
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
@@ -22,8 +22,6 @@ from .calibration import MapCalibration
 from .last_view import LastView
 from .reference_match import check_same_kind
 
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 LANES = 8
 """Turns of the query are padded to a multiple of this, so that the inner loops are whole vector instructions."""
 BEST = 9
@@ -82,7 +80,7 @@ def normalised_intersections(references: Rows, queries: Floats, scales: int = 1,
     return np.minimum(out, np.float32(1.0))
 
 
-def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
+def window_turns(directions: Array) -> Ints:
     """The window in which a robot turned by 2 pi h / W from a reference sees its image: (W,) indices.
 
     `directions` (W,): where the windows look, evenly around the robot and one of them straight ahead. Raises BadInput

@@ -2,11 +2,9 @@
 
 from typing import Annotated, Literal
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Bounds, Stage
 from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_COLOUR_DISTANCE, MAX_DISTANCES, similarities
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -29,9 +27,7 @@ class SelectiveMatch(ReferenceMatch, Stage):
     """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
     possible, sqrt(3) 255, which leaves no segment out (docs/experiments/omniview_mcl_segments.md)."""
 
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         exponent, scale = self.exponent_and_scale(features)
         histograms = features.kind == "histograms"
         return similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)

@@ -3,11 +3,11 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.geometry.appearance.segments import cosine_similarities
 from omninav.stages.geometry.appearance.whitening import Whitening, learned_whitening
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -33,18 +33,14 @@ class WhitenedMatch(ReferenceMatch, Stage):
         """Nothing learned yet: the map comes with the first image."""
         self._learned: tuple[ReferenceGraph, int, Whitening] | None = None
 
-    def compare(
-        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
-    ) -> npt.NDArray[np.float32]:
+    def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         if not len(map):
             return np.zeros((0 if chosen is None else len(chosen), self.headings), np.float32)
         whitening = self._whitening(map)
         some = whitening.of(np.asarray(map.features[:] if chosen is None else map.features[chosen], np.float32))
         return cosine_similarities(some, whitening.of(features.values), self.headings)
 
-    def compare_view(
-        self, map: ReferenceGraph, features: SegmentFeatures, view: npt.NDArray[np.float32]
-    ) -> npt.NDArray[np.float32]:
+    def compare_view(self, map: ReferenceGraph, features: SegmentFeatures, view: Floats) -> Floats:
         if not len(map):
             return np.zeros((1, self.headings), np.float32)
         whitening = self._whitening(map)

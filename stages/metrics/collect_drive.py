@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
-from omninav.stages.values.drive import EVIDENCE, Drive, Ints, pose_row
+from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.pose import Motion, Pose

@@ -5,16 +5,15 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import spearmanr
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.appearance.visual_distance import MAX_GLOBAL_DISTANCE, colour_distances
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.rooms import Rooms
 
-Array = npt.NDArray[np.float64]
 QUANTITIES = {
     "comparison.passed_rate": Quantity(title="Pairs of views that pass the colours", unit="%"),
     "comparison.other_rooms_left_out": Quantity(title="Pairs of two rooms left out by colours", unit="%"),
@@ -95,5 +94,5 @@ def against_metres(distances: Array, metres: Array, within: float) -> dict[str, 
     }
 
 
-def _share(hits: npt.NDArray[np.bool_]) -> float | None:
+def _share(hits: Bools) -> float | None:
     return float(hits.mean()) if len(hits) else None

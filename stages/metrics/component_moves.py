@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricStage
-from omninav.stages.values.drive import Array
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.view_mixtures import MixturesNow
 
 NEAR_M = 1.0

@@ -3,12 +3,12 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 QUANTITIES = {
     "confidence.confident_share": Quantity(title="Images with a concentrated belief", unit="%", better="higher"),
@@ -72,9 +72,9 @@ def sigmas_of(drive: Drive) -> Array:
     return found
 
 
-def confident(drive: Drive) -> npt.NDArray[np.bool_]:
+def confident(drive: Drive) -> Bools:
     """Which of the frames have a confident estimate, see `Confidence`: (N,)."""
-    sure: npt.NDArray[np.bool_] = known(drive.estimate) & (drive.mode_weight >= MIN_WEIGHT)
+    sure: Bools = known(drive.estimate) & (drive.mode_weight >= MIN_WEIGHT)
     return sure & (sigmas_of(drive) <= MAX_SIGMA_M)
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 Index = npt.NDArray[np.int64]
 HOME_M = 2.0

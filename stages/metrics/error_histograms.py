@@ -5,8 +5,9 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 SMALL_M = 0.4
 """Largest error that is small, metres."""

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricStage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.values.drive import Drive
 
 NEAR_M = 1.5
 """Distance up to which a component belongs to the hypothesis, metres."""

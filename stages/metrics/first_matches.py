@@ -6,20 +6,17 @@ from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.true_matches import Motion, angles_between, right_by_depth, right_by_epipolar
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 COLUMN_RATIO = 0.8
 """Largest ratio of the nearest to the second nearest distance of vertical segments that match."""

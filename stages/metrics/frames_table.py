@@ -7,9 +7,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.tables import write_table
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.confidence import TRACKING_STATES
-from omninav.stages.values.drive import EVIDENCE, Array, Drive, known
+from omninav.stages.values.drive import EVIDENCE, Drive, known
 
 from .confidence import confident
 

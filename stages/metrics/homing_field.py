@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.values.drive import Array, pose_rows
+from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.homing_field import HomingField
 from omninav.stages.values.pose import Pose

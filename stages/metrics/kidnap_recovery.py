@@ -4,14 +4,13 @@ import itertools
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
-Ints = npt.NDArray[np.int64]
 QUANTITIES = {
     "lifts.number": Quantity(title="Times lifted", context=True),
     "lifts.never": Quantity(title="Times lifted and not right again", better="lower"),

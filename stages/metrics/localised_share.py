@@ -5,8 +5,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 THRESHOLDS = {"fine": (0.25, 2.0), "medium": (0.5, 5.0), "coarse": (5.0, 10.0)}
 """Largest errors in position (m) and heading (degrees): Sattler et al. 2018."""

@@ -4,17 +4,13 @@ from typing import Any
 
 import networkx
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.probability.dempster_shafer import support, unknown
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
 
 QUANTITIES = {
     "loops.loop_closures.precision": Quantity(title="Loop closures, precision", unit="%", better="higher"),

@@ -4,18 +4,15 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
 
 from .error_curves import HOME_M, lap_ends
 from .trajectory_errors import spread
-
-Ints = npt.NDArray[np.int64]
-
 
 QUANTITIES = {
     "map.inserted": Quantity(title="References added"),

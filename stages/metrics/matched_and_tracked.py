@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
 from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -49,7 +49,7 @@ class Judged(NamedTuple):
 
     metres: float
     angles: Array
-    right: npt.NDArray[np.bool_]
+    right: Bools
 
 
 class MatchedAndTracked(MetricStage):
@@ -157,7 +157,7 @@ def metres(motion: Array) -> float:
     return math.hypot(motion[0], motion[1])
 
 
-def _summary(judged: Sequence[Judged], both: npt.NDArray[np.bool_]) -> dict[str, float | None]:
+def _summary(judged: Sequence[Judged], both: Bools) -> dict[str, float | None]:
     angles = np.concatenate([each.angles for each in judged])
     apart = [each.metres for each in judged if math.isfinite(each.metres)]
     return {

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.geometry.arrays import Array, Bools, Ints
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
-
-Ints = npt.NDArray[np.int64]
-
 
 QUANTITIES = {
     "mislocalised_references.references": Quantity(title="References learned at a wrong place", better="lower"),
@@ -100,5 +97,5 @@ def wrong_shares(
     return frames[:, 0], frames[:, 1], shares
 
 
-def _mean_of_those(shares: Array, there: npt.NDArray[np.bool_]) -> float | None:
+def _mean_of_those(shares: Array, there: Bools) -> float | None:
     return float(shares[there].mean()) if there.any() else None

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap

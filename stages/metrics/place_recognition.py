@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Table, Value
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 from omninav.stages.values.visual_words import PlaceWords
@@ -25,7 +25,7 @@ DISTANCES_M = (0.5, 1.0, 2.0, 5.0)
 class RankedReferences(Value):
     """The references most similar to an image, the best first: (K,) their numbers in the map."""
 
-    references: npt.NDArray[np.int64]
+    references: Ints
 
 
 class RankReferences(Stage):
@@ -97,9 +97,7 @@ def quantities(distance_m: float) -> dict[str, Quantity]:
     }
 
 
-def recalls(
-    positions: Array, ranked: Sequence[npt.NDArray[np.int64]], references: Array, distance_m: float
-) -> dict[str, Any]:
+def recalls(positions: Array, ranked: Sequence[Ints], references: Array, distance_m: float) -> dict[str, Any]:
     """Recall of ranked references for queries at positions (N, 2), by where references (R, 2) were taken (m)."""
     cells = sort_into_cells(references, distance_m)
     counts = have_a_point_within(cells, positions, float(np.nextafter(distance_m, np.inf)))

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.local_features import VerticalSegments
 
-Array = npt.NDArray[np.float64]
 COLOURS = 3
 """Entries of a segment's descriptor before its profile's coefficients."""
 QUANTITIES = {

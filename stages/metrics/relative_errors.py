@@ -3,12 +3,12 @@
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 
 def quantities(distance_m: float) -> dict[str, Quantity]:
@@ -89,7 +89,7 @@ def absolute_trajectory_errors(estimate: Array, truth: Array) -> Array:
     return left
 
 
-def pairs_apart(truth: Array, distance_m: float) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def pairs_apart(truth: Array, distance_m: float) -> tuple[Ints, Ints]:
     """Starts and ends of pairs: for each frame the first later one at least `distance_m` of path further on."""
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     ends = np.searchsorted(path, path + distance_m - 1e-9)
@@ -97,9 +97,7 @@ def pairs_apart(truth: Array, distance_m: float) -> tuple[npt.NDArray[np.int64],
     return starts, ends[starts].astype(np.int64)
 
 
-def relative_pose_errors(
-    estimate: Array, truth: Array, starts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64]
-) -> tuple[Array, Array]:
+def relative_pose_errors(estimate: Array, truth: Array, starts: Ints, ends: Ints) -> tuple[Array, Array]:
     """Error of the motion from start to end: metres and degrees, each (pairs,)."""
     error = between(between(truth[starts], truth[ends]), between(estimate[starts], estimate[ends]))
     return np.hypot(error[:, 0], error[:, 1]), np.degrees(np.abs(error[:, 2]))

@@ -3,13 +3,12 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
-Ints = npt.NDArray[np.int64]
 PLACE_M = 1.0
 """Side of a place's cell, metres."""
 AWAY_M = 5.0

@@ -6,8 +6,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.smoothing import smoothed, smoothed_with_lag
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 from .trajectory_errors import pose_errors, quantities
 

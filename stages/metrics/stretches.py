@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import counted
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.confidence import MIN_EMPTY, MIN_SEEN, MIN_SURE
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch, StretchState
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 Columns = Mapping[str, npt.NDArray[Any]]
 
 BLIND_CORRELATION, MIN_CONTRAST = 0.15, 1.0 / 255.0
@@ -77,13 +76,13 @@ class Log:
         return [text if isinstance(text, str) else "" for text in texts]
 
     @cached_property
-    def sure(self) -> Flags:
+    def sure(self) -> Bools:
         """Which estimates are sure: by the confidence, or without a monitor by the belief's concentration."""
         stated = self["confidence"] >= MIN_SURE if self.known("confidence") else self["confident"] == 1.0
         return np.asarray(np.isfinite(self["estimate_x"]) & stated)
 
     @cached_property
-    def blind(self) -> Flags:
+    def blind(self) -> Bools:
         """Which images say nothing, in rows of `MIN_EMPTY` and more."""
         empty = (self["correlation"] < BLIND_CORRELATION) | (self["contrast"] < MIN_CONTRAST)
         empty |= self["features"] < MIN_SEEN
@@ -92,7 +91,7 @@ class Log:
         return without_short(empty, MIN_EMPTY)
 
     @cached_property
-    def off_map(self) -> Flags:
+    def off_map(self) -> Bools:
         """Which estimates lie beside the map and have no landmarks there, in rows of `MIN_PART` and more."""
         limit = OFF_MAP_SCALES if self.known("landmarks") else OFF_MAP_SCALES_BY_APPEARANCE
         beside = (self["nearest_scales"] > limit) & ~(self["landmarks_away_m"] < NEAR_M)
@@ -105,7 +104,7 @@ class Log:
         return max(NEAR_M, NEAR_SCALES * median(self["nearest_m"][away] / self["nearest_scales"][away]))
 
     @cached_property
-    def agrees(self) -> Flags:
+    def agrees(self) -> Bools:
         """Sure estimates that the image bears out, by landmarks or else by its best match, where these are known."""
         by_match = self["match_away_m"] < self.gate if self.known("match_away_m") else np.ones(len(self), np.bool_)
         near = np.where(np.isfinite(self["landmarks_away_m"]), self["landmarks_away_m"] < NEAR_M, by_match)
@@ -230,8 +229,8 @@ def median(values: Array) -> float:
     return float(np.median(known)) if len(known) else math.nan
 
 
-def without_short(flags: Flags, least: int) -> Flags:
-    """Flags (N,), those taken away of which fewer than `least` follow each other."""
+def without_short(flags: Bools, least: int) -> Bools:
+    """Bools (N,), those taken away of which fewer than `least` follow each other."""
     kept, row = flags.copy(), 0
     for flag, group in groupby(flags.tolist()):
         length = len(list(group))

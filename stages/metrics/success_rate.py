@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Bools, Ints
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
@@ -69,13 +69,13 @@ class SuccessRate(MetricStage):
         return self.Out(metrics=Metrics({"success": found}, QUANTITIES, ("success.recovered_after_frames",)))
 
 
-def is_good(drive: Drive) -> npt.NDArray[np.bool_]:
+def is_good(drive: Drive) -> Bools:
     """Which frames have an estimate close to the truth, (N,); without an estimate it is none."""
     near = position_errors(drive.estimate, drive.truth) <= WITHIN_M
     return near & (heading_errors_deg(drive.estimate, drive.truth) <= WITHIN_DEG)
 
 
-def kidnapped_before(drive: Drive, min_distance_m: float) -> npt.NDArray[np.int64]:
+def kidnapped_before(drive: Drive, min_distance_m: float) -> Ints:
     """Frames before which the robot was kidnapped: its true position is that far from where its odometry leads."""
     led = compose(drive.truth[:-1], np.nan_to_num(drive.motion[1:]))
     off = np.hypot(*(drive.truth[1:, :2] - led[:, :2]).T)

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 
 HEADLINES = (
     "position_error_m.median",
@@ -121,7 +121,7 @@ def pose_errors(poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
     }
 
 
-def spread(errors: npt.NDArray[np.float64]) -> dict[str, float]:
+def spread(errors: Array) -> dict[str, float]:
     """Mean, standard deviation, median, 90th percentile and maximum (percentiles interpolate linearly)."""
     return {
         "mean": float(errors.mean()),

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 QUANTITIES = {

@@ -4,10 +4,10 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage, Quantity
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
 
@@ -52,7 +52,7 @@ class ViewSpacing(MetricStage):
         return self.Out(metrics=Metrics({"spacing": found}, QUANTITIES))
 
 
-def nearest_views(map: ViewMixtures, view: WholeView, rows: npt.NDArray[np.int64]) -> Array:
+def nearest_views(map: ViewMixtures, view: WholeView, rows: Ints) -> Array:
     """The distance of some views of a map, `rows` (N,), to their nearest other ones, as they were kept: (N,)."""
     nearest = np.empty(len(rows))
     for number, row in enumerate(rows):
@@ -85,7 +85,7 @@ def spaced(nearest: Array) -> dict[str, Any]:
     }
 
 
-def _as_kept(view: WholeView, values: npt.NDArray[np.float32]) -> WholeView:
+def _as_kept(view: WholeView, values: Floats) -> WholeView:
     # A view with a kept one's numbers. What it would look like turned is not kept, so it is compared as it is.
     own: dict[str, Any] = {"values": values}
     if any(field.name == "turned" for field in dataclasses.fields(view)):

@@ -5,10 +5,10 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.particles import share_within
@@ -32,8 +32,6 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.track import Track
-
-Array = npt.NDArray[np.float64]
 
 MAX_IMAGES = 500
 """Images that are remembered, of a robot that stands or moves slowly."""
@@ -309,7 +307,7 @@ def leads_of_best(similarities: Similarities, map: ReferenceGraph, pose: Array, 
     return MatchLeads(best_place(similarities, map), _lead_over(far, similarities), _lead_over(near, similarities))
 
 
-def _lead_over(rows: npt.NDArray[np.bool_], similarities: Similarities) -> float:
+def _lead_over(rows: Bools, similarities: Similarities) -> float:
     others = similarities.best[rows]
     if not len(others):
         return 0.0

@@ -4,10 +4,10 @@ import math
 from dataclasses import field
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
@@ -25,7 +25,7 @@ WHITE = 255.0
 class MeasureEvidenceState(State):
     """`strip` (1, rows, columns): the image before; of no rows before the first."""
 
-    strip: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((1, 0, 0), np.float32))
+    strip: Floats = field(default_factory=lambda: np.zeros((1, 0, 0), np.float32))
 
 
 class MeasureEvidence(Stage):

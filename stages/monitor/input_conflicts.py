@@ -7,11 +7,11 @@ from dataclasses import field
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.turn_fit import TurnFit, clipped, explained, turn_fit
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
@@ -25,8 +25,6 @@ from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 from omninav.stages.values.similarity import Similarities
 
 from .confidence_monitor import best_place
-
-Array = npt.NDArray[np.float64]
 
 INTERVAL_S = 0.25
 """Images that come sooner after the last one that was watched are left out (s)."""
@@ -76,7 +74,7 @@ class InputConflictsState(State):
     the last judgement found; what was said, by its kind, and how many judgements ago each that stands was found last.
     """
 
-    strips: list[npt.NDArray[np.float32]] = field(default_factory=list)
+    strips: list[Floats] = field(default_factory=list)
     stamp: int = 0
     pose: Array = field(default_factory=lambda: np.full(3, np.nan))
     rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
@@ -210,7 +208,7 @@ def lies_at(match: Array, estimate: PoseEstimate | None, length_scale_m: float) 
     return float(math.hypot(*away[:2]) < NEAR_SCALES * length_scale_m and abs(wrap(away[2])) < NEAR_RAD)
 
 
-def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32]) -> None:
+def remember(recent: InputConflictsState, stamp: int, pixels: Floats) -> None:
     """Add a row for an image; its comparison with the one before is left to `compare_strips`."""
     row = np.full((1, COLUMNS), np.nan)
     row[0, 0], row[0, 1:4], row[0, 10] = 0.0, recent.pose, 0.0

@@ -3,17 +3,15 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.appearance.segments import HEADINGS, MAX_DISTANCES, similarities
 from omninav.stages.geometry.appearance.turn_fit import explained
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.maps import ReferenceGraph
-
-Array = npt.NDArray[np.float64]
 
 MIN_REFERENCES = 20
 """References without which nothing is said."""

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
@@ -16,9 +16,6 @@ from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-
-Array = npt.NDArray[np.float64]
-
 
 DRIFT_M = (0.1, 0.05)
 """Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""

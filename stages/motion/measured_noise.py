@@ -4,14 +4,12 @@ import math
 from dataclasses import field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import State
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion, UncertainMotion
-
-Array = npt.NDArray[np.float64]
 
 SURE = 0.95
 """Probability of a pose by landmarks from which it tells where the robot is."""

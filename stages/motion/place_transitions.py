@@ -3,14 +3,12 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.place_graph import links_between
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.topological_map import TopologicalMap
-
-Array = npt.NDArray[np.float64]
 
 TELEPORT_PROBABILITY = 0.01
 """Probability of being at any place next, so that a robot that was carried is found."""

@@ -5,20 +5,16 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 from omninav.stages.geometry.landmarks.map_making import LocalViews
 from omninav.stages.geometry.landmarks.visual_odometry import STILL, Keyframes, begun, extended, is_keyframe, tracked
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
-
-Array = npt.NDArray[np.float64]
-Bytes = npt.NDArray[np.uint8]
-Floats = npt.NDArray[np.float32]
 
 MAX_LOST = 5
 """Images in a row that show no motion, from which on each begins anew."""
@@ -49,7 +45,7 @@ class VisualOdometryState(State):
     """
 
     poses: Array = field(default_factory=lambda: np.empty((0, 3)))
-    starts: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
     descriptors: Bytes = field(default_factory=lambda: np.empty((0, 0), np.uint8))
     points: Array = field(default_factory=lambda: np.empty((0, 3)))

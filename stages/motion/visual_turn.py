@@ -6,10 +6,10 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.turn_by_flow import smoothness, turn_by_flow
+from omninav.stages.geometry.arrays import Bytes
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
@@ -30,7 +30,7 @@ some 2 where each column has detail of its own, towards 4 where columns are inte
 class VisualTurnState(State):
     """The last panorama in grey (rows, columns)."""
 
-    grey: npt.NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
+    grey: Bytes = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
 
 
 class VisualTurn(OdometryNoiseModel, Stage):

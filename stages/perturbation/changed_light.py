@@ -6,13 +6,11 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
-
-Array = npt.NDArray[np.float64]
 
 Gain = Annotated[float, Bounds(gt=0, le=10)]
 

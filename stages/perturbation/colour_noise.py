@@ -3,13 +3,10 @@
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Bools, Ints
 from omninav.stages.values.image import Panorama
-
-Mask = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 
 PATTERN = 0
 """Number from which, with the frame's, parts and noise follow: all repetitions see the same images."""
@@ -30,7 +27,7 @@ def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
     return np.diff(np.concatenate([[-1], bars, [whole + parts - 1]])) - 1
 
 
-def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:
+def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Bools:
     """Full-height sectors around the circle that cover `share` of it exactly: (rows, columns) bool.
 
     As many as fit with a mean width of `width` (a share of the circle); their widths, gaps and place are random.

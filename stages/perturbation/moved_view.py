@@ -5,12 +5,10 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.image import Pixels, Windows
-
-Bools = npt.NDArray[np.bool_]
 
 
 def moved_view(

@@ -5,10 +5,10 @@ from dataclasses import field
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.unbroken_view import of_one_place
 from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to
 from omninav.stages.geometry.plane.se2 import wrap_angle
@@ -21,9 +21,6 @@ from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 MIN_PROBABILITY = 0.5
 """Least confidence in the estimate with which the robot drives, and probability of a pose that tells of an arrival."""

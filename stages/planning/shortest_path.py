@@ -6,20 +6,16 @@ from typing import Annotated, Literal
 
 import networkx
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput, nearest
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 
 MAX_VISUAL_DISTANCE = 0.5
 """Largest visual distance between a goal's image and its place: the paper's size of places."""

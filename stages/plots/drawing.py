@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.landmarks import Landmarks
 from omninav.stages.values.map_places import AnyMap
@@ -14,8 +14,6 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = npt.NDArray[np.float64]
 
 # Okabe & Ito's palette (2008), dark enough on white
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"

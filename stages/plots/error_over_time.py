@@ -7,8 +7,9 @@ import numpy as np
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.values.drive import Drive
 
 
 class ErrorOverTime(FigureStage):

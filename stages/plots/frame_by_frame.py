@@ -6,18 +6,18 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.probability.calibration import ELLIPSE_95, squared_mahalanobis
 from omninav.stages.geometry.probability.gaussians import moments
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.homing import DrivingStatus, PathProgress
@@ -38,7 +38,6 @@ from .plan_chart import draw_surroundings, jumps, plan_chart
 from .snapshot_times import even_frames
 from .target_images import target_of
 
-Flags = npt.NDArray[np.bool_]
 Shown = Particles | GaussianMixture | PlaceBelief
 MAX_ANSWERS = 3
 """References of an answer that are shown at most."""
@@ -217,7 +216,7 @@ def _draw_now(layer: Layer, belief: Shown | None, drive: Drive, path: Array, n: 
     layer.dart(drive.estimate[n], "blue")
 
 
-def _doubted(drive: Drive) -> Flags:
+def _doubted(drive: Drive) -> Bools:
     """Which estimates have a covariance that is not zero: (N,)."""
     spread = drive.covariance[:, 0, 0] + drive.covariance[:, 1, 1]
     return np.asarray(known(drive.estimate) & (np.nan_to_num(spread) > 0.0))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from omninav.pipeline.report.chart import Layer
-from omninav.stages.values.drive import Array
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute

@@ -9,12 +9,12 @@ from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.panorama import camera_behind
 from omninav.stages.camera.thumbnail import thumbnail
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 
 from .snapshot_times import is_snapshot_frame
 
-Array = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float32]
 
 COLUMNS = 480

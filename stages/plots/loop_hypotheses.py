@@ -1,10 +1,10 @@
 """Plots loop hypotheses of a tour, and the topological map made from it."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
+from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
@@ -54,7 +54,7 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
             if tour != 0:  # the first one's way is what the links show
                 chart.base.line(poses[:, :2], "line", 0.8)
         chart.name(f"images ({len(found.poses)})", "grey", "dot")
-    shown: tuple[tuple[npt.NDArray[np.bool_], Colour, str], ...] = (
+    shown: tuple[tuple[Bools, Colour, str], ...] = (
         (~found.accepted, "orange", "rejected"),
         (found.accepted, "green", "accepted"),
     )
@@ -70,7 +70,7 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
 def _draw_places(chart: Chart, map: TopologicalMap) -> None:
     paths = [map.poses[map.whole_way(link)] for link in range(len(map.links))]
     loop = map.kinds == LOOP
-    kinds: tuple[tuple[npt.NDArray[np.bool_], Colour, str], ...] = ((~loop, "blue", "driven"), (loop, "green", "loops"))
+    kinds: tuple[tuple[Bools, Colour, str], ...] = ((~loop, "blue", "driven"), (loop, "green", "loops"))
     for of_kind, colour, name in kinds:
         some = [path for path, kept in zip(paths, of_kind, strict=True) if kept]
         draw_lines(chart.base, some, colour, 1.3)

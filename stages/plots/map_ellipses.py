@@ -6,7 +6,8 @@ import numpy as np
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Colour
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.view_mixtures import ViewMixtures

@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
+from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
-Ints = npt.NDArray[np.int64]
 Named = tuple[npt.NDArray[Any], Colour, str]
 BINS = 80
 X_LABEL = "frames, all logs one after the other"

@@ -3,7 +3,8 @@
 import numpy as np
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import SOURCE_WORDS

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline.mcap.message_types import standard_types
-from omninav.stages.plots.pose_messages import BASE, MAP, Array, Fields, header, quaternion, ros_point
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.plots.pose_messages import BASE, MAP, Fields, header, quaternion, ros_point
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap

@@ -4,13 +4,13 @@ import math
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.camera.model import seen_at
 from omninav.stages.camera.panorama import panorama_camera
 from omninav.stages.camera.thumbnail import Thumbnail, thumbnail
+from omninav.stages.geometry.arrays import Bools, Floats
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.landmarks import LandmarkFix
 
@@ -30,8 +30,8 @@ class EncodedPanorama(Value):
 
     jpeg: bytes
     headings: tuple[float, ...] = ()
-    points: Annotated[npt.NDArray[np.float32] | None, Shape("N", 2, finite=False)] = None
-    agree: Annotated[npt.NDArray[np.bool_] | None, Shape("N")] = None
+    points: Annotated[Floats | None, Shape("N", 2, finite=False)] = None
+    agree: Annotated[Bools | None, Shape("N")] = None
 
 
 class PanoramaSnapshot(Stage):

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.appearance.place_graph import links_between
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.drive import known as poses_known
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -67,7 +67,7 @@ class PlaceBeliefOverTime(FigureStage):
         )
 
 
-def with_neighbours(shares: Array, nearest: npt.NDArray[np.int64], map: TopologicalMap) -> tuple[Array, Array]:
+def with_neighbours(shares: Array, nearest: Ints, map: TopologicalMap) -> tuple[Array, Array]:
     """Of each tick the belief in a place (N,), and in it with all places that are linked with it; NaN where unknown."""
     linked = links_between(map.links, len(map)) <= 1
     alone = np.where(nearest >= 0, shares[np.arange(len(shares)), nearest], np.nan)
@@ -83,7 +83,7 @@ def binned(shares: Array, columns: int) -> Array:
     return fewer
 
 
-def _draw(seconds: Array, shares: Array, nearest: npt.NDArray[np.int64], map: TopologicalMap) -> bytes:
+def _draw(seconds: Array, shares: Array, nearest: Ints, map: TopologicalMap) -> bytes:
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
     time, middle = (float(seconds[0]), float(seconds[-1]) + step), seconds + step / 2
     upper = Chart(time, (-0.5, len(map) - 0.5), "time (s)", "place", height=(float(np.clip(5 * len(map), 150, 320)), 0))

@@ -2,9 +2,9 @@
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.report.chart import Chart, Colour, Layer, broken
+from omninav.stages.geometry.arrays import Array, Bytes
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
@@ -12,7 +12,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .drawing import Array, extent_of, grid_extent, shown_landmarks
+from .drawing import extent_of, grid_extent, shown_landmarks
 
 Extent = tuple[float, float, float, float]
 
@@ -104,7 +104,7 @@ def _outlines(plan: FloorPlan) -> tuple[bytes, Extent]:
     return tinted(covered[::-1]), extent
 
 
-def tinted(opacity: npt.NDArray[np.uint8], colour: tuple[int, int, int] = STANDING) -> bytes:
+def tinted(opacity: Bytes, colour: tuple[int, int, int] = STANDING) -> bytes:
     """PNG bytes of one colour (blue-green-red), as opaque as (rows, columns) says."""
     pixels = np.empty((*opacity.shape, 4), np.uint8)
     pixels[:, :, :3], pixels[:, :, 3] = colour, opacity

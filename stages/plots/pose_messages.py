@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from omninav.pipeline.mcap.message_rows import MessageRows, row_bytes
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
+from omninav.stages.geometry.arrays import Array
 
-Array = npt.NDArray[np.float64]
 Fields = dict[str, Any]
 MAP, ODOM, BASE = "map", "odom", "base_link"
 """Frames: the map's, the odometry's, the robot's."""

@@ -8,7 +8,8 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
-from omninav.stages.values.drive import Array
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -138,7 +137,7 @@ def _blueprint() -> Any:
     return blueprint.Blueprint(blueprint.Horizontal(*views), collapse_panels=True)
 
 
-def _arrow(pose: Array) -> dict[str, npt.NDArray[np.float64]]:
+def _arrow(pose: Array) -> dict[str, Array]:
     ahead = ARROW_M * np.array([np.cos(pose[2]), np.sin(pose[2]), 0.0])
     return {"origins": _level(pose[None, :2]), "vectors": ahead[None]}
 

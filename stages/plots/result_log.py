@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from importlib.resources import files
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.plots.pose_messages import path_bytes
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.map_places import AnyMap
 
 from .markers import map_markers
@@ -69,6 +67,6 @@ def _write_paths(log: LogWriter, drive: Drive) -> None:
         log.append("/odometry/path", "nav_msgs/msg/Path", last, _path(drive.stamps, alone, last))
 
 
-def _path(stamps: npt.NDArray[np.int64], poses: Array, now: int) -> bytes:
+def _path(stamps: Ints, poses: Array, now: int) -> bytes:
     every = -(-len(poses) // PATH_POSES)
     return path_bytes(stamps[::every], poses[::every], now)

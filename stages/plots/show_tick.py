@@ -4,16 +4,16 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.pipeline.mcap.message_types import encode_message
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.plots.pose_messages import path_bytes
 from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PlaceBelief, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.drive import Array, pose_row
+from omninav.stages.values.drive import pose_row
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.homing import HomingVector
@@ -215,7 +215,7 @@ def _shown_references(found: Similarities | Neighbours | VisualDistances, map: A
     """
     if isinstance(found, Neighbours):  # a view is seen from several places
         return None, float(found.similarities.max(initial=0.0))
-    rows: npt.NDArray[np.int64] | None
+    rows: Ints | None
     if isinstance(found, Similarities):
         values, rows = found.best.astype(np.float64), found.candidates
     else:

@@ -6,8 +6,9 @@ import numpy as np
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.maps import ReferenceGraph
 
 from .drawing import (

@@ -1,9 +1,9 @@
 """Keeps what a plot needs of the similarities: the best one of each reference, at some frames."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.similarity import Similarities
 
 from .snapshot_times import is_snapshot_frame
@@ -16,10 +16,10 @@ class Peaks(Value):
     (headings,) of reference number `reference` of the map, headings as in `Similarities`.
     """
 
-    best: npt.NDArray[np.float32]
-    candidates: npt.NDArray[np.int64] | None
+    best: Floats
+    candidates: Ints | None
     reference: int
-    profile: npt.NDArray[np.float32]
+    profile: Floats
 
 
 class SimilarityPeaks(Stage):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.values.drive import Array
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute

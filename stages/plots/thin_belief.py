@@ -1,12 +1,10 @@
 """A belief in few particles or Gaussians, small enough to be kept for every frame."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PoseEstimate
 
-Array = npt.NDArray[np.float64]
 PARTICLES = 300
 """Largest number of particles or Gaussians."""
 

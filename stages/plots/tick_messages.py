@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import State
 from omninav.pipeline.mcap.message_rows import MessageRows, row_bytes
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.plots.pose_messages import (
     BASE,
@@ -23,7 +24,7 @@ from omninav.stages.plots.pose_messages import (
     set_stamps,
     transform,
 )
-from omninav.stages.values.drive import Array, known
+from omninav.stages.values.drive import known
 
 from .markers import GREEN, PINK, axis_ends, gaussian_markers, homing_arrow, opacity, weighted_points
 from .show_tick import ROW, ShownTick
@@ -42,7 +43,6 @@ ORDER = (
 )  # fmt: skip
 """Topics in the order in which a tick's messages are written."""
 
-Ints = npt.NDArray[np.int64]
 Rows = npt.NDArray[np.void]
 
 
@@ -86,10 +86,10 @@ def tick_messages(ticks: Sequence[ShownTick], before: PathSoFar, views_every: in
     path = np.isin(np.arange(len(ticks)), list(block.paths))
     rated, compared = ~np.isnan(rows["confidence"]), ~np.isnan(rows["best_similarity"])
 
-    def has(field_name: str) -> npt.NDArray[np.bool_]:
+    def has(field_name: str) -> Bools:
         return np.array([getattr(shown, field_name) is not None for shown in ticks])
 
-    topics: list[tuple[str, str, npt.NDArray[np.bool_], Callable[[Ints], list[bytes]]]] = [
+    topics: list[tuple[str, str, Bools, Callable[[Ints], list[bytes]]]] = [
         ("/tf", "tf2_msgs/msg/TFMessage", everywhere, block.transforms),
         ("/odom", "nav_msgs/msg/Odometry", everywhere, block.odometries),
         ("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", known(rows["truth"]), block.true_poses),

@@ -7,7 +7,8 @@ import numpy as np
 
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.files import write_whole
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive, known
 
 
 class TrajectoryFile(Stage):

@@ -7,7 +7,8 @@ import numpy as np
 from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import broken
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses

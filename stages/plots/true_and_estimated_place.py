@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Colour, broken
 from omninav.stages.geometry.appearance.place_graph import links_between
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -70,7 +70,7 @@ class TrueAndEstimatedPlace(FigureStage):
         )
 
 
-def judged(path: Array, believed: npt.NDArray[np.int64], map: TopologicalMap) -> npt.NDArray[np.int64]:
+def judged(path: Array, believed: Ints, map: TopologicalMap) -> Ints:
     """Of each image, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
     nearest, apart = map.nearest_places(path), links_between(map.links, len(map))
     return np.where(believed == nearest, RIGHT, np.where(apart[believed, nearest] <= 1, BESIDE, WRONG))
@@ -78,9 +78,9 @@ def judged(path: Array, believed: npt.NDArray[np.int64], map: TopologicalMap) ->
 
 def _draw(
     path: Array,
-    believed: npt.NDArray[np.int64],
+    believed: Ints,
     shares: Array,
-    kinds: npt.NDArray[np.int64],
+    kinds: Ints,
     map: TopologicalMap,
     plan: FloorPlan | None,
 ) -> bytes:

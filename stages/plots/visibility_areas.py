@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
-from omninav.stages.values.drive import Array, Drive
+from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visibility import VisibilityAreas
@@ -76,14 +77,14 @@ class ShowVisibilityAreas(FigureStage):
         )
 
 
-def views_by_cell(areas: VisibilityAreas) -> npt.NDArray[np.int64]:
+def views_by_cell(areas: VisibilityAreas) -> Ints:
     """Number of views whose area holds a cell: (rows, columns)."""
     views = np.bincount(areas.target[areas.target >= 0], minlength=len(areas.points))
     steps = np.zeros((areas.shape[0], areas.shape[1] + 1), np.int64)
     each = np.repeat(views, np.diff(areas.starts))
     np.add.at(steps, (areas.runs[:, 0], areas.runs[:, 1]), each)
     np.subtract.at(steps, (areas.runs[:, 0], areas.runs[:, 2]), each)
-    counts: npt.NDArray[np.int64] = np.cumsum(steps, axis=1)[:, :-1]
+    counts: Ints = np.cumsum(steps, axis=1)[:, :-1]
     return counts
 
 
@@ -91,8 +92,8 @@ def _draw(
     map: ReferenceGraph,
     areas: VisibilityAreas,
     grid: OccupancyGrid,
-    chosen: npt.NDArray[np.int64],
-    counts: npt.NDArray[np.int64],
+    chosen: Ints,
+    counts: Ints,
     driven: Array,
 ) -> bytes:
     rows, columns = np.nonzero(grid.cells == FREE)

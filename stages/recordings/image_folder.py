@@ -10,13 +10,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_small
 from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera, camera_models
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Undecodable, decode_image, orientation_of
 from omninav.stages.values.image import Pixels
 
@@ -26,11 +26,9 @@ from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_l
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording, checked_image
-from .stamps import ascending, lone
+from .stamps import Stamps, ascending, lone
 from .tables import NO_TIME, CsvTable, Delimiter, by_numbers, read_table, table_of
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 MAX_STARS = 8
 """Wildcards in the name of a file."""
 MAX_DIGITS = 10
@@ -198,7 +196,7 @@ class ImageFolder(Losses):
             numbers = map(_last_number, table.texts(frames.index), self._rows)
         return np.array([round(min(number * frames.period, FAR) * 1e9) for number in numbers], dtype=np.int64)
 
-    def _usable(self, paths: list[Path], times: Stamps, truth: Array | None) -> npt.NDArray[np.int64]:
+    def _usable(self, paths: list[Path], times: Stamps, truth: Array | None) -> Ints:
         rows = []
         for row, path in enumerate(paths):
             if times[row] == NO_TIME:

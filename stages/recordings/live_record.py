@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.commands import GoalPoint, Reinitialise
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
@@ -24,7 +24,6 @@ from .plausibility import MotionLimits
 from .recording import UnreadableRecording
 from .topic_recording import STALE, Feed, TopicRecording
 
-Array = npt.NDArray[np.float64]
 Role = Literal["image", "odometry", "truth", "scan", "initial_pose", "goal", "restart"]
 HEADER, HEADER_TYPE = "/omninav/live", "std_msgs/msg/String"
 """The topic that makes a file a live record: its one message says what the others are."""

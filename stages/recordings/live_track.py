@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose, interpolate
 
 from .plausibility import EXCURSION_S, MotionLimits, possible_between, seconds_within
 
-Array = npt.NDArray[np.float64]
 KEPT_S = 30.0
 """How far back a pose can be asked for."""
 MAX_PAUSE_S = 10.0

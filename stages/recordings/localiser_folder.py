@@ -3,16 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import BadInput, counted
+from omninav.stages.geometry.arrays import Array, Ints
 
 from .camera_yaml import parse_camera
 from .recorded_images import RecordedImages
 from .tables import NO_TIME, Time, read_table
 from .truth_file import trajectory_rows
 
-Array = npt.NDArray[np.float64]
 POSES = ("poses.csv", "poses.tum")
 """Files that hold its poses: the first that is there."""
 COST = "cpu_ms"
@@ -54,9 +53,7 @@ def write_folder(folder: Path, map: RecordedImages, drive: RecordedImages) -> li
     ]
 
 
-def _write_images(
-    folder: Path, images: RecordedImages, poses: Array, rows: npt.NDArray[np.int64], head: str
-) -> list[Path]:
+def _write_images(folder: Path, images: RecordedImages, poses: Array, rows: Ints, head: str) -> list[Path]:
     folder.mkdir()
     lines, files = [head], []
     for row in rows.tolist():

@@ -5,8 +5,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Bytes
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
@@ -110,7 +110,7 @@ def _raw_pixels(message: Any) -> Pixels:
         raise Undecodable(f"encoding '{message.encoding}' is not known (known: {', '.join(_AS_BGR)})")
     channels, conversion = _AS_BGR[message.encoding]
     height, width, step = int(message.height), int(message.width), int(message.step)
-    data: npt.NDArray[np.uint8] = np.frombuffer(bytes(message.data), np.uint8)
+    data: Bytes = np.frombuffer(bytes(message.data), np.uint8)
     if width < 1 or height < 1 or step < width * channels or data.size < height * step:
         raise Undecodable(f"{data.size} bytes for {width} x {height} pixels of {message.encoding}")
     rows = data[: height * step].reshape(height, step)[:, : width * channels]

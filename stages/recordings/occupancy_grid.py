@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds
 from omninav.pipeline.files import digest_file, digest_text, user_path
@@ -15,6 +14,7 @@ from omninav.pipeline.graph.parameters import read_parameters
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_small, read_yaml
+from omninav.stages.geometry.arrays import Bools, Bytes, Ints
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
@@ -96,7 +96,7 @@ def _named(content: Any, file: Path) -> dict[str, Any]:
     return known
 
 
-def _levels(file: Path, image: str) -> npt.NDArray[np.uint8]:
+def _levels(file: Path, image: str) -> Bytes:
     """The grey levels of a grid's image."""
     try:
         return decode_image(read_small(file.parent / image, MAX_CELLS * 4), colour=False, max_pixels=MAX_CELLS)
@@ -133,7 +133,7 @@ def read_grid(file: Path) -> FloorPlan:
     return FloorPlan(corners, x + columns * grid.resolution, y + rows * grid.resolution)
 
 
-def boxes(occupied: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+def boxes(occupied: Bools) -> Ints:
     """Occupied cells (rows, columns) as few boxes: (B, 4) first column, first row, column and row after the last.
 
     Runs of a row that stand in the next row as well are one box.

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
+from .stamps import Stamps
+
 Rows = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
+
 MIN_INTERVAL_S = 0.05
 """Stamps of a busy computer come in bunches: of two that are closer, this interval is judged."""
 EXCURSION_S = 1.0
@@ -63,7 +64,7 @@ def believed(stamps: Stamps, poses: Array, limits: MotionLimits) -> BelievedTrac
     return BelievedTrack(rows, jumps, np.column_stack([stamps[rows[:-1][torn]], stamps[rows[1:][torn]]]))
 
 
-def _kept(stamps: Stamps, poses: Array, torn: Mask, limits: MotionLimits) -> tuple[Rows, Rows]:
+def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tuple[Rows, Rows]:
     """The longest chain of stretches by dynamic programming: its rows, and which of these start again.
 
     `torn` (N - 1,): where a pose between two is missing. There a stretch ends too, since more is possible.
@@ -130,16 +131,16 @@ def possible_between(before: Array, after: Array, seconds: float, limits: Motion
     return abs(math.remainder(heading - heading_then, 2 * math.pi)) <= limits.turn * max(seconds, MIN_INTERVAL_S)
 
 
-def _resumes(firsts: Rows, ends: Rows, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Mask:
+def _resumes(firsts: Rows, ends: Rows, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Bools:
     """Whether a track can be at the first pose of a stretch, soon after the end of one before: (S - back,)."""
     last, first = ends[:-back] - 1, firsts[back:]
     possible = _possible(stamps[last], poses[last], stamps[first], poses[first], limits)
     return possible if back == 1 else possible & (stamps[first] - stamps[last] <= EXCURSION_S * 1e9)
 
 
-def _possible(before: Stamps, start: Array, after: Stamps, end: Array, limits: MotionLimits) -> npt.NDArray[np.bool_]:
+def _possible(before: Stamps, start: Array, after: Stamps, end: Array, limits: MotionLimits) -> Bools:
     seconds = np.maximum((after - before) / 1e9, MIN_INTERVAL_S)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is too far
         near = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1]) <= limits.speed * seconds
-        possible: npt.NDArray[np.bool_] = near & (np.abs(wrap(end[:, 2] - start[:, 2])) <= limits.turn * seconds)
+        possible: Bools = near & (np.abs(wrap(end[:, 2] - start[:, 2])) <= limits.turn * seconds)
     return possible

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
+
 from .plausibility import MotionLimits, believed, without_jumps
+from .stamps import Stamps
 from .topic_recording import Feed, in_order
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 Rows = npt.NDArray[np.int64]
 MAX_STAMP = 2**63 - 1
 """Largest time stamp, ns: the year 2262. A later one is out of order in any log."""

@@ -4,18 +4,16 @@ import math
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .description import Description, Heading
 from .plausibility import MotionLimits, believed
 from .recording import UnreadableRecording
-from .stamps import ascending_rows, poses_near
+from .stamps import Stamps, ascending_rows, poses_near
 from .tables import NO_TIME, Angle, CsvTable, Length
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 MAX_SKEW = 0.1
 """Difference of a rotation's cells from those of a rotation; files round to three digits."""
 MAX_STEEP_DEG = 60.0
@@ -76,9 +74,7 @@ def frame_poses(
     return poses, said
 
 
-def headings(
-    description: Description, table: CsvTable, rows: npt.NDArray[np.int64], stamps: Stamps, x: Array, y: Array
-) -> Array:
+def headings(description: Description, table: CsvTable, rows: Ints, stamps: Stamps, x: Array, y: Array) -> Array:
     """Headings (K,) at rows of a table, of which stamps (ns) and positions (m) are given."""
     heading, tangent = description.heading, description.tangent
     if heading is not None and heading.rotation:
@@ -95,7 +91,7 @@ def headings(
     return track_directions(along, np.column_stack([x, y]), tangent.window, tangent.lag)
 
 
-def _forward(heading: Heading, table: CsvTable, rows: npt.NDArray[np.int64]) -> Array:
+def _forward(heading: Heading, table: CsvTable, rows: Ints) -> Array:
     """Directions (K, 3) in the world of the axis that points ahead, at rows of a table.
 
     NaN in a row without a rotation. Raises `UnreadableRecording` where most have none, or most directions are steep.

@@ -2,13 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape, Starts
-
-Array = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array, Bytes, Ints
 
 
 class RecordedImages(Value):
@@ -20,9 +16,9 @@ class RecordedImages(Value):
     """
 
     camera: str
-    pngs: Annotated[npt.NDArray[np.uint8], Shape("bytes")]
-    ends: Annotated[npt.NDArray[np.int64], Shape("N+1"), Starts("bytes")]
-    stamps: Annotated[npt.NDArray[np.int64], Shape("N")]
+    pngs: Annotated[Bytes, Shape("bytes")]
+    ends: Annotated[Ints, Shape("N+1"), Starts("bytes")]
+    stamps: Annotated[Ints, Shape("N")]
     odometry: Annotated[Array, Shape("N", 3, finite=False)]
     truth: Annotated[Array, Shape("N", 3, finite=False)]
 

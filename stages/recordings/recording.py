@@ -7,21 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .messages import is_blank
 from .plausibility import MotionLimits
-
-Array = npt.NDArray[np.float64]
 
 
 class UnreadableRecording(BadInput):
@@ -45,7 +41,7 @@ class Recording(Protocol):
     @property
     def name(self) -> str: ...
     @property
-    def stamps(self) -> npt.NDArray[np.int64]: ...
+    def stamps(self) -> Ints: ...
     @property
     def odometry(self) -> Array | None: ...
     @property

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import interpolate
 
-Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 LONE_S = 3600.0
 """A record further than this from all others of its kind tells of a broken clock, not of a drive."""
@@ -67,16 +67,16 @@ def ascending_rows(stamps: Stamps) -> Stamps:
     return firsts[np.array(kept[::-1], np.int64)]
 
 
-def within(stamps: Stamps, times: Stamps) -> npt.NDArray[np.bool_]:
+def within(stamps: Stamps, times: Stamps) -> Bools:
     """Which stamps lie in the range of `times`."""
-    inside: npt.NDArray[np.bool_] = (stamps >= times[0]) & (stamps <= times[-1])
+    inside: Bools = (stamps >= times[0]) & (stamps <= times[-1])
     return inside
 
 
-def lone(stamps: Stamps) -> npt.NDArray[np.bool_]:
+def lone(stamps: Stamps) -> Bools:
     """Which of ascending stamps (N,) in ns lie more than `LONE_S` from all others: none where that is common."""
     if len(stamps) < 3:
         return np.zeros(len(stamps), np.bool_)
     far = np.concatenate([[True], np.diff(stamps) > LONE_S * 1e9, [True]])
-    alone: npt.NDArray[np.bool_] = far[:-1] & far[1:]
+    alone: Bools = far[:-1] & far[1:]
     return alone if 2 * alone.sum() < len(stamps) else np.zeros(len(stamps), np.bool_)

@@ -18,11 +18,11 @@ import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import cut, nearest
 from omninav.pipeline.graph.small_files import read_small
+from omninav.stages.geometry.arrays import Array, Bools
 
 from .recording import UnreadableRecording
+from .stamps import Stamps
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 PI = Decimal("3.14159265358979323846264338328")
 _LENGTHS = {"m": Decimal(1), "cm": Decimal("0.01"), "mm": Decimal("0.001"), "in": Decimal("0.0254")}
 _TIMES = {
@@ -284,7 +284,7 @@ def by_numbers(name: str) -> list[str | tuple[int, str]]:
     return [(len(digits), digits) if part.isdecimal() else part for part, digits in parts]
 
 
-def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
+def _plain_numbers(texts: Any, unit: str) -> tuple[Bools, npt.NDArray[Any]]:
     """Which cells are plain numbers, within all bounds, of a unit of `_PLAIN`; and their values in its base unit."""
     import pyarrow as pa
     import pyarrow.compute as pc

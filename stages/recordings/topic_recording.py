@@ -8,21 +8,19 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .decode_ahead import DecodeAhead
 from .messages import scan_of
 from .recording import checked_image
-from .stamps import ascending, lone
+from .stamps import Stamps, ascending, lone
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 STALE = 1_000_000_000
 """Nanoseconds after which range readings say nothing any more."""
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import nearest
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
@@ -20,12 +20,10 @@ from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
-from .stamps import poses_at, within
+from .stamps import Stamps, poses_at, within
 from .topic_recording import Feed, TopicRecording, in_order
 from .transforms import TransformTopic
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 SET_BACK_S = 10.0
 """Records of one topic that lie in a file earlier than what comes before them by so much tell of a clock set back."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
@@ -235,7 +233,7 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
     return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
-def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:
+def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: Bools, why: str) -> None:
     for stamp in stamps[lost]:
         feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
 

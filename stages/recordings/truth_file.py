@@ -7,19 +7,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import counted, cut
 from omninav.pipeline.graph.small_files import read_small
+from omninav.stages.geometry.arrays import Array
 
 from .plausibility import MotionLimits, believed
 from .positions import track_directions
 from .recording import Recording, UnreadableRecording
-from .stamps import ascending_rows, poses_near
+from .stamps import Stamps, ascending_rows, poses_near
 from .tables import MAX_TABLE_BYTES, NO_TIME, Angle, CsvTable, Length, Time, read_table, table_of, text_lines
 
-Array = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
 COLUMNS = {
     "time": ("t", "time", "timestamp", "stamp", "sec", "seconds"),
     "x": ("x", "px", "pos_x", "position_x", "tx", "p_rs_r_x", "truth_x"),

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.mcap.message import Losses
@@ -20,9 +19,8 @@ from omninav.stages.values.image import Pixels
 from .camera_yaml import write_camera
 from .named_camera import assumed_camera, named_camera
 from .recording import Format, OpenOptions, UnreadableRecording, checked_image
-from .stamps import ascending
+from .stamps import Stamps, ascending
 
-Stamps = npt.NDArray[np.int64]
 MAX_FRAMES = 2_000_000
 """Of a video: nine hours at 60 a second."""
 TOLERANCE_NS = 1_000_000

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.probability.evidence import MIN_SPREAD, evidence_novelty
 from omninav.stages.geometry.probability.likelihood_ratio import (
     ratios_of,
@@ -25,7 +25,7 @@ BROKEN = 0.002
 offices, three of 600 on recordings."""
 
 
-def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibration) -> npt.NDArray[np.float32]:
+def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibration) -> Floats:
     """The ratio for each compared reference and heading: (references, headings) float32, 1 says nothing."""
     scores = standard_scores(similarities.values, similarities.sampling_weight)
     return saturated_ratios(scores, calibration.slope, calibration.middle, OUTLIERS, calibration.images)

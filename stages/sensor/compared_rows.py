@@ -1,9 +1,8 @@
 """Index from a reference to its row among the candidates."""
 
 import numpy as np
-import numpy.typing as npt
 
-Ints = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Ints
 
 
 class ComparedRows:

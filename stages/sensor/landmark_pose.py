@@ -10,6 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.probability.particles import systematic
@@ -18,10 +19,6 @@ from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_des
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 
 WORD_REFERENCES = (10, 80)
 """References that share most words with the image, whose landmarks are looked for: at first, and where none of their

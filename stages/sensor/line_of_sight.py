@@ -10,14 +10,13 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.visibility import VisibilityAreas
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Runs = npt.NDArray[np.uint16]
 
 MAX_CELLS_PER_SIDE = 65535
@@ -197,7 +196,7 @@ def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[floa
 @compiled(nogil=True)
 def _headings(
     starts: npt.NDArray[np.int32], runs: Runs, points: Array, where: Ints, centres: Array, window: float
-) -> npt.NDArray[np.bool_]:
+) -> Bools:
     seen = np.zeros((len(centres), HEADING_BINS), np.bool_)
     half = min(round(window / (2 * math.pi) * HEADING_BINS), HEADING_BINS // 2)
     for t in range(len(points)):

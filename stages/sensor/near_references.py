@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
@@ -21,9 +22,6 @@ from omninav.stages.values.similarity import Similarities, SimilarityField
 from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from .compared_rows import ComparedRows
 
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
 Shorts = npt.NDArray[np.int32]
 
 CELLS_PER_LENGTH_SCALE = 4

@@ -3,15 +3,13 @@
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.belief import Likelihood
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 from omninav.stages.values.visual_words import WordSimilarities
-
-Array = npt.NDArray[np.float64]
 
 MIN_LIKELIHOOD = 0.001
 """Smallest likelihood of a place, over that of one that looks the same: views are blocked."""
@@ -58,7 +56,7 @@ def place_likelihoods(
     return min_likelihood + (1.0 - min_likelihood) * (np.exp(-squares) if tail == "gaussian" else 1.0 / (1.0 + squares))
 
 
-def word_likelihoods(similarities: npt.NDArray[np.float32], contrast: float, min_likelihood: float) -> Array:
+def word_likelihoods(similarities: Floats, contrast: float, min_likelihood: float) -> Array:
     """Likelihoods in [min_likelihood, 1] of the cosines (P,) of places' words: 1 for the most similar place."""
     best = float(similarities.max(initial=0.0))
     return min_likelihood + (1.0 - min_likelihood) * np.exp(contrast * (similarities.astype(np.float64) - best))

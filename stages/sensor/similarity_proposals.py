@@ -1,9 +1,9 @@
 """Proposes poses that the current view itself suggests, for recovery from kidnapping."""
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -11,8 +11,6 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import SimilarityField
 from omninav.stages.values.track import Track
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 NUMBER = 100
 """Poses proposed at each image."""
 SHARE_BY_EXCESS = 0.5

@@ -3,20 +3,16 @@
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, NoveltyThreshold
 
-Array = npt.NDArray[np.float64]
 
-
-def superpose(
-    rows: npt.NDArray[np.int64], shares: Array, turns: Array, extents: Array, map: ViewMixtures
-) -> tuple[Array, Array, Array]:
+def superpose(rows: Ints, shares: Array, turns: Array, extents: Array, map: ViewMixtures) -> tuple[Array, Array, Array]:
     """Superpose the mixtures of a map's views `rows` (J,), weighted by `shares` (J,), turned by `turns` (J,) rad.
 
     Returns means, covariances and weights of the components with positive weight, in the order of the map. The turn is

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
@@ -22,8 +22,6 @@ from .compared_rows import ComparedRows
 from .near_references import similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
 from .visibility_similarity import CUTOFF_SIGMAS, mean_seen, sums_by_turn
-
-Array = npt.NDArray[np.float64]
 
 BACKGROUND_WEIGHT = math.exp(-0.5)
 """Weight of what is not known, with a `calibration`: as much as a view taken one sigma away."""

@@ -7,12 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.grid import cells_of
 from omninav.stages.values.visibility import VisibilityAreas
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 Shorts = npt.NDArray[np.int32]
 Numbers = npt.NDArray[np.uint32]
 
@@ -57,7 +56,7 @@ class Cells(NamedTuple):
     resolution: float
     rows: int
     columns: int
-    places: npt.NDArray[np.float32]
+    places: Floats
     most: int
 
 
@@ -118,10 +117,10 @@ def _by_cell(
     return first, items
 
 
-def sees_any(poses: Array, cells: Cells) -> npt.NDArray[np.bool_]:
+def sees_any(poses: Array, cells: Cells) -> Bools:
     """Whether any group is seen from poses (N, 3): (N,)."""
     row, column = cells_of(poses, cells.origin, cells.resolution).T
     inside = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
     number = np.where(inside, row * cells.columns + column, 0)
-    sees: npt.NDArray[np.bool_] = inside & (cells.starts[number + 1] > cells.starts[number])
+    sees: Bools = inside & (cells.starts[number + 1] > cells.starts[number])
     return sees

@@ -4,13 +4,12 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 
-from .visibility_index import Array, Cells, Ints, Looks, Numbers, Shorts
+from .visibility_index import Cells, Looks, Numbers, Shorts
 
-Floats = npt.NDArray[np.float32]
 Single = np.floating[Any]
 
 CUTOFF_SIGMAS = 3.0

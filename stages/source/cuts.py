@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 
-Array = npt.NDArray[np.float64]
 Frames = npt.NDArray[np.int64]
 Cut = tuple[int, int]
 
@@ -25,7 +25,7 @@ def check_cuts(cuts: Sequence[Cut], frames: int, name: str) -> None:
         end = to
 
 
-def remaining_frames(cuts: Sequence[Cut], frames: int) -> npt.NDArray[np.int64]:
+def remaining_frames(cuts: Sequence[Cut], frames: int) -> Ints:
     """Numbers of the frames that are left."""
     kept = np.ones(frames, np.bool_)
     for after, to in cuts:
@@ -44,10 +44,10 @@ def thinned(frames: Frames, stamps: Frames, rate_hz: float | None) -> Frames:
     return frames[np.unique(periods, return_index=True)[1]]
 
 
-def crossed(cuts: Sequence[Cut], frames: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+def crossed(cuts: Sequence[Cut], frames: Ints) -> Bools:
     """Whether a cut lies between each of the frames (N,) and the next: (N - 1,)."""
     done = np.searchsorted([to for _, to in cuts], frames, side="right")
-    between_them: npt.NDArray[np.bool_] = np.diff(done) > 0
+    between_them: Bools = np.diff(done) > 0
     return between_them
 
 

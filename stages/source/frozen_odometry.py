@@ -3,11 +3,9 @@
 from itertools import groupby
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between
-
-Array = npt.NDArray[np.float64]
 
 STILL = 1e-9
 """Metres and radians: below, odometry has not changed between two images."""

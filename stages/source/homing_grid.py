@@ -5,11 +5,11 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator.config import WorldConfig
@@ -20,8 +20,6 @@ from omninav.stages.simulator.simulated_recording import simulation_digest
 from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.pose import Pose
-
-Array = npt.NDArray[np.float64]
 
 
 class HomingGridState(State):
@@ -168,10 +166,10 @@ def grid_around(target: tuple[float, float, float], spacing: float, radius: floa
     return np.column_stack([x.ravel()[near] + target[0], y.ravel()[near] + target[1]])
 
 
-def in_sight(world: World, target: tuple[float, ...], points: Array) -> npt.NDArray[np.bool_]:
+def in_sight(world: World, target: tuple[float, ...], points: Array) -> Bools:
     """Between which of some points (N, 2) and a target no body stands at the height of the camera: (N,)."""
     away = np.column_stack([points - target[:2], np.zeros(len(points))])
     metres = np.linalg.norm(away, axis=1)
     eye = (target[0], target[1], world.config.eye_height)
-    seen: npt.NDArray[np.bool_] = first_hits(world.boxes, world.config.height, eye, away / metres[:, None]) > metres
+    seen: Bools = first_hits(world.boxes, world.config.height, eye, away / metres[:, None]) > metres
     return seen

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.image_folder import ImageFolder
 from omninav.stages.recordings.live_record import LiveRecording
@@ -22,7 +22,6 @@ from .outputs import motion_of, pose_of
 from .playback import Playback, PlaybackState
 from .synthetic_odometry import add_odometry_noise
 
-Array = npt.NDArray[np.float64]
 SYNTHETIC_DISTANCE_NOISE = 0.1
 """Standard deviation of synthetic odometry's distance after one metre, metres; it grows with the root of the path."""
 SYNTHETIC_TURN_NOISE_DEG_PER_M = 3.0

@@ -6,14 +6,13 @@ from itertools import groupby, pairwise
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
 
-Array = npt.NDArray[np.float64]
 NEW_LOG_AFTER_S = 3600.0
 """Longest pause within a log, seconds: a longer one begins another, since several days may lie in one file."""
 OdometryKind = Literal["measured", "synthetic", "guessed"]
@@ -28,7 +27,7 @@ class LogPart:
     """
 
     recording: Recording
-    frames: npt.NDArray[np.int64]
+    frames: Ints
     driven: Array
     truth: Array | None
     kind: OdometryKind

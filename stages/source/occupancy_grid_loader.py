@@ -6,18 +6,15 @@ from typing import Annotated, Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 FROM_TOUR = "from_tour"
 CLEARANCE_M = 0.2
@@ -140,7 +137,7 @@ def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) 
     return FreeSpace(grid.centres(*np.nonzero(free)), grid.resolution) if free.any() else None
 
 
-def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolution: float) -> OccupancyGrid:
+def along_path(poses: Array, edges: Ints, reach: float, resolution: float) -> OccupancyGrid:
     """A grid that stands in for an unknown one: free within `reach` metres of a path, with a wall around it.
 
     The path are places (R, >= 2) and the straight `edges` (E, 2) between them. The wall is one cell thick; what lies
@@ -168,7 +165,7 @@ def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolut
     )
     tree: Any = KDTree(places)
     centres = grid.centres(*np.divmod(np.arange(rows * columns), columns))
-    free: Mask = np.isfinite(tree.query(centres, distance_upper_bound=reach)[0]).reshape(rows, columns)
+    free: Bools = np.isfinite(tree.query(centres, distance_upper_bound=reach)[0]).reshape(rows, columns)
     grid.cells[cv2.dilate(free.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = OCCUPIED
     grid.cells[free] = FREE
     return grid

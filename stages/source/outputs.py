@@ -2,17 +2,13 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from omninav.pipeline import Outputs, Tick
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.commands import GoalPoint, Reinitialise
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import BridgedMotion, Motion, Pose
 from omninav.stages.values.scan import Scan
-
-Array = npt.NDArray[np.float64]
 
 
 class DriveOutputs(Outputs):

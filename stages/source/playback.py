@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Source, State, Tick
 from omninav.pipeline.engine.code_version import module_version
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import counted
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
@@ -40,7 +40,7 @@ class PlaybackState(State):
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
-    view: npt.NDArray[np.float32] | None = None
+    view: Floats | None = None
 
 
 class Playback(Source, ABC):

@@ -11,9 +11,10 @@ from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
 from omninav.stages.camera.mirror_ring import RingNotFound, find_ring
 from omninav.stages.camera.model import Ring
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.unwarp.calibration import Array, Calibration, Model, board_points, calibrated
+from omninav.stages.unwarp.calibration import Calibration, Model, board_points, calibrated
 from omninav.stages.values.image import Image, Pixels
 
 from .camera_look import draw_panorama

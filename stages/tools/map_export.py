@@ -8,11 +8,11 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.files import user_path, write_whole
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved
 from omninav.stages.values.encoded_image import Undecodable
@@ -114,7 +114,7 @@ class ExportMap(Tool):
         return pixels[:, left : left + wide]
 
 
-def spaced(poses: npt.NDArray[np.float64], spacing: float) -> npt.NDArray[np.int64]:
+def spaced(poses: Array, spacing: float) -> Ints:
     """Rows of poses (N, >= 2) of which each lies at least `spacing` metres from the one before it that is kept."""
     kept: list[int] = []
     for row, (x, y) in enumerate(poses[:, :2].tolist()):
@@ -127,7 +127,7 @@ def _has_panoramas(map: MapOfPlaces) -> bool:
     return isinstance(map, ReferenceGraph) and map.features.shape[1] > 1
 
 
-def _in_order(map: MapOfPlaces) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+def _in_order(map: MapOfPlaces) -> tuple[Array, Ints]:
     """Poses of views, and their rows in the order of the tour."""
     if isinstance(map, ReferenceGraph):
         return map.poses, np.arange(len(map))

@@ -15,11 +15,10 @@ import numpy.typing as npt
 from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.messages import pose_of
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.thumbnails import decoded
-
-Array = npt.NDArray[np.float64]
 
 WIDTH, BAND, MAX_HEIGHT = 960, 40, 960
 """Width of the video, height of the line of text below the image, and largest height of the floor, pixels."""

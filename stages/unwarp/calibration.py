@@ -5,15 +5,14 @@ from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.model import Camera, Ring
 from omninav.stages.camera.ocamcalib import OCamCalib
+from omninav.stages.geometry.arrays import Array
 
-Array = npt.NDArray[np.float64]
 Model = Literal["ocamcalib", "hyperbolic", "fisheye"]
 Make = Callable[[tuple[int, int], Ring, Array], Camera]
 MIN_BOARDS = 3

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.camera.model import Array, Bools, Camera
+from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Pixels
 
 

@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.camera.model import Array, Camera, require_elevations
+from omninav.stages.camera.model import Camera, require_elevations
 from omninav.stages.camera.perspective import Perspective
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Image, Pixels, Windows
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Value
-from omninav.stages.geometry.arrays import Array as Array  # metrics and plots have it from here
-from omninav.stages.geometry.arrays import Bools, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 from .evidence import ImageEvidence

@@ -6,8 +6,9 @@ import pytest
 from omninav.pipeline import BadInput
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.fisheye import Fisheye
-from omninav.stages.camera.model import MODELS, Array, Bools, Camera, camera_models, require_elevations, seen_at
+from omninav.stages.camera.model import MODELS, Camera, camera_models, require_elevations, seen_at
 from omninav.stages.camera.rays import angles, normalised, turned, unit_vectors
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.recordings.camera_yaml import parse_camera
 
 
