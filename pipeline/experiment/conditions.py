@@ -5,7 +5,6 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +24,10 @@ Compose = Callable[[Sequence[str]], dict[str, Any]]
 
 @dataclass
 class ConditionRun:
-    """A condition in one scenario, or a reference run: what is run for every seed, and what has been found so far."""
+    """A condition in one scenario: what is run for every seed, and what has been found so far."""
 
     condition: Condition
     scenario: str
-    variant: str
     overrides: tuple[str, ...]
     folder: Path
     seeds: tuple[int, ...]
@@ -63,26 +61,13 @@ class ConditionRun:
 
 def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[ConditionRun]:
     """A run for each condition in each scenario. `overrides`: what was typed after the experiment's name."""
-    run, number = partial(_run, experiment, folder, overrides), experiment.repetitions
+    number = experiment.repetitions
     # Each scenario has seeds of its own, so that draws of stages differ, too.
     seeds = [tuple(range(begin, begin + number)) for begin in range(0, experiment.runs_of_a_condition, number)]
     return [
-        run(condition, scenario, (experiment.set, condition.overrides, own), seeds=of_scenario)
+        _run(experiment, folder, overrides, condition, scenario, of_scenario)
         for condition in experiment.conditions()
-        for of_scenario, (scenario, own) in zip(seeds, experiment.all_scenarios.items(), strict=True)
-    ]
-
-
-def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[list[ConditionRun]]:
-    """For each sentence of the file about reference runs: a run for each label of its factor in each scenario."""
-    run = partial(_run, experiment, folder, overrides)
-    return [
-        [
-            run(Condition({each.over: str(label)}, words), scenario, (each.set, words, own), variant=each.variant)
-            for label, words in experiment.sweep[each.over].items()
-            for scenario, own in experiment.all_scenarios.items()
-        ]
-        for each in experiment.reference_runs
+        for of_scenario, scenario in zip(seeds, experiment.all_scenarios, strict=True)
     ]
 
 
@@ -92,18 +77,15 @@ def _run(
     overrides: Sequence[str],
     condition: Condition,
     scenario: str,
-    parts: Sequence[str],
-    variant: str = "",
-    seeds: tuple[int, ...] = (0,),
+    seeds: tuple[int, ...],
 ) -> ConditionRun:
-    """`variant` is that of a reference run, whose time is measured: it shares nothing."""
-    own = [word for part in (experiment.common, *parts) for word in shlex.split(part)]
+    parts = experiment.common, experiment.set, condition.overrides, experiment.all_scenarios[scenario]
+    own = [word for part in parts for word in shlex.split(part)]
     named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
-    typed = (*([] if named else [f"variant={variant or experiment.variant}"]), *own, *overrides)
-    words = " ".join(part for part in (condition.name, scenario, variant) if part)
+    typed = (*([] if named else [f"variant={experiment.variant}"]), *own, *overrides)
+    words = " ".join(part for part in (condition.name, scenario) if part)
     place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", words).strip("_")
-    shared = experiment.shared and not variant
-    run = ConditionRun(condition, scenario, variant or experiment.variant, typed, place, seeds, shared)
+    run = ConditionRun(condition, scenario, typed, place, seeds, experiment.shared)
     run.development = scenario in experiment.development
     return run
 

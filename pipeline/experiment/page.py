@@ -79,7 +79,7 @@ def beyond_the_mean(measure: Measure, cell: Cell) -> list[str]:
     parts = []
     if cell.median is not None and number(cell.median, digits) != number(cell.figure, digits):
         parts.append(f"median {number(cell.median, digits)}")
-    if cell.found < cell.ran and not measure.pooled:
+    if cell.found < cell.ran:
         parts.append(f"{cell.found} of {cell.ran}")
     if cell.development is not None:
         parts.append(f"development {number(cell.development, digits)}")

@@ -17,7 +17,7 @@ from omninav.stages.geometry.arrays import Array
 
 from .series import series_at
 from .specification import Condition, Curve, Experiment, Labels, space_of
-from .verdicts import Case, Results, Verdict, judge, key_of, over_runs, pooled, samples
+from .verdicts import Case, Results, Verdict, judge, key_of, over_runs, samples
 
 SUFFIX = ".result.json"
 """End of a result file's name, after the experiment's name."""
@@ -88,8 +88,6 @@ class ExperimentResult:
     """Measure -> its figures, in the order of the table's rows and columns."""
     curves: tuple[tuple[Line, ...], ...] = ()
     """Lines of each of the file's curves; none in results that were kept without."""
-    reference_runs: tuple[str, ...] = ()
-    """Sentences with their figures."""
     recordings: Mapping[str, str] = field(default_factory=dict)
     """Name of a recording -> what was stated of it."""
     conditions: tuple[ConditionRow, ...] = ()
@@ -129,10 +127,6 @@ def _cells(experiment: Experiment, results: Results, development: Results, name:
     for labels, column in itertools.product(rows_of(experiment), experiment.labels(by)):
         here = labels | {by: column}
         at, ran = (*labels.values(), column), len(results.get(key_of(here), {}))
-        if measure.pooled:
-            whole = pooled(experiment, results, name, here)
-            yield Cell(at, whole, found=ran if whole is not None else 0, ran=ran)
-            continue
         found = list(samples(experiment, results, name, here).values())
         chosen_on = list(samples(experiment, development, name, here).values())
         beside = over_runs(measure, chosen_on) if chosen_on else None

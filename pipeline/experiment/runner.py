@@ -9,7 +9,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, version
@@ -30,15 +29,14 @@ from .conditions import (
     check,
     condition_runs,
     find_results,
-    reference_runs,
     results_by_condition,
     timed_groups,
 )
-from .page import number, write_page
+from .page import write_page
 from .repetition import finished
 from .result import ConditionRow, ExperimentResult, figures_of
 from .shared_inputs import Recording, artifacts_of, recordings_of
-from .specification import FULL, Experiment, Measure, ReferenceRun, figure_of, read_experiment
+from .specification import FULL, Experiment, read_experiment
 from .verdicts import Verdict, judge
 
 STATE = "experiment.json"
@@ -56,15 +54,9 @@ class ExperimentRun:
     folder: Path
     argv: Sequence[str]
     conditions: list[ConditionRun]
-    references: list[list[ConditionRun]]
     engine: EngineSettings = field(default_factory=EngineSettings)
     recordings: list[Recording] = field(default_factory=list)
     started: datetime = field(default_factory=datetime.now)
-
-    @property
-    def all_runs(self) -> list[ConditionRun]:
-        """Conditions and reference runs."""
-        return [*self.conditions, *(run for several in self.references for run in several)]
 
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
@@ -78,10 +70,10 @@ class ExperimentRun:
         write_whole(self.folder / "experiment.yaml", self.file)
         self._write_state("running")
         self._record(workers)
-        find_results(self.experiment, self.all_runs)
+        find_results(self.experiment, self.conditions)
         self._make_artifacts(workers)
         self._repeat(workers)
-        well = not any(run.error for run in self.all_runs)
+        well = not any(run.error for run in self.conditions)
         self._write_state("complete" if well else "failed")
         self.write_page()
         return well
@@ -100,7 +92,6 @@ class ExperimentRun:
         results, beside = results_by_condition(conditions), results_by_condition(conditions, development=True)
         verdicts, cells, curves = figures_of(experiment, results, beside)
         common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
-        references = zip(experiment.reference_runs, self.references, strict=True)
         return ExperimentResult(
             name=experiment.name,
             command=shlex.join(self.argv),
@@ -110,16 +101,15 @@ class ExperimentRun:
             verdicts=verdicts,
             cells=cells,
             curves=curves,
-            reference_runs=tuple(reference_text(experiment, reference, runs) for reference, runs in references),
             recordings={each.name: _facts(each.facts) for each in self.recordings},
             conditions=tuple(_condition(run, common) for run in conditions),
-            failures={run.name: run.error for run in self.all_runs if run.error},
-            missing=sum(len(run.missing) for run in self.all_runs if not run.error),
+            failures={run.name: run.error for run in self.conditions if run.error},
+            missing=sum(len(run.missing) for run in self.conditions if not run.error),
             common_overrides=tuple(common),
         )
 
     def _record(self, workers: Workers) -> None:
-        self.recordings = recordings_of(self.all_runs, self.folder)
+        self.recordings = recordings_of(self.conditions, self.folder)
         jobs = [each.job(self.folder / "recordings") for each in self.recordings if not each.made]
         failed = self._run_jobs(workers, jobs, "recordings")
         for each in self.recordings:
@@ -130,7 +120,7 @@ class ExperimentRun:
                 each.use()
 
     def _make_artifacts(self, workers: Workers) -> None:
-        artifacts = artifacts_of([run for run in self.all_runs if run.unfinished], self.folder)
+        artifacts = artifacts_of([run for run in self.conditions if run.unfinished], self.folder)
         failed = self._run_jobs(workers, [each.job() for each in artifacts if not each.made], "artifacts")
         for each in artifacts:
             if each.name in failed:
@@ -139,13 +129,13 @@ class ExperimentRun:
             each.use()
 
     def _repeat(self, workers: Workers) -> None:
-        runs = [run for run in self.all_runs if run.unfinished]
+        runs = [run for run in self.conditions if run.unfinished]
         parts = max(1, workers.number // max(1, len(runs)))  # a condition's seeds share more in one job than in several
         jobs = {job.name: (job, run) for run in runs for job in self._repetitions(run, parts)}
-        total = sum(len(run.seeds) for run in self.all_runs)
+        total = sum(len(run.seeds) for run in self.conditions)
 
         def done() -> int:
-            return sum(len(run.results) for run in self.all_runs)
+            return sum(len(run.results) for run in self.conditions)
 
         throttle = Throttle()
         with Progress(unit="repetitions") as progress:
@@ -251,18 +241,6 @@ def _repeated(experiment: Experiment) -> str:
     return f"{runs} repetitions of each condition with {named}{several}"
 
 
-def reference_text(experiment: Experiment, reference: ReferenceRun, runs: Sequence[ConditionRun]) -> str:
-    """A sentence with the figures of its reference runs."""
-    measure = Measure("", (reference.measure,), reference.scale)
-    parts = []
-    for label in experiment.labels(reference.over):
-        own = [run for run in runs if run.condition.labels[reference.over] == label]
-        found = [figure_of(measure, result) for run in own for result in run.results.values()]
-        known = [figure for figure in found if figure is not None]
-        parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
-    return reference.text.replace("{}", "; ".join(parts))
-
-
 def _facts(facts: Mapping[str, Any]) -> str:
     return ", ".join(f"{title(name).lower()} {value} {unit(name)}".rstrip() for name, value in facts.items())
 
@@ -288,7 +266,6 @@ def plan_experiment(
         engine = replace(engine, workers=experiment.cores)
     folder = (Path(str(config.get("runs", "runs"))) / f"{experiment.name}_{profile}").resolve()
     conditions = condition_runs(experiment, folder, overrides)
-    references = reference_runs(experiment, folder, overrides)
-    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, references, engine)
-    check(experiment, run.all_runs, compose)
+    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, engine)
+    check(experiment, conditions, compose)
     return run

@@ -81,16 +81,5 @@ def aggregated(
             return float(getattr(np, aggregate)(values))
 
 
-def pooled_deviation(means: Sequence[float], deviations: Sequence[float], counts: Sequence[float]) -> float:
-    """Standard deviation of all entries of several groups, from each group's mean, standard deviation and size.
-
-    The law of total variance: the mean of the groups' variances and the variance of their means, both weighted.
-    """
-    weights = np.asarray(counts, dtype=np.float64) / np.sum(counts)
-    centre = float(np.sum(weights * np.asarray(means)))
-    within = float(np.sum(weights * np.asarray(deviations) ** 2))
-    return float(np.sqrt(within + np.sum(weights * (np.asarray(means) - centre) ** 2)))
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

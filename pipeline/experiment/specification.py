@@ -41,7 +41,7 @@ class Measure:
     title: str
     path: tuple[str, ...]
     """Paths to look at, of which the first that is there counts; paths joined by + are added. With `stages` it is
-    `p50_ms`, `p95_ms` or `max_ms`; with `pooled` it names the errors (`after_settling.error_m`)."""
+    `p50_ms`, `p95_ms` or `max_ms`."""
     scale: float = 1.0
     """The figure is multiplied by it, for another unit."""
     digits: int = 1
@@ -52,8 +52,6 @@ class Measure:
     """The share of the series that counts."""
     stages: tuple[str, ...] = ()
     """Stages whose time together (ms), step by step, is the figure."""
-    pooled: bool = False
-    """Whether the figure is the standard deviation over all frames of all repetitions."""
     over_runs: Literal["mean", "largest", "smallest"] = "mean"
     """Which figure of the repetitions' is shown: with `largest`, that of the worst of them. Claims about a worst figure
     count the runs that keep to the limit."""
@@ -144,22 +142,6 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class ReferenceRun:
-    """A sentence on the page with figures of another variant: it is run once for each label of a factor."""
-
-    text: str
-    """`{}` is replaced by the figures."""
-    variant: str
-    measure: str
-    """The path of the figure."""
-    over: str
-    """The factor."""
-    set: str = ""
-    """Overrides of these runs."""
-    scale: float = 1.0
-
-
-@dataclass(frozen=True)
 class Experiment:
     """Content of an experiment's file. Overrides are written as one would type them, or as a list of such words."""
 
@@ -174,7 +156,7 @@ class Experiment:
     common: str = ""
     """Overrides of all runs."""
     set: str = ""
-    """Overrides of all conditions, but not of the reference runs."""
+    """Overrides of all conditions."""
     repetitions: int = 50
     """Each condition is run with this many seeds in each scenario, 0, 1, 2, … in the order of the scenarios."""
     scenarios: Mapping[str, str] = field(default_factory=dict)
@@ -192,7 +174,6 @@ class Experiment:
     claims: Mapping[str, Claim] = field(default_factory=dict)
     """Key -> claim. Results name a claim by its key, so that its sentences may change."""
     curves: tuple[Curve, ...] = ()
-    reference_runs: tuple[ReferenceRun, ...] = ()
     notes: tuple[str, ...] = ()
     best: tuple[str, ...] = ()
     """Measures by which the best condition over the scenarios of development is named: that with the least figure of
@@ -344,7 +325,6 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     named = [("page.rows", f) for f in page.rows] + [("page.columns", page.columns)]
     named += [("page." + k, f) for k, f in (("along", page.along), ("panels", page.panels)) if f]
     named += [(f"curves[{n}].panels", curve.panels) for n, curve in enumerate(experiment.curves) if curve.panels]
-    named += [(f"reference_runs[{n}].over", each.over) for n, each in enumerate(experiment.reference_runs)]
     labelled = [(f"without[{n}]", labels) for n, labels in enumerate(experiment.without)]
     labelled += [(f"curves[{n}].only", curve.only) for n, curve in enumerate(experiment.curves)]
     measured = [(f"page.drawn[{n}]", name) for n, name in enumerate(page.drawn)]
@@ -393,8 +373,6 @@ def _faults(experiment: Experiment, claim: Claim) -> "list[str]":
     if claim.ratio_to is not None and claim.lowest:
         faults.append("lowest: a ratio is compared with a number")
     measure = experiment.measures.get(claim.measure)
-    if measure is not None and measure.pooled:
-        faults.append(f"{claim.measure} is pooled over the repetitions, which leaves nothing to judge it by")
     with_conditions = claim.lowest or any(isinstance(getattr(claim, side), Mapping) for side in sides)
     if measure is not None and measure.over_runs != "mean" and (with_conditions or claim.ratio_to is not None):
         faults.append(f"{claim.measure} is the {measure.over_runs} of the repetitions, which is compared with a number")
@@ -415,7 +393,7 @@ def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
     if measure.stages:
         space = result["timing"].get("together", {}).get("+".join(measure.stages), {})
     for path in measure.path:
-        figure = figure_at(space, f"{path}.std" if measure.pooled else path, measure.aggregate, measure.window)
+        figure = figure_at(space, path, measure.aggregate, measure.window)
         if figure is not None:
             return figure * measure.scale
     return None

@@ -9,8 +9,7 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array
 
 from .intervals import MIN_GROUPS, bootstrap_interval, share_interval
-from .series import figure_at, pooled_deviation
-from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of, space_of
+from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of
 
 Repetition = tuple[str, int]
 """Scenario ('' where there is none) and seed."""
@@ -107,24 +106,6 @@ def over_runs(measure: Measure, figures: Iterable[float]) -> float:
     """One figure of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
     name = {"mean": "mean", "largest": "max", "smallest": "min"}[measure.over_runs]
     return float(getattr(np, name)(np.fromiter(figures, dtype=np.float64)))
-
-
-def pooled(experiment: Experiment, results: Results, measure: str, labels: Labels) -> float | None:
-    """The standard deviation over all frames of all repetitions of a condition, of a measure that is `pooled`."""
-    described = experiment.measures[measure]
-    for path in described.path:
-        place = path.rpartition(".")[0]
-        frames = f"{place}.frames" if place else "frames"
-        groups = [
-            [figure_at(space_of(result), each) for each in (f"{path}.mean", f"{path}.std", frames)]
-            for _, result in sorted(results.get(key_of(labels), {}).items())
-        ]
-        known = [[figure for figure in group if figure is not None] for group in groups]
-        whole = [group for group in known if len(group) == 3]
-        if whole:
-            means, deviations, counts = zip(*whole, strict=True)
-            return described.scale * pooled_deviation(means, deviations, counts)
-    return None
 
 
 def judge(experiment: Experiment, results: Results) -> dict[str, Verdict]:

@@ -119,18 +119,17 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
 
     run = planned_experiment(config, arguments)
     experiment = run.experiment
-    open_inputs(run.all_runs)
-    _refuse_unwritable(run.all_runs[0].config)
+    open_inputs(run.conditions)
+    _refuse_unwritable(run.conditions[0].config)
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
-    runs = sum(len(each.seeds) for each in run.all_runs)
+    runs = sum(len(each.seeds) for each in run.conditions)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
     kind = "scenario" if experiment.scenarios else "development draw"
     number = len(experiment.named_scenarios)
     over = f" in each of {counted(number, kind)}" if number else ""
     conditions = counted(len(experiment.conditions()), "condition")
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
-    references = len(run.all_runs) - len(run.conditions)
-    print(f"{counted(runs, 'run')} in all" + (f", {references} of them reference runs" if references else ""))
+    print(f"{counted(runs, 'run')} in all")
     print(f"claims to be judged: {len(experiment.claims)}")
     readers = sorted({name for each in run.conditions if each.planned for name in truth_readers(each.planned.graph)})
     print(f"ground truth is read by: {', '.join(readers) or 'no stage'}")

@@ -54,6 +54,6 @@ def test_a_recording_is_whole_or_made_again(tmp_path: Path, capfd: pytest.Captur
 
 
 def test_an_experiment_that_another_process_runs_is_refused(tmp_path: Path):
-    run = ExperimentRun(None, "paper", "", tmp_path, [], [], [])  # type: ignore[arg-type]
+    run = ExperimentRun(None, "paper", "", tmp_path, [], [])  # type: ignore[arg-type]
     with locked(tmp_path / ".lock"), pytest.raises(BadInput, match=f"process {os.getpid()} is running it"):
         run.run()

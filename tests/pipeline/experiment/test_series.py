@@ -1,9 +1,8 @@
 """Figures out of nested results, worked by hand."""
 
-import numpy as np
 import pytest
 
-from omninav.pipeline.experiment.series import aggregated, at, figure_at, pooled_deviation, series_at
+from omninav.pipeline.experiment.series import aggregated, at, figure_at, series_at
 
 RESULT = {
     "error_m": {"mean": 2.0},
@@ -77,10 +76,3 @@ def test_entries_that_are_not_there_are_left_out_and_too_few_give_nothing():
 def test_paths_joined_by_plus_are_added_and_one_that_is_missing_leaves_none():
     assert figure_at(RESULT, "error_m.mean + logs.0.error_m.mean") == 5.0
     assert figure_at(RESULT, "error_m.mean + logs.5.error_m.mean") is None
-
-
-def test_the_pooled_deviation_is_that_of_all_entries_together():
-    rng = np.random.default_rng(4)
-    groups = [rng.normal(centre, spread, size) for centre, spread, size in ((0, 1, 30), (5, 2, 80), (-3, 0.1, 7))]
-    found = pooled_deviation(*zip(*((g.mean(), g.std(), len(g)) for g in groups), strict=True))
-    assert found == pytest.approx(np.concatenate(groups).std())

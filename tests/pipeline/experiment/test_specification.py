@@ -80,7 +80,6 @@ def faults(change: dict[str, object], profile: str = "full") -> list[str]:
 
 
 CURVE = {"title": "t", "x_label": "x", "path": "p"}
-RUN = {"text": "{}", "variant": "v", "measure": "m"}
 UNSOURCED = "a place in a paper, expected `paper` beside it, and `source` of the experiment"
 CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
 
@@ -95,7 +94,6 @@ CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
         ({"curves": [CURVE, CURVE | {"only": {"x": "a"}}]}, "experiment.curves[1].only: there is no 'x'"),
         ({"curves": [CURVE | {"only": {"data": "x"}}]}, "experiment.curves[0].only.data: there is no 'x'"),
         ({"curves": [CURVE, CURVE | {"panels": "x"}]}, "experiment.curves[1].panels: there is no 'x'"),
-        ({"reference_runs": [RUN | {"over": "x"}]}, "experiment.reference_runs[0].over: there is no 'x'"),
         ({"without": [{"data": "x"}]}, "experiment.without[0].data: there is no 'x'"),
         ({"claims": {"a": CLAIM | {"measure": "x"}}}, "experiment.claims.a.measure: there is no 'x'"),
         ({"claims": {"a": CLAIM, "b": CLAIM | {"of": {"data": "x"}}}}, "experiment.claims.b.data: there is no 'x'"),
@@ -136,7 +134,7 @@ def test_each_fault_is_named_with_its_place(change: dict[str, object], problem: 
         {"claims": {"a": CLAIM | {"of": {"data": "first"}, "ratio_to": {"method": "b"}}}},
         {"claims": {"a": CLAIM | {"at_most": "published", "of": {"method": "a"}}}},
         {"page": FILE["page"] | {"along": "data", "panels": "method", "drawn": ["error"]}},
-        {"curves": [CURVE | {"panels": "data", "only": {"method": "b"}}], "reference_runs": [RUN | {"over": "data"}]},
+        {"curves": [CURVE | {"panels": "data", "only": {"method": "b"}}]},
     ],
 )
 def test_a_file_at_its_limits_is_read(change: dict[str, object]):
@@ -170,7 +168,6 @@ def test_what_is_not_a_mean_is_not_compared_with_conditions():
     for change in ({"below": other}, {"lowest": True}, {"ratio_to": other, "below": 1.0}):
         assert len(claim_faults(change)) == 0
         assert len(claim_faults(change, over_runs="largest")) == 1
-        assert len(claim_faults(change, pooled=True)) == 1
 
 
 def test_every_seed_runs_in_every_scenario_and_development_by_itself():
@@ -226,7 +223,6 @@ RESULT = {
         ({"path": ["near.error.mean"], "scale": 100.0}, 300.0),
         ({"path": ["far.error.mean", "near.error.mean", "facts.images"]}, 3.0),
         ({"path": ["far.error.mean"]}, None),
-        ({"path": ["near.error"], "pooled": True, "scale": 2.0}, 1.0),
         ({"path": ["laps"], "aggregate": "max"}, 9.0),
         ({"path": ["laps"], "window": [0.0, 0.6]}, 3.0),
         ({"path": ["timing.drive.seconds"]}, 12.0),
@@ -241,20 +237,18 @@ def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, objec
 
 
 def test_what_a_file_leaves_out():
-    file = FILE | {"curves": [CURVE], "reference_runs": [RUN | {"over": "data"}], "claims": {"a": CLAIM}}
+    file = FILE | {"curves": [CURVE], "claims": {"a": CLAIM}}
     found = read_experiment(file, "full")
-    error, (curve,), (run,), (claim,) = (
+    error, (curve,), (claim,) = (
         found.measures["error"],
         found.curves,
-        found.reference_runs,
         found.claims.values(),
     )
     assert (found.repetitions, found.shared, found.cores) == (50, True, None)
-    assert (error.scale, error.digits, error.aggregate, error.window, error.pooled) == (
+    assert (error.scale, error.digits, error.aggregate, error.window) == (
         1.0,
         1,
         "mean",
         (0.0, 1.0),
-        False,
     )
-    assert (curve.scale, run.scale, claim.scale, claim.lowest) == (1.0, 1.0, 1.0, False)
+    assert (curve.scale, claim.scale, claim.lowest) == (1.0, 1.0, False)

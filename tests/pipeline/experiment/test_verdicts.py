@@ -12,7 +12,6 @@ from omninav.pipeline.experiment.verdicts import (
     judge,
     key_of,
     over_runs,
-    pooled,
 )
 from omninav.pipeline.graph.problems import ProblemsFound
 
@@ -222,33 +221,6 @@ def test_a_claim_that_says_nothing_clear_is_refused(claim: dict[str, object], sa
         held(claim, a=CLEAR, b=FAR)
 
 
-def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is_judged_by_it():
-    runs = [np.array([1.0, 2.0, 3.0]), np.array([7.0, 9.0])]
-    file = {
-        "name": "test",
-        "title": "A test",
-        "about": "",
-        "variant": "none",
-        "sweep": {"method": {"a": ""}},
-        "measures": {"sigma": {"title": "Sigma", "path": ["late.error"], "pooled": True, "scale": 100.0}},
-        "page": {"rows": [], "columns": "method"},
-    }
-    results = {
-        key_of({"method": "a"}): {
-            ("", seed): {
-                "metrics": {"late": {"error": {"mean": run.mean(), "std": run.std()}, "frames": len(run)}},
-                "timing": {},
-                "facts": {},
-            }
-            for seed, run in enumerate(runs)
-        }
-    }
-    found = pooled(read_experiment(file, "full"), results, "sigma", {"method": "a"})
-    assert found == pytest.approx(100 * np.concatenate(runs).std())
-    with pytest.raises(ProblemsFound, match="pooled"):
-        read_experiment(file | {"claims": {"a": {"statement": "small", "measure": "sigma", "at_most": 1.0}}}, "full")
-
-
 def test_a_case_says_what_was_compared():
     (case,) = judged({"below": {"method": "b"}, "scale": 0.5}, a=[4.0] * 6, b=[6.0] * 6).cases
     assert case == Case("a", 4.0, 3.0, "0.5 x method b", 1.0, (1.0, 1.0), False, 6, 6, False, 6)
@@ -401,19 +373,6 @@ def test_the_headline_of_a_page_follows_from_its_claims(found: list[bool | None]
 def test_of_the_runs_the_mean_counts_or_the_largest_or_the_smallest():
     for name, figure in (("mean", 3.0), ("largest", 5.0), ("smallest", 1.0)):
         assert over_runs(Measure("Error", ("error",), over_runs=name), iter([5.0, 1.0, 3.0])) == figure
-
-
-def test_frames_are_pooled_of_runs_that_have_all_three_figures():
-    whole = {"error": {"mean": 1.0, "std": 2.0}, "frames": 4}
-    measures = {"sigma": {"title": "Sigma", "path": ["late", "error"], "pooled": True}}
-    file = {"name": "t", "title": "T", "about": "", "variant": "v", "sweep": {"method": {"a": ""}}}
-    experiment = read_experiment(file | {"measures": measures, "page": {"rows": [], "columns": "method"}}, "full")
-    runs = [whole, {"error": {"mean": 9.0, "std": None}, "frames": 4}, {"frames": 4}]
-    results = {
-        key_of({"method": "a"}): {("", n): {"metrics": run, "timing": {}, "facts": {}} for n, run in enumerate(runs)}
-    }
-    assert pooled(experiment, results, "sigma", {"method": "a"}) == pytest.approx(2.0)
-    assert pooled(experiment, {}, "sigma", {"method": "a"}) is None
 
 
 def test_means_are_compared_and_not_medians():
