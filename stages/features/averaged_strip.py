@@ -1,7 +1,7 @@
 """Averages a panorama to a small strip, the input of transforms of whole views."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -12,6 +12,7 @@ from omninav.stages.values.image import Panorama, Pixels
 from omninav.stages.values.views import Coefficients
 
 FloatArray = npt.NDArray[np.float32]
+Real = TypeVar("Real", bound=np.floating[Any])
 Channels = Literal["brightness", "colour"]
 Contrast = Literal["none", "whole", "local"]
 
@@ -95,7 +96,7 @@ def _blurred(strip: FloatArray, across: float, down: float) -> FloatArray:
     return cast(FloatArray, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))
 
 
-def turned_copies(rows: FloatArray, headings: int) -> FloatArray:
+def turned_copies(rows: npt.NDArray[Real], headings: int) -> npt.NDArray[Real]:
     """Rows (D, P) that run column by column, turned: (headings, D, P).
 
     An image projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,
