@@ -13,7 +13,6 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 
-from .background import with_background
 
 BACKGROUND_REFERENCES = 128
 """References compared of all that are neither near the belief nor similar, the same at each image."""
@@ -61,5 +60,19 @@ class AroundBelief:
         return distinct(np.concatenate(found))
 
     def with_others(self, chosen: Ints, map: ReferenceGraph) -> Candidates:
-        """The chosen references, and a sample of the others as background."""
-        return with_background(chosen, len(map), BACKGROUND_REFERENCES)
+        """The chosen references (N,), ascending, and others at even steps over the map, always the same ones.
+
+        Each of the others represents as many as are left out, so that sums by sampling weight are estimates for the
+        whole map: the chosen ones, which look most like the view, count for themselves alone. What is read of a map
+        that lies in its file is read again and again, and not all of it little by little. All references where none is
+        chosen, or no others would be left out.
+        """
+        others = len(map) - len(chosen)
+        if not len(chosen) or others <= BACKGROUND_REFERENCES:
+            return Candidates()
+        even = np.linspace(0, len(map) - 1, BACKGROUND_REFERENCES).astype(np.int64)
+        even = even[~np.isin(even, chosen)]
+        together = np.concatenate([chosen, even])
+        weight = np.concatenate([np.ones(len(chosen)), np.full(len(even), others / max(len(even), 1))])
+        order = np.argsort(together, kind="stable")
+        return Candidates(together[order], weight[order])

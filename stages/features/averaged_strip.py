@@ -1,7 +1,7 @@
 """Averages a panorama to a small strip, the input of transforms of whole views."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.image import Panorama, Pixels
 from omninav.stages.values.views import Coefficients
 
+Real = TypeVar("Real", bound=np.floating[Any])
 Channels = Literal["brightness", "colour"]
 Contrast = Literal["none", "whole", "local"]
 
@@ -92,7 +93,7 @@ def _blurred(strip: Floats, across: float, down: float) -> Floats:
     return cast(Floats, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))
 
 
-def turned_copies(rows: Floats, headings: int) -> Floats:
+def turned_copies(rows: npt.NDArray[Real], headings: int) -> npt.NDArray[Real]:
     """Rows (D, P) that run column by column, turned: (headings, D, P).
 
     An image projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,

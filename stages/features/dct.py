@@ -9,7 +9,7 @@ from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
-from .averaged_strip import AveragedStrip
+from .averaged_strip import AveragedStrip, turned_copies
 
 
 def cosine_basis(size: int) -> Array:
@@ -56,9 +56,7 @@ class CosineTransform(AveragedStrip, Stage):
         self._down, self._across = lowest_frequencies(self.rows, self.columns, self.coefficients, self.mean)
         self._vertical = cosine_basis(self.rows)[: self._down.max() + 1]
         waves = cosine_basis(self.columns)[: self._across.max() + 1]
-        # Seen by a robot turned counter-clockwise, all columns move right: the same as waves moved to the left.
-        step = self.columns // self.headings
-        self._turned = np.stack([np.roll(waves, -step * heading, axis=1) for heading in range(self.headings)])
+        self._turned = turned_copies(waves, self.headings)
 
     def step(self, ctx: Context, panorama: Panorama) -> AveragedStrip.Out:
         """Describe one panorama."""

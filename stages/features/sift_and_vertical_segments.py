@@ -9,9 +9,6 @@ from omninav.stages.values.image import Image, Panorama
 from .rotation_reduced_sift import RotationReducedSift
 from .vertical_segments import FindVerticalSegments
 
-MAX_COLUMNS = 200
-"""Prototypes that are kept of an image: those that stand for most columns."""
-
 
 class SiftAndVerticalSegments(RotationReducedSift):
     """Rotation-reduced SIFT with colours, and invariant column segments, which complement each other.
@@ -23,7 +20,7 @@ class SiftAndVerticalSegments(RotationReducedSift):
     def setup(self, ctx: Context) -> None:
         """Make both detectors."""
         super().setup(ctx)
-        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
+        self._columns = FindVerticalSegments(max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> RotationReducedSift.Out:
         """Describe one image."""

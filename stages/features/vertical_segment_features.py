@@ -11,9 +11,6 @@ from omninav.stages.values.local_features import LocalFeatures
 from .rotation_reduced_sift import none_found
 from .vertical_segments import FindVerticalSegments
 
-MAX_COLUMNS = 200
-"""Largest number of prototypes; those that stand for most columns are kept."""
-
 
 class VerticalSegmentFeatures(Stage):
     """Describes a view by invariant column segments alone, without patches, to measure what these contribute.
@@ -31,7 +28,7 @@ class VerticalSegmentFeatures(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Make the detector."""
-        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
+        self._columns = FindVerticalSegments(max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """Describe one image."""

@@ -28,16 +28,6 @@ MAX_COMPONENTS = 200
 """Components that stay, the heaviest, which bounds the work."""
 
 
-def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: float = 1.0) -> float:
-    """The weight alpha of b: w_b det(C_a) / (w_b det(C_a) + w_a det(C_b)).
-
-    Gross, Koenig & Mueller 2005, equation 5; with equal weights the form of Porta & Kroese. A heuristic: it does not
-    minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3 in
-    docs/papers.md).
-    """
-    return float(_ratio(np.linalg.slogdet(cov_a)[1], np.linalg.slogdet(cov_b)[1], weight_a, weight_b))
-
-
 def alpha_of_min_determinant(cov_a: Array, cov_b: Array) -> float:
     """The weight alpha of b at which the intersection has the smallest determinant.
 
@@ -73,7 +63,13 @@ def fuse(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _ratio(log_det_a: float, log_det_b: float, weight_a: float, weight_b: float) -> float:
+def alpha_by_ratio(log_det_a: float, log_det_b: float, weight_a: float, weight_b: float) -> float:
+    """The weight alpha of b: w_b det(C_a) / (w_b det(C_a) + w_a det(C_b)).
+
+    Gross, Koenig & Mueller 2005, equation 5; with equal weights the form of Porta & Kroese. A heuristic: it does not
+    minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3 in
+    docs/papers.md).
+    """
     alpha: float = 1.0 / (1.0 + weight_a / weight_b * np.exp(log_det_b - log_det_a))
     return alpha
 
@@ -154,7 +150,7 @@ def _fuse(
                 continue
             share_a, share_b = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
             if by_ratio:
-                alpha = _ratio(log_det_a[i], log_det_b[j], share_a, share_b)
+                alpha = alpha_by_ratio(log_det_a[i], log_det_b[j], share_a, share_b)
             else:
                 inverse_into(cov_b[j], inverse)
                 alpha = _min_determinant(cov_a[i], inverse)

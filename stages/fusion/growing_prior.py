@@ -1,21 +1,20 @@
 """The first belief of a log where the map is learned during the drive."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import drawn, floored, moments
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.commands import Reinitialise
-from omninav.stages.values.pose import Pose, StartPose
+from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-Where = Literal["uniform", "truth", "origin"] | StartPose
+from .first_pose import Where, first_pose, particles_around
 
 INITIAL_SIGMA_M, INITIAL_SIGMA_DEG = 0.01, 0.5
 """Standard deviations of the pose at which a map is begun; 0.1 m and 0.1 rad where there is a map."""
@@ -42,14 +41,8 @@ class GrowingPrior:
             if len(map):
                 return None
             at = "origin" if truth is None else "truth"
-        metres, radians = (0.1, 0.1) if len(map) else (INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG)))
-        if at == "origin":
-            return np.zeros(3), np.array([metres, metres, radians])
-        if at == "truth":
-            if truth is None:
-                raise BadInput("start: this log has no true pose at its first image; use start=uniform")
-            return np.array([truth.x, truth.y, truth.heading]), np.array([metres, metres, radians])
-        return np.array(at[:3]), np.array([at[3], at[3], at[4]])
+        sigmas = (0.1, 0.1) if len(map) else (INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG)))
+        return first_pose(at, truth, sigmas)
 
 
 class ParticlesInMap(GrowingPrior, Stage):
@@ -72,12 +65,10 @@ class ParticlesInMap(GrowingPrior, Stage):
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         known = self.known(map, truth, restart)
-        if known is None:
-            poses = drawn(map.means, map.covariances, map.weights, self.number, ctx.rng)
-            poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.number)
-        else:
-            poses = known[0] + ctx.rng.standard_normal((self.number, 3)) * known[1]
-            poses[:, 2] = wrap(poses[:, 2])
+        if known is not None:
+            return self.Out(belief=particles_around(*known, self.number, ctx.rng))
+        poses = drawn(map.means, map.covariances, map.weights, self.number, ctx.rng)
+        poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.number)
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
 
 

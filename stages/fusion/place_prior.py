@@ -1,6 +1,6 @@
 """The first belief of a log over the places of a topological map."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -8,8 +8,10 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.commands import Reinitialise
-from omninav.stages.values.pose import Pose, StartPose
+from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
+
+from .first_pose import Where, first_pose
 
 
 class PlacePrior(Stage):
@@ -19,7 +21,7 @@ class PlacePrior(Stage):
     no place.
     """
 
-    at: Literal["uniform", "truth", "origin"] | StartPose = "uniform"
+    at: Where = "uniform"
     """`uniform`: a kidnapped robot. Else the place whose medoid was taken closest to the log's first true pose, to the
     origin, or to x, y (m) of a pose and its spread, of which nothing else counts."""
     restart_after: Annotated[int, Bounds(ge=1)] | None = None
@@ -49,11 +51,6 @@ class PlacePrior(Stage):
         poses = map.poses[map.places]
         if where == "uniform":
             return self.Out(belief=PlaceBelief(np.full(len(map), 1.0 / len(map)), poses))
-        if where == "truth" and truth is None:
-            raise BadInput("start: this log has no true pose at its first image; use start=uniform")
-        if where == "truth" and truth is not None:
-            x, y = truth.x, truth.y
-        else:
-            x, y = (0.0, 0.0) if isinstance(where, str) else where[:2]
-        closest = int(np.argmin(np.hypot(poses[:, 0] - x, poses[:, 1] - y)))
+        pose, _ = first_pose(where, truth)
+        closest = int(np.argmin(np.hypot(poses[:, 0] - pose[0], poses[:, 1] - pose[1])))
         return self.Out(belief=PlaceBelief((np.arange(len(map)) == closest).astype(np.float64), poses))

@@ -34,29 +34,16 @@ class UniformRecovery(Stage):
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation; without proposals, as of a robot that was not carried, none is random."""
-        number = 0 if proposals is None else min(RANDOM_PARTICLES, self.number)
-        poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, number, proposals)
+        weights = particles.weights * likelihood.values
+        total = float(weights.sum())
+        if not (math.isfinite(total) and total > 0.0):
+            ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
+            weights = particles.weights
+        random = 0 if proposals is None else min(RANDOM_PARTICLES, self.number)
+        poses = np.empty((0, 3))
+        if random < self.number:
+            poses = particles.poses[systematic(weights, self.number - random, float(ctx.rng.random()))]
+        if proposals is not None:
+            drawn = systematic(proposals.weights, random, float(ctx.rng.random()))
+            poses = np.concatenate([poses, proposals.poses[drawn]])
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
-
-
-def weighed(ctx: Context, particles: Particles, likelihood: Likelihood) -> Array:
-    """The particles' weights after the image, before them where it leaves none: (N,), not normalised."""
-    weights = particles.weights * likelihood.values
-    total = float(weights.sum())
-    if math.isfinite(total) and total > 0.0:
-        return weights
-    ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
-    return particles.weights
-
-
-def resampled(
-    ctx: Context, particles: Particles, weights: Array, number: int, random: int, proposals: Particles | None
-) -> Array:
-    """Poses (number, 3) drawn by weight, `random` of them from the proposals."""
-    poses = np.empty((0, 3))
-    if random < number:
-        poses = particles.poses[systematic(weights, number - random, float(ctx.rng.random()))]
-    if proposals is not None and random:
-        drawn = systematic(proposals.weights, random, float(ctx.rng.random()))
-        poses = np.concatenate([poses, proposals.poses[drawn]])
-    return poses

@@ -113,14 +113,9 @@ class UnimodalQueue(Stage):
         if start is None or not seen:
             return []
         steps = [motion_gaussian(motion.steps, motion.sigmas) for motion in pending.motions]
+        motions, noise = (np.stack(each) for each in zip(*steps, strict=True))
         means, covariances, mismatch = reconstruct_path(
-            start.means[0],
-            start.covariances[0],
-            np.stack([step[0] for step in steps]),
-            np.stack([step[1] for step in steps]),
-            end.means[0],
-            end.covariances[0],
-            independent=False,
+            start.means[0], start.covariances[0], motions, noise, end.means[0], end.covariances[0], independent=False
         )
         if self.odometry_gate and mismatch > self.odometry_gate:
             self._drop_path(ctx, pending)

@@ -1,7 +1,6 @@
 """Computes the visibility areas of a map's references over an occupancy grid."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,32 +38,20 @@ WITHIN_DEG = 5.0
 the coverage is counted over `free` where wired, else over all free cells."""
 
 
-class Sight(NamedTuple):
-    """Hits of rays: `cells` (N, 2), row and column of the occupied cell, -1 where none; `faces` (N,), of `FACES`."""
-
-    cells: Ints
-    faces: Ints
-
-
 def axes_of(sectors: int) -> Array:
     """Azimuths (rad) of the middles of a panorama's equal parts; one part looks straight ahead. (sectors,)."""
     axes: Array = np.pi - 2 * np.pi * (np.arange(sectors) + 0.5) / sectors
     return axes
 
 
-def first_occupied(cells: Cells, starts: Array, directions: Array) -> Sight:
-    """The closest occupied cell along rays through free cells.
+@compiled(nogil=True)
+def first_occupied(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
+    """The closest occupied cell along rays through free cells: (N, 2) row and column, -1 where none; (N,), of `FACES`.
 
     `starts` (N, 2): row and column in cells, as numbers whose whole part is the cell; `directions` (N,) rad. A ray that
     begins in a cell that is not free, leaves the grid, or enters an unknown cell hits nothing (erratum 46 in
     docs/papers.md).
     """
-    found, faces = _cast(cells, np.ascontiguousarray(starts), np.ascontiguousarray(directions))
-    return Sight(found, faces)
-
-
-@compiled(nogil=True)
-def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
     found, faces = np.full((len(starts), 2), -1, np.int64), np.full(len(starts), -1, np.int64)
     rows, columns = cells.shape
     for n in range(len(starts)):
@@ -101,6 +88,7 @@ def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) 
     return i == last_row and j == last_column
 
 
+@compiled(nogil=True)
 def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
     """Cells from which points are visible, by constrained region growing (Wolf, Burgard & Burkhardt 2005, section V).
 
@@ -108,11 +96,6 @@ def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]
     neighbours as long as they are free and the line from their middle to the point crosses free cells only. Gives runs
     of rows (N, 3) row, first column, column behind the last, and where each point's begin, (T + 1,).
     """
-    return _grow(cells, np.ascontiguousarray(points))
-
-
-@compiled(nogil=True)
-def _grow(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
     rows, columns = cells.shape
     tried = np.full((rows, columns), -1, np.int32)
     seen = np.full((rows, columns), -1, np.int32)
@@ -167,9 +150,9 @@ def visibility_areas(poses: Array, grid: OccupancyGrid, axes: Array) -> Visibili
     rows, columns = grid.cells.shape
     starts = (poses[:, 1::-1] - grid.origin[::-1]) / grid.resolution
     directions = (poses[:, 2, None] + axes).ravel()
-    sight = first_occupied(grid.cells, np.repeat(starts, len(axes), axis=0), directions)
-    hit = sight.faces >= 0
-    numbers = (sight.cells[hit, 0] * columns + sight.cells[hit, 1]) * len(FACES) + sight.faces[hit]
+    seen, seen_faces = first_occupied(grid.cells, np.repeat(starts, len(axes), axis=0), directions)
+    hit = seen_faces >= 0
+    numbers = (seen[hit, 0] * columns + seen[hit, 1]) * len(FACES) + seen_faces[hit]
     faces, which = np.unique(numbers, return_inverse=True)
     target = np.full(len(hit), -1, np.int32)
     target[hit] = which

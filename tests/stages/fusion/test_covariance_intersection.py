@@ -171,9 +171,10 @@ def test_agreement_does_not_make_it_more_certain() -> None:
 
 def test_the_ratio_saturates() -> None:
     # Erratum 3: C_b = 4 C_a in three dimensions has 64 times the determinant: alpha = 1 / 65.
-    assert alpha_by_ratio(UNIT, 4 * UNIT) == pytest.approx(1 / 65)
-    assert alpha_by_ratio(4 * UNIT, UNIT) == pytest.approx(64 / 65)
-    assert alpha_by_ratio(UNIT, UNIT, 0.2, 0.6) == pytest.approx(0.75)
+    larger = float(np.linalg.slogdet(4 * UNIT).logabsdet)
+    assert alpha_by_ratio(0.0, larger, 1.0, 1.0) == pytest.approx(1 / 65)
+    assert alpha_by_ratio(larger, 0.0, 1.0, 1.0) == pytest.approx(64 / 65)
+    assert alpha_by_ratio(0.0, 0.0, 0.2, 0.6) == pytest.approx(0.75)
 
 
 @given(covariances(), covariances())
@@ -220,7 +221,8 @@ def test_each_pair_has_an_alpha_of_its_own() -> None:
     for rule in ("det_min", "det_ratio"):
         means, covariance, _ = fuse(a, b, 7.81, rule)  # type: ignore[arg-type]
         for j in range(2):
-            by_ratio = alpha_by_ratio(a[1][0], b[1][j], 0.9, float(b[2][j]))
+            log_dets = np.linalg.slogdet(np.stack([a[1][0], b[1][j]])).logabsdet
+            by_ratio = alpha_by_ratio(*log_dets.tolist(), 0.9, float(b[2][j]))
             alpha = alpha_of_min_determinant(a[1][0], b[1][j]) if rule == "det_min" else by_ratio
             mean, expected = intersected(a[0][0], a[1][0], b[0][j], b[1][j], alpha)
             assert means[j] == pytest.approx(mean)

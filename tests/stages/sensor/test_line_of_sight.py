@@ -47,20 +47,20 @@ ROOM = drawn(
 
 
 def test_a_view_sees_the_face_of_the_closest_occupied_cell_ahead_of_it():
-    sight = first_occupied(ROOM.cells, np.array([[1.5, 4.5]] * 4), np.radians([90.0, 0.0, -90.0, 180.0]))
-    assert sight.cells.tolist() == [[3, 4], [1, 8], [0, 4], [1, 0]]
+    cells, faces = first_occupied(ROOM.cells, np.array([[1.5, 4.5]] * 4), np.radians([90.0, 0.0, -90.0, 180.0]))
+    assert cells.tolist() == [[3, 4], [1, 8], [0, 4], [1, 0]]
     # the faces below, to the left, above and to the right of these cells
-    assert sight.faces.tolist() == [3, 1, 2, 0]
+    assert faces.tolist() == [3, 1, 2, 0]
     areas = visibility_areas(np.array([[4.5, 1.5, math.pi / 2]]), ROOM, axes_of(1))
     assert areas.points[0] == pytest.approx([4.5, 3.0], abs=0.01)
 
 
 def test_what_is_unknown_or_outside_blocks_and_shows_nothing():
     grid = drawn("..?#", "....", "...#")
-    sight = first_occupied(
+    cells, _ = first_occupied(
         grid.cells, np.array([[2.5, 0.5], [1.5, 0.5], [0.5, 0.5], [2.5, 3.5], [9.5, 0.5]]), np.zeros(5)
     )
-    assert sight.cells.tolist() == [[-1, -1], [-1, -1], [0, 3], [-1, -1], [-1, -1]]
+    assert cells.tolist() == [[-1, -1], [-1, -1], [0, 3], [-1, -1], [-1, -1]]
 
 
 def test_an_area_is_what_sees_its_point_and_not_the_other_side_of_a_thin_wall():
@@ -141,7 +141,7 @@ def test_a_ray_meets_the_cell_that_clipping_meets_first(seed: int):
     rng = np.random.default_rng(seed)
     cells = rng.choice([FREE, OCCUPIED, UNKNOWN], (9, 11), p=[0.85, 0.1, 0.05]).astype(np.uint8)
     start, direction = rng.uniform(0, (9, 11)), rng.uniform(-np.pi, np.pi)
-    sight = first_occupied(cells, start[None], np.array([direction]))
+    found, _ = first_occupied(cells, start[None], np.array([direction]))
     way = np.array([np.sin(direction), np.cos(direction)])
     # In the middle between two lines of the grid that follow each other on the way, the ray is inside a cell.
     crossed = np.sort(np.concatenate([(np.arange(12) - at) / step for at, step in zip(start, way, strict=True)]))
@@ -152,7 +152,7 @@ def test_a_ray_meets_the_cell_that_clipping_meets_first(seed: int):
     states = cells[along[:, 0], along[:, 1]]
     first = int(np.argmax(states != FREE)) if (states != FREE).any() else None
     met = first is not None and first > 0 and states[first] == OCCUPIED
-    assert sight.cells[0].tolist() == (along[first].tolist() if met else [-1, -1])
+    assert found[0].tolist() == (along[first].tolist() if met else [-1, -1])
 
 
 def test_sectors_look_along_the_middles_of_a_panoramas_parts():
