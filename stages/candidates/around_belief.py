@@ -13,7 +13,6 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
 
-
 BACKGROUND_REFERENCES = 128
 """References compared of all that are neither near the belief nor similar, the same at each image."""
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Outputs
 from omninav.stages.geometry.arrays import Floats

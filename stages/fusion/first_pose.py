@@ -3,14 +3,13 @@
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Pose, StartPose
 
-Array = npt.NDArray[np.float64]
 Stated = Literal["truth", "origin"] | StartPose
 Where = Literal["uniform", "truth", "origin"] | StartPose
 

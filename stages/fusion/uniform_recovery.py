@@ -6,7 +6,6 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
