@@ -13,8 +13,8 @@ import numpy as np
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_small
-from omninav.stages.geometry.arrays import Array
 
+from .intervals import Array
 from .series import series_at
 from .specification import Condition, Curve, Experiment, Labels, space_of
 from .verdicts import Case, Results, Verdict, judge, key_of, over_runs, samples

@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.stages.geometry.arrays import Array
-
-from .intervals import MIN_GROUPS, bootstrap_interval, share_interval
+from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
 from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of
 
 Repetition = tuple[str, int]

@@ -10,11 +10,11 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Pose, StartPose
 
-Stated = Literal["truth", "origin"] | StartPose
+KnownStart = Literal["truth", "origin"] | StartPose
 Where = Literal["uniform", "truth", "origin"] | StartPose
 
 
-def first_pose(at: Stated, truth: Pose | None, sigmas: tuple[float, float] = (0.1, 0.1)) -> tuple[Array, Array]:
+def first_pose(at: KnownStart, truth: Pose | None, sigmas: tuple[float, float] = (0.1, 0.1)) -> tuple[Array, Array]:
     """The pose (3,) and its standard deviations (3,), which are `sigmas` (m, rad) where `at` does not state them.
 
     Raises BadInput where `at` is `truth` and the log has no true pose.
