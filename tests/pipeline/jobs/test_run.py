@@ -57,8 +57,10 @@ def test_a_job_that_takes_too_much_memory_is_ended_and_named_with_what_it_took(t
 
 
 CLIENT = """
+import signal
 import sys
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
 sys.path.append({tests!r})
 from omninav.pipeline.jobs.executors import EngineSettings
 from omninav.pipeline.jobs.job import Job
