@@ -125,7 +125,7 @@ PLAIN: dict[Any, Any] = {
     float: (int, float),
     Path: (str, Path),
 }
-"""What passes as a plain type; a bool passes as nothing else."""
+"""Types of values that pass as each plain type; a bool passes as nothing else."""
 
 
 def _convert_plain(value: Any, expected: Any, where: str) -> Any:

@@ -16,7 +16,7 @@ class BadMessage(Exception):
 
 
 class Losses:
-    """What could not be used: `dropped` counts it by kind, `details` tells the first case of each."""
+    """Counts what could not be used: `dropped` by kind, and `details` with the first case of each."""
 
     def __init__(self) -> None:
         self.dropped: Counter[str] = Counter()

@@ -74,7 +74,7 @@ def refuse_long_arrays(store: "Typestore", msgtype: str) -> None:
 
 
 def has_header(store: "Typestore", msgtype: str) -> bool:
-    """Whether messages of a type begin with a header."""
+    """Tell whether messages of a type begin with a header."""
     fields = store.fielddefs.get(msgtype, ([], []))[1]
     return bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
 

@@ -1,4 +1,4 @@
-"""What the drawings of a graph share: its bands, and how nodes, outputs and wires are written."""
+"""Names the bands of a drawn graph, and writes its nodes, outputs and wires as every drawing of it does."""
 
 from omninav.pipeline.graph.graph import Graph, Wire
 

@@ -63,7 +63,7 @@ class Watched:
 
 
 def driven(odometry: Array) -> tuple[float, float]:
-    """How far (m) and how much, to either side (rad), poses (N, 3) drive and turn."""
+    """Sum the steps of poses (N, 3): metres driven, and radians turned to either side."""
     steps = np.diff(odometry, axis=0)
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum()), float(np.abs(steps[:, 2]).sum())
 
