@@ -56,6 +56,10 @@ class ViewComparison(Stage):
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
     patch_distance: PatchDistance = "euclidean"
     """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
+    max_global_distance: Annotated[float, Bounds(gt=0)] = MAX_GLOBAL_DISTANCE
+    """Largest distance between the global colours of views that are compared further."""
+    min_matches: Annotated[int, Bounds(ge=1)] = 8
+    """Fewest matches of views that have something in common."""
     supervised: Supervised = "auto"
     """Source of poses: the tour's `truth`, its `odometry`, or `auto`: the truth where there is one."""
 
@@ -90,9 +94,9 @@ class ViewComparison(Stage):
         if not views:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
         ctx.doing(f"comparing {len(views)} views")
-        options = ComparisonOptions(self.ratio, patch_distance=self.patch_distance)
+        options = ComparisonOptions(self.ratio, min_matches=self.min_matches, patch_distance=self.patch_distance)
         colours = np.stack([view.descriptor.values for view in views]).astype(np.float64)
-        close = colour_distances(colours[:, None], colours[None]) <= MAX_GLOBAL_DISTANCE
+        close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance
         prepared = [view_features(view.features) for view in views]
         known_number = sum(view.owner >= 0 for view in views)
         distances, shares = compare_all(ctx, prepared, close, known_number, options)

@@ -31,6 +31,10 @@ class VisualDistance(Stage):
     """Largest ratio of a match's distance to that of the second nearest of either patch."""
     patch_distance: PatchDistance = "euclidean"
     """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
+    max_global_distance: Annotated[float, Bounds(gt=0)] = MAX_GLOBAL_DISTANCE
+    """Largest distance between the global colours of views that are compared further."""
+    min_matches: Annotated[int, Bounds(ge=1)] = 8
+    """Fewest matches of views that have something in common."""
 
     class Out(Outputs):
         """Visual distance to each place."""
@@ -59,8 +63,8 @@ class VisualDistance(Stage):
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make a new map"
             )
         here = view_features(features)
-        options = ComparisonOptions(self.ratio, patch_distance=self.patch_distance)
-        close = colour_distances(map.views.moments[map.places], descriptor.values) <= MAX_GLOBAL_DISTANCE
+        options = ComparisonOptions(self.ratio, min_matches=self.min_matches, patch_distance=self.patch_distance)
+        close = colour_distances(map.views.moments[map.places], descriptor.values) <= self.max_global_distance
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
         compared = np.flatnonzero(close)
