@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import queue
+import socket
 import subprocess
 import sys
 import threading
@@ -129,6 +130,22 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     yield number
     disconnect()
+
+
+@pytest.fixture
+def router(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
+    """As `ros2 run rmw_zenoh_cpp rmw_zenohd` starts one, at a port of the test's own."""
+    zenoh = pytest.importorskip("zenoh")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        place = json.dumps([f"tcp/127.0.0.1:{free.getsockname()[1]}"])
+    settings = zenoh.Config()
+    for key, value in (("mode", '"router"'), ("listen/endpoints", place), ("scouting/multicast/enabled", "false")):
+        settings.insert_json5(key, value)
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f"connect/endpoints={place}")
+    with zenoh.open(settings) as session:
+        yield session
+        disconnect()
 
 
 @functools.cache

@@ -1,7 +1,6 @@
 """Every message that an option of `publish` declares, over every transport, read back by decoders that are not ours."""
 
 import functools
-import importlib
 import json
 import math
 import os
@@ -9,26 +8,36 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.cli.config_groups import group_options
-from omninav.stages.live.publish import register_nav2
+from omninav.stages.live import publish
+from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages, register_nav2
 from omninav.stages.live.transport import connect
 from omninav.stages.plots.result_messages import ResultMessages
 
-from . import idl_types
-from .conftest import ROS2_PYTHON, WAIT_S, OtherEnd, ours_for_rclpy
+from . import every_message
+from .conftest import ROS2_PYTHON, WAIT_S, OtherEnd, Wire, ours_for_rclpy
 
 HERE = Path(__file__).parent
 STAMP = {"sec": 1_700_000_000, "nanosec": 250_000_000}
 INSTALLED = ("geometry_msgs", "nav_msgs", "std_msgs", "diagnostic_msgs")
 """Packages of messages that have wheels for rclpy."""
+NAV2 = {
+    "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
+    "nav2_msgs/msg/ParticleCloud": "std_msgs/Header header\nParticle[] particles",
+}
+"""As in nav2's repository: these do not come with ROS."""
 
 
 @functools.cache
@@ -49,10 +58,6 @@ def options() -> list[dict[str, dict[str, Any]]]:
 
 def topics_declared(told: list[dict[str, dict[str, Any]]]) -> dict[str, str]:
     """Topic -> message type of all that these parameters say, and of the diagnostics."""
-    from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages
-
-    from .every_message import SHOWN
-
     found = {"/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
     for one in told:
         stage = Publish(**one["publish"])
@@ -63,22 +68,33 @@ def topics_declared(told: list[dict[str, dict[str, Any]]]) -> dict[str, str]:
             packages = {"PoseArray": "geometry_msgs", "ParticleCloud": "nav2_msgs"}
             named[belief.topic] = f"{packages[belief.message]}/msg/{belief.message}"
             shown = PublishMessages(**one["publish_messages"])
-            named |= {shown.grid if name == "/grid" else name: SHOWN[name][0] for name in one["messages"]["topics"]}
+            types = {name: every_message.SHOWN[name][0] for name in one["messages"]["topics"]}
+            named |= {shown.grid if name == "/grid" else name: kind for name, kind in types.items()}
         found |= {topic: kind for topic, kind in named.items() if topic is not None}
     return found
 
 
 def plain(value: Any) -> Any:
     """A decoded message as mappings, lists and numbers."""
-    if hasattr(value, "__dict__") and not isinstance(value, type):
-        return {name.lstrip("_"): plain(each) for name, each in vars(value).items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(each) for each in value]
-    return value
+    if hasattr(value, "__slots__"):
+        return {name: plain(getattr(value, name)) for name in value.__slots__}
+    return [plain(each) for each in value] if isinstance(value, list) else value
 
 
-def with_idl(msgtype: str, data: bytes) -> Any:
-    return plain(getattr(idl_types, msgtype.rpartition("/")[2]).deserialize(data))
+@functools.cache
+def decoder_of(msgtype: str) -> Callable[[bytes], Any]:
+    """A decoder of the `mcap` project, which shares nothing with omninav's encoder."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    for name, definition in NAV2.items():
+        types.register(get_types_from_msg(definition, name))
+    definition, _ = types.generate_msgdef(msgtype, ros_version=2)
+    decode = DecoderFactory().decoder_for("cdr", Schema(1, definition.encode(), "ros2msg", msgtype))
+    assert decode is not None
+    return decode
+
+
+def decoded(msgtype: str, data: bytes) -> Any:
+    return plain(decoder_of(msgtype)(data))
 
 
 def pose(x: float, y: float, heading: float) -> dict[str, Any]:
@@ -156,9 +172,16 @@ def check(topic: str, found: Any) -> None:
         close(found, GRID if topic == "/map" else WANTED[topic], topic)
 
 
-def teller(transport: str, python: str, told: list[dict[str, dict[str, Any]]], **more: str) -> subprocess.Popen[str]:
+@contextmanager
+def teller(transport: str, python: str, told: list[dict[str, dict[str, Any]]], **more: str) -> Iterator[Any]:
+    """A process that tells all; its output."""
     words = [python, str(HERE / "every_message.py"), transport, json.dumps(told)]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, **more})
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, **more})
+    try:
+        yield process.stdout
+    finally:
+        process.kill()
+        process.wait()
 
 
 @pytest.fixture(params=[0, 1, 2], ids=["ros2 or amcl 0", "ros2 or amcl 1", "a bare command"])
@@ -167,45 +190,28 @@ def one(request: pytest.FixtureRequest) -> list[dict[str, dict[str, Any]]]:
     return [options()[request.param]]
 
 
-def hear_all(transport: Any, told: list[dict[str, dict[str, Any]]]) -> dict[str, bytes]:
-    topics = topics_declared(told)
+def check_all_heard(name: str, told: list[dict[str, dict[str, Any]]]) -> None:
+    transport, topics, heard = connect(name), topics_declared(told), dict[str, bytes]()
     for topic, kind in topics.items():
         transport.subscribe(topic, kind)
-    heard: dict[str, bytes] = {}
     until = time.monotonic() + WAIT_S
-    while len(heard) < len(topics) and time.monotonic() < until:
-        arrival = transport.take(0.2)
-        if arrival is not None:
-            heard[arrival.topic] = arrival.data
+    with teller(name, sys.executable, told):
+        while len(heard) < len(topics) and time.monotonic() < until:
+            arrival = transport.take(0.2)
+            if arrival is not None:
+                heard[arrival.topic] = arrival.data
     assert sorted(heard) == sorted(topics)
-    return heard
+    for topic, data in heard.items():
+        check(topic, decoded(topics[topic], data))
 
 
 def test_over_dds(domain: int, one: list[dict[str, dict[str, Any]]]):
-    process = teller("dds", sys.executable, one)
-    try:
-        for topic, data in hear_all(connect("dds"), one).items():
-            check(topic, with_idl(topics_declared(one)[topic], data))
-    finally:
-        process.kill()
-        process.wait()
+    check_all_heard("dds", one)
 
 
-def test_over_zenoh(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):
-    pytest.importorskip("zenoh")
-    from .test_zenoh_transport import router
-
-    routers = router.__wrapped__(monkeypatch)  # type: ignore[attr-defined]
-    next(routers)
+def test_over_zenoh(router: object, one: list[dict[str, dict[str, Any]]]):
     register_nav2()  # a subscription's key has the type's hash
-    process = teller("zenoh", sys.executable, one)
-    try:
-        for topic, data in hear_all(connect("zenoh"), one).items():
-            check(topic, with_idl(topics_declared(one)[topic], data))
-    finally:
-        process.kill()
-        process.wait()
-        next(routers, None)
+    check_all_heard("zenoh", one)
 
 
 def with_rclpy(other_end: OtherEnd, topics: dict[str, str]) -> Iterator[tuple[str, Any]]:
@@ -223,33 +229,23 @@ def with_rclpy(other_end: OtherEnd, topics: dict[str, str]) -> Iterator[tuple[st
 def test_rclpy_reads_what_it_has_types_for(transport: str, other_end: OtherEnd, one: list[dict[str, dict[str, Any]]]):
     own = transport == "rclpy"
     libraries = {"PYTHONPATH": ours_for_rclpy()} if own else {}
-    process = teller(transport, str(ROS2_PYTHON) if own else sys.executable, one, **libraries)
-    try:
-        assert process.stdout is not None
-        first = process.stdout.readline()
-        output = process.stdout
-        threading.Thread(target=lambda: [None for _ in output], daemon=True).start()
-        left_out = set(json.loads(first)["left_out"])
-        topics = topics_declared(one)
-        readable = {topic: kind for topic, kind in topics.items() if kind.partition("/")[0] in INSTALLED}
+    topics = topics_declared(one)
+    readable = {topic: kind for topic, kind in topics.items() if kind.partition("/")[0] in INSTALLED}
+    with teller(transport, str(ROS2_PYTHON) if own else sys.executable, one, **libraries) as output:
+        left_out = set(json.loads(output.readline())["left_out"])
+        threading.Thread(target=output.read, daemon=True).start()
         assert left_out == (topics.keys() - readable.keys() if own else set())
         for topic, message in with_rclpy(other_end, readable):
             check(topic, message)
-    finally:
-        process.kill()
-        process.wait()
 
 
 def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):
-    from . import every_message
-    from .conftest import Wire
-
     class Bytes(Wire):
         def publish(self, topic, msgtype, data, latched=False):
-            self.sent.append((topic, with_idl(msgtype, data)))
+            self.sent.append((topic, decoded(msgtype, data)))
 
     wire = Bytes()
-    for module in (every_message, importlib.import_module("omninav.stages.live.publish")):
+    for module in (every_message, publish):
         monkeypatch.setattr(module, "connect", lambda name, domain=None: wire)
     every_message.Told("dds", one).tell()
     assert {topic for topic, _ in wire.sent} == topics_declared(one).keys()

@@ -1,17 +1,14 @@
 """The zenoh transport between two processes and a router, and the keys by which nodes with rmw_zenoh find it."""
 
-import json
-import socket
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.live.publish_truth import PublishTruth
-from omninav.stages.live.transport import TransportError, connect, disconnect
+from omninav.stages.live.transport import TransportError, connect
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Pose
 
@@ -21,21 +18,6 @@ zenoh = pytest.importorskip("zenoh")
 ODOMETRY, TWIST, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"
 STRING = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 """std_msgs/String, in the examples of rmw_zenoh's own design document."""
-
-
-@pytest.fixture
-def router(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
-    """As `ros2 run rmw_zenoh_cpp rmw_zenohd` starts one, at a port of the test's own."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        place = json.dumps([f"tcp/127.0.0.1:{free.getsockname()[1]}"])
-    settings = zenoh.Config()
-    for key, value in (("mode", '"router"'), ("listen/endpoints", place), ("scouting/multicast/enabled", "false")):
-        settings.insert_json5(key, value)
-    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f"connect/endpoints={place}")
-    with zenoh.open(settings) as session:
-        yield session
-        disconnect()
 
 
 def test_messages_pass_both_ways_between_two_processes(router: object):
