@@ -61,7 +61,7 @@ def test_the_simulated_robot_speaks_it(router: zenoh.Session):
     listener = router.declare_subscriber("5/ground_truth/pose/**", heard.append)
     ctx, truth = Context("truth"), PublishTruth(transport="zenoh", domain=5)
     truth.setup(ctx)
-    until(lambda: truth.step(ctx, Tick(0, 7), Pose(1.0, 2.0, 0.5), EpisodeStatistics(0, 0.0)) and heard)
+    until(lambda: truth.step(ctx, Tick(0, 7), Pose(1.0, 2.0, 0.5), EpisodeStatistics(0, 0.0)) or heard)
     assert decode(POSE, heard[0].payload.to_bytes()).pose.position.y == 2.0
     listener.undeclare()
 
