@@ -14,7 +14,7 @@ from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.pose import Pose
 
-SMALL = mirror(columns=160)
+SMALL = mirror(columns=32)
 KITCHEN = Room(name="kitchen", corner=(0.0, 0.0), size=(6.0, 3.0), doors=(Door(side="north", at=3.0),))
 WORLD = replace(
     DEMO, size=(6.0, 6.0), camera=SMALL, rooms=(KITCHEN,), shelves=(), blocks=(), aisle_blocks=(), wall_panels=(),
