@@ -1,4 +1,4 @@
-"""Real rclpy at the other end, in an environment of its own."""
+"""Robots of the tests' own, and real rclpy at the other end, in an environment of its own."""
 
 import base64
 import functools
@@ -11,17 +11,24 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import DRIVE, ROOT
 
+import omninav
+from omninav.pipeline.api.run import Run
 from omninav.pipeline.mcap.message_types import make_message, standard_types
-from omninav.stages.live.transport import Transport, disconnect
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live import intake, live_source, publish, publish_truth, robot_driver, watchdog
+from omninav.stages.live.transport import Arrival, Transport, disconnect
 
-ROOT = Path(__file__).parents[3]
+CAMERA = ROOT / "tests/data/camera.yaml"
+IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odom", "/ground_truth/pose"
 ROS2_PYTHON = Path(os.environ.get("OMNINAV_ROS2_PYTHON", ROOT / ".venv-ros2/bin/python"))
 WAIT_S = 60.0
 """Until what does not happen has failed: a busy machine is slow."""
@@ -44,7 +51,8 @@ class Wire(Transport):
 
     def __init__(self) -> None:
         super().__init__()
-        self.sent: list[tuple[str, object]] = []
+        self.place, self.status.live = "a test", True
+        self.sent: list[tuple[str, Any]] = []
         self.there: dict[str, str] = {}
 
     def subscribe(self, topic, msgtype, newest=False):
@@ -61,6 +69,76 @@ class Wire(Transport):
 
     def on(self, topic):
         return [message for each, message in self.sent if each == topic]
+
+
+class Recorded(Wire):
+    """A robot that says what a recorded one said, `at_once` messages whenever it is listened to, by a clock of its own.
+
+    `silent`: images that never come.
+    """
+
+    def __init__(self, drive: Path = DRIVE, at_once: int = 50, silent: range = range(0)) -> None:
+        super().__init__()
+        self.now_s = 0.0
+        self._script = self._messages(drive, at_once, silent)
+
+    def take(self, timeout_s=0.0):
+        return next(self._script, None)
+
+    def _messages(self, drive: Path, at_once: int, silent: range) -> Iterator[Arrival | None]:
+        images = itertools.count()
+        for number, arrival in enumerate(recorded(drive, IMAGE, ODOMETRY, TRUTH)):
+            self.now_s = arrival.received / 1e9
+            if arrival.topic != IMAGE or next(images) not in silent:
+                yield arrival
+            if number % at_once == 0:
+                yield None
+
+
+def recorded(drive: Path, *topics: str) -> list[Arrival]:
+    """What a recorded robot said on these topics (none: on all), in the order in which it was received."""
+    reader = LogReader(drive)
+    types = reader.topics
+    records = sorted(reader.scan(set(topics) or None), key=lambda record: record.log_time)
+    return [Arrival(each.topic, types[each.topic], each.log_time, bytes(each.data)) for each in records]
+
+
+def joined(monkeypatch: pytest.MonkeyPatch, robot: Wire) -> None:
+    """Have every stage join this robot."""
+    for module in (live_source, publish, publish_truth, robot_driver):
+        monkeypatch.setattr(module, "connect", lambda name, domain: robot)
+    monkeypatch.setattr(live_source, "disconnect", lambda: None)
+
+
+@pytest.fixture
+def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
+    """A transport of the test's own, which every stage joins."""
+    made = Wire()
+    joined(monkeypatch, made)
+    return made
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """A clock that stands until a test moves it: a busy machine is not late."""
+    moment = [1000.0]
+    for module in (intake, watchdog):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment[0]))
+    return moment
+
+
+@pytest.fixture
+def localised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Path) -> Callable[..., Run]:
+    """A live run of a variant on a robot, by the robot's clock."""
+
+    def run(robot: Recorded, variant: str, *settings: str) -> Run:
+        joined(monkeypatch, robot)
+        for module in (live_source, intake):
+            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: robot.now_s))
+        words = ("source=live", "publish=ros2", "log=live", f"camera={CAMERA}", "plots=none", *settings)
+        return omninav.run(variant, *words, folder=tmp_path / "run", cache=shared_cache, progress=False)
+
+    return run
 
 
 class OtherEnd:

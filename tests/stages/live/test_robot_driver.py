@@ -17,20 +17,12 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
-from .conftest import OtherEnd, Wire, decode, encode, until
+from .conftest import OtherEnd, decode, encode, until
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 CAMERA = Cylindrical(80, 20, 40.0, height=0.5)
 IMAGE = Image(np.zeros((20, 80, 3), np.uint8))
 SCAN = Scan(np.array([1.0, 2.0, np.inf]), -1.0, 1.0, 0.0, 5.0)
-
-
-@pytest.fixture
-def wire(monkeypatch):
-    made = Wire()
-    for module in (robot_driver, publish_truth):
-        monkeypatch.setattr(module, "connect", lambda name, domain: made)
-    return made
 
 
 class Drive:

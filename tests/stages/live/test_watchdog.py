@@ -1,26 +1,13 @@
 """The watchdog alone, and under the stage that commands the robot."""
 
 import threading
-from types import SimpleNamespace
-
-import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.live import publish, watchdog
 from omninav.stages.live.publish import Publish
 from omninav.stages.live.watchdog import MIN_TIMEOUT_S, Watchdog
 from omninav.stages.values.command import Command
 
 from .conftest import Wire, until
-
-
-@pytest.fixture
-def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The watchdog's clock, which stands until a test moves it: a busy machine is not late."""
-    moment = [100.0]
-    clock = SimpleNamespace(monotonic=lambda: moment[0])
-    monkeypatch.setattr(watchdog, "time", clock)
-    return moment
 
 
 class Robot:
@@ -61,10 +48,7 @@ def test_a_robot_that_stands_is_left_alone_and_is_stopped_once_more_at_the_end(n
     assert robot.stops == 1
 
 
-def test_a_camera_that_falls_silent_while_the_robot_drives_stops_it(monkeypatch: pytest.MonkeyPatch, now: list[float]):
-    wire = Wire()
-    wire.status.live = True
-    monkeypatch.setattr(publish, "connect", lambda name, domain: wire)
+def test_a_camera_that_falls_silent_while_the_robot_drives_stops_it(wire: Wire, now: list[float]):
     stage, ctx = Publish(command_type="Twist"), Context("publish")
     stage.setup(ctx)
     for number in range(3):  # ten ticks a second, and then no more
