@@ -22,6 +22,7 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
 
 START, GOAL = (2.0, 2.6, 2.0), (8.0, 3.2, -1.0)
+BLOCKED = DrivingStatus("blocked", "a chair")
 
 
 def fix_of(features: LocalFeatures) -> LandmarkFix | None:
@@ -50,19 +51,10 @@ class Drive:
         tick, ctx = Tick(self.tick, 10**15 + self.tick * 200_000_000), Context("planning")
         self.tick += 1
         pose = Pose(*self.pose.tolist())
+        estimate, seen = PoseEstimate(pose, np.eye(3), 1.0, pose), seen_from(room(), self.pose) if sees else None
+        own = mapped_room(), estimate, PoseConfidence(confidence)
         out = self.planner.step(
-            ctx,
-            self.plan,
-            tick,
-            mapped_room(),
-            PoseEstimate(pose, np.eye(3), 1.0, pose),
-            PoseConfidence(confidence),
-            fix,
-            self.goal,
-            self.features,
-            seen_from(room(), self.pose) if sees else None,
-            status or self.status,
-            point,
+            ctx, self.plan, tick, *own, fix, self.goal, self.features, seen, status or self.status, point
         )
         done = self.follow.step(ctx, self.following, tick, out.vector, out.progress)
         self.status = done.status
@@ -164,18 +156,14 @@ def test_a_robot_that_gets_lost_stops_at_once() -> None:
 def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_up() -> None:
     drive = Drive(start=(3.0, 3.0, 0.0))  # between two passes of the tour
     before = set(drive.step().route.places.tolist())
-    blocked = DrivingStatus("blocked", "a chair")
-    after = drive.step(status=blocked).route
+    after = drive.step(status=BLOCKED).route
     assert after.number == 1
     assert not before & set(after.places.tolist())
     for _ in range(26 * MAX_BLOCKED):
         drive.pose = np.array((3.0, 3.0, 0.0))
-        out = drive.step(status=blocked)
+        out = drive.step(status=BLOCKED)
     assert (out.route.state, out.route.why) == ("gave up", "a chair")
     assert drive.status.state == "waiting"
-
-
-BLOCKED = DrivingStatus("blocked", "a chair")
 
 
 def test_where_something_stands_at_the_goal_the_robot_turns_and_ends_before_it() -> None:

@@ -1,7 +1,5 @@
 """Ways over a small map with a ring and a dead end, and what happens where they fail."""
 
-import itertools
-
 import numpy as np
 import pytest
 from made_places import made_map
@@ -23,7 +21,6 @@ from omninav.stages.values.visual_distance import VisualDistances
 # 0 - 1 - 2 - 3 in a row, 3 and 0 are neighbours by a loop, 4 hangs on 2 (driven from 4 to 2), 5 is on its own
 BETWEEN = {(0, 1): 1, (1, 2): 0, (2, 3): 4, (4, 2): 2}
 OPEN = {"failed_links": np.zeros((0, 2), np.int64), "failures": np.zeros(0, np.int64)}
-TICKS = itertools.count()
 MODULE = "omninav.stages.planning.shortest_path"
 
 
@@ -43,24 +40,28 @@ def believed(place: int, share: float = 0.9) -> PlaceBelief:
     return PlaceBelief(probabilities, np.zeros((6, 3)))
 
 
-def under_way(state: ShortestPathPlannerState, at: int, arrived: bool = False) -> PathProgress:
-    views = int(state.views[-1])
-    return PathProgress(state.number, at, views, at, at >= views - 1, False, arrived)
+class Planner:
+    """The planner, at five ticks a second, of a robot that is led where it says."""
+
+    def __init__(self, goal: int | str, **parameters: float) -> None:
+        self.stage, self.state, self.ticks = ShortestPathPlanner(goal=goal, **parameters), ShortestPathPlannerState(), 0
+
+    def look(self, belief: PlaceBelief | int, status: str | None = None, at: int | None = None, share: float = 0.9):
+        """The route of a robot that believes itself at a place, and drives, or does not, to the view `at` of it."""
+        tick = Tick(0, 200_000_000 * self.ticks)
+        self.ticks += 1
+        belief = believed(belief, share) if isinstance(belief, int) else belief
+        why = "a chair" if status == "blocked" else "too few matches"
+        doing = None if status is None else DrivingStatus(status, why)
+        progress = None
+        if at is not None:
+            views = int(self.state.views[-1])
+            progress = PathProgress(self.state.number, at, views, at, at >= views - 1, False, status == "arrived")
+        return self.stage.step(Context("planning"), self.state, tick, belief, a_map(), None, doing, progress)
 
 
-def drive(
-    stage: ShortestPathPlanner,
-    state: ShortestPathPlannerState,
-    place: int,
-    status=None,
-    at: int | None = None,
-    share=0.9,
-    arrived=False,
-):
-    tick = Tick(0, 200_000_000 * next(TICKS))
-    progress = None if at is None else under_way(state, at, arrived)
-    doing = None if status is None else DrivingStatus(status, "a chair" if status == "blocked" else "too few matches")
-    return stage.step(Context("planning"), state, tick, believed(place, share), a_map(), None, doing, progress)
+def planned(outs) -> list[bool]:
+    return [out.path is not None for out in outs]
 
 
 def test_the_way_with_the_fewest_links_is_taken():
@@ -119,67 +120,59 @@ def test_a_picture_of_no_place_is_refused_with_the_nearest():
 def test_it_plans_once_it_is_sure_and_not_again(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
     monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 1.0)
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
-    first = drive(stage, state, 1, share=0.4)
-    assert first.path is None
-    assert first.route.state == "locating"
-    second = drive(stage, state, 1, share=0.6)
-    assert second.path is not None
+    planner = Planner(3)
+    first = planner.look(1, share=0.4)
+    assert (first.path, first.route.state) == (None, "locating")
+    second = planner.look(1, share=0.6)
     assert second.route.places.tolist() == [1, 0, 3]
     assert second.path.names == ("place 1", "on the way, image 60", "place 0, hall", "place 3")
-    again = drive(stage, state, 0, "driving", at=2)
-    assert again.path is None
-    assert again.route.state == "under way"
+    again = planner.look(0, "driving", at=2)
+    assert (again.path, again.route.state) == (None, "under way")
 
 
 def test_even_if_it_is_sure_it_looks_for_a_moment(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.6)
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
-    assert [drive(stage, state, 1).path is not None for _ in range(4)] == [False, False, False, True]
+    planner = Planner(3)
+    assert planned(planner.look(1) for _ in range(4)) == [False, False, False, True]
 
 
 def test_who_looks_long_enough_goes_by_the_most_probable_place(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 0.6)
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
-    planned = [drive(stage, state, 2, share=0.3).path is not None for _ in range(4)]
-    assert planned == [False, False, False, True]
+    planner = Planner(3)
+    assert planned(planner.look(2, share=0.3) for _ in range(4)) == [False, False, False, True]
 
 
 def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
-    drive(stage, state, 1)
-    out = drive(stage, state, 2, "lost", at=1)
-    assert out.path is not None
-    assert out.path.number == 1
-    assert out.route.places.tolist() == [2, 3]
+    planner = Planner(3)
+    planner.look(1)
+    out = planner.look(2, "lost", at=1)
+    assert (out.path.number, out.route.places.tolist()) == (1, [2, 3])
 
 
 def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.4)
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
+    planner = Planner(3)
     for _ in range(3):
-        drive(stage, state, 1)
-    waiting = drive(stage, state, 1, "lost", at=1)
+        planner.look(1)
+    waiting = planner.look(1, "lost", at=1)
     assert (waiting.route.state, waiting.route.why) == ("locating", "lost: too few matches")
-    going = drive(stage, state, 1, "driving", at=1)
+    going = planner.look(1, "driving", at=1)
     assert (going.path, going.route.state, going.route.number, going.route.why) == (None, "under way", 0, "")
 
 
 def test_around_a_link_that_failed_there_may_be_another_way():
-    stage, state = ShortestPathPlanner(goal="hall"), ShortestPathPlannerState()
-    assert drive(stage, state, 2).route.places.tolist() == [2, 1, 0]
-    out = drive(stage, state, 1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
-    assert state.failed_links.tolist() == [[1, 0]]
+    planner = Planner("hall")
+    assert planner.look(2).route.places.tolist() == [2, 1, 0]
+    out = planner.look(1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
+    assert planner.state.failed_links.tolist() == [[1, 0]]
     assert out.route.places.tolist() == [1, 2, 3, 0]
 
 
 def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_stands():
-    stage, state = ShortestPathPlanner(goal=4), ShortestPathPlannerState()
-    tried = [drive(stage, state, 2).route.places.tolist()]
-    for _ in range(2):
-        tried.append(drive(stage, state, 2, "blocked", at=1).route.places.tolist())
-    assert tried == [[2, 4]] * 3
-    last = drive(stage, state, 2, "blocked", at=1)
+    planner = Planner(4)
+    tried = [planner.look(2), *(planner.look(2, "blocked", at=1) for _ in range(2))]
+    assert [out.route.places.tolist() for out in tried] == [[2, 4]] * 3
+    last = planner.look(2, "blocked", at=1)
     assert last.route.state == "gave up"
     assert last.route.why == (
         "no route leads from place 2 to 4 but what could not be driven 3 times, from place 2 to 4; "
@@ -187,92 +180,84 @@ def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_st
     )
     assert last.path is not None
     assert not last.path.views  # there is nothing to drive to any more
-    assert drive(stage, state, 2, "blocked", at=1).path is None
+    assert planner.look(2, "blocked", at=1).path is None
 
 
 def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from_there_begin_behind_it():
-    stage, state = ShortestPathPlanner(goal=3, search_s=0.0), ShortestPathPlannerState()
-    drive(stage, state, 1)
-    out = drive(stage, state, 1, "lost", at=0)
-    assert state.failed_links.tolist() == [[1, 1]]
-    assert out.path is not None
+    planner = Planner(3, search_s=0.0)
+    planner.look(1)
+    out = planner.look(1, "lost", at=0)
+    assert planner.state.failed_links.tolist() == [[1, 1]]
     assert out.path.names == ("on the way, image 60", "place 0, hall", "place 3")
     assert out.route.places.tolist() == [1, 0, 3]
-    drive(stage, state, 1, "blocked", at=0)  # the picture that it began with
-    assert state.failed_links.tolist() == [[1, 1], [1, 0]]
-    doubtful = PlaceBelief(np.array([0.1, 0.5, 0.3, 0.0, 0.1, 0.0]), np.zeros((6, 3)))
-    state.failures = np.array([1, 1])
-    tick = Tick(0, 200_000_000 * next(TICKS))
-    found = stage.step(
-        Context("planning"), state, tick, doubtful, a_map(), None, DrivingStatus("lost"), under_way(state, 0)
-    )
+    planner.look(1, "blocked", at=0)  # the picture that it began with
+    assert planner.state.failed_links.tolist() == [[1, 1], [1, 0]]
+    planner.state.failures = np.array([1, 1])
+    found = planner.look(PlaceBelief(np.array([0.1, 0.5, 0.3, 0.0, 0.1, 0.0]), np.zeros((6, 3))), "lost", at=0)
     assert found.route.places.tolist() == [2, 3]  # 0.3 against half of 0.5
 
 
 def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_place(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
-    stage, state = ShortestPathPlanner(goal=3, search_s=2.0), ShortestPathPlannerState()
-    planned = [drive(stage, state, 1).path is not None for _ in range(2)]
-    planned += [drive(stage, state, 1, "lost", at=0).path is not None for _ in range(2)]
-    assert planned == [False, True, False, True]  # the second begins behind the medoid
-    again = [drive(stage, state, 1, "lost", at=0) for _ in range(11)]
-    assert [out.path is not None for out in again] == 10 * [False] + [True]
+    planner = Planner(3, search_s=2.0)
+    assert planned(planner.look(1) for _ in range(2)) == [False, True]
+    assert planned(planner.look(1, "lost", at=0) for _ in range(2)) == [False, True]  # it begins behind the medoid
+    again = [planner.look(1, "lost", at=0) for _ in range(11)]
+    assert planned(again) == 10 * [False] + [True]
     assert again[9].route.state == "locating"
-    assert state.failed_links.tolist() == [[1, 1]]  # no link has failed: it may not be there at all
-    assert state.failures.tolist() == [2]
+    assert planner.state.failed_links.tolist() == [[1, 1]]  # no link has failed: it may not be there at all
+    assert planner.state.failures.tolist() == [2]
 
 
 def test_sure_of_another_place_it_looks_around_no_longer(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.2)
-    stage, state = ShortestPathPlanner(goal=3, search_s=2.0), ShortestPathPlannerState()
+    planner = Planner(3, search_s=2.0)
     for _ in range(2):
-        drive(stage, state, 1)
+        planner.look(1)
     for _ in range(3):
-        drive(stage, state, 1, "lost", at=0)
-    assert drive(stage, state, 4, "lost", at=0, share=0.45).path is None  # likelier, but not sure
-    out = drive(stage, state, 4, "lost", at=0)
+        planner.look(1, "lost", at=0)
+    assert planner.look(4, "lost", at=0, share=0.45).path is None  # likelier, but not sure
+    out = planner.look(4, "lost", at=0)
     assert out.path is not None
     assert out.route.places.tolist()[0] == 4
 
 
 def test_lost_again_on_the_same_link_it_looks_around_too():
-    stage, state = ShortestPathPlanner(goal=4, search_s=1.0), ShortestPathPlannerState()
-    drive(stage, state, 2)
-    assert drive(stage, state, 2, "lost", at=1).path is not None
-    planned = [drive(stage, state, 2, "lost", at=1).path is not None for _ in range(6)]
-    assert planned == 5 * [False] + [True]
-    assert state.failed_links.tolist() == [[2, 4]]
-    assert drive(stage, state, 2, "blocked", at=1).path is not None  # who stands before something need not look around
+    planner = Planner(4, search_s=1.0)
+    planner.look(2)
+    assert planned(planner.look(2, "lost", at=1) for _ in range(7)) == [True, *5 * [False], True]
+    assert planner.state.failed_links.tolist() == [[2, 4]]
+    assert planner.look(2, "blocked", at=1).path is not None  # who stands before something need not look around
 
 
 def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
-    stage, state = ShortestPathPlanner(goal=3), ShortestPathPlannerState()
-    drive(stage, state, 1)
-    drive(stage, state, 1, "lost", at=0)
-    drive(stage, state, 1, "driving", at=1)
-    assert not len(state.failed_links)
+    planner = Planner(3)
+    planner.look(1)
+    planner.look(1, "lost", at=0)
+    planner.look(1, "driving", at=1)
+    assert not len(planner.state.failed_links)
 
 
 def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.MAX_FAILURES", 2)
-    stage, state = ShortestPathPlanner(goal=4, search_s=0.0), ShortestPathPlannerState()
-    drive(stage, state, 2)
-    drive(stage, state, 2, "blocked", at=1)
-    last = drive(stage, state, 2, "lost", at=1)
-    assert last.route.why.endswith("it was blocked: a chair; the last route ended because it was lost: too few matches")
+    planner = Planner(4, search_s=0.0)
+    planner.look(2)
+    planner.look(2, "blocked", at=1)
+    why = planner.look(2, "lost", at=1).route.why
+    assert why.endswith("it was blocked: a chair; the last route ended because it was lost: too few matches")
 
 
 def test_it_arrives_and_stays():
-    stage, state = ShortestPathPlanner(goal=0), ShortestPathPlannerState()
-    drive(stage, state, 1)
-    assert drive(stage, state, 0, "arrived", at=2, arrived=True).route.state == "arrived"
-    assert drive(stage, state, 4).route.state == "arrived"
+    planner = Planner(0)
+    planner.look(1)
+    assert planner.look(0, "arrived", at=2).route.state == "arrived"
+    assert planner.look(4).route.state == "arrived"
 
 
 def test_after_so_many_ways_it_gives_up_and_says_why():
-    stage, state = ShortestPathPlanner(goal=3, search_s=0.0, max_routes=2), ShortestPathPlannerState()
-    drive(stage, state, 1)
-    drive(stage, state, 1, "lost", at=0)
-    out = drive(stage, state, 1, "lost", at=0)
-    assert out.route.state == "gave up"
-    assert out.route.why == "2 routes were tried; the last route ended because it was lost: too few matches"
+    planner = Planner(3, search_s=0.0, max_routes=2)
+    planner.look(1)
+    planner.look(1, "lost", at=0)
+    route = planner.look(1, "lost", at=0).route
+    assert route.state == "gave up"
+    assert route.why == "2 routes were tried; the last route ended because it was lost: too few matches"
