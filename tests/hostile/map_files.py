@@ -5,6 +5,7 @@ import functools
 import hashlib
 import io
 import json
+import math
 import re
 import tempfile
 import zipfile
@@ -102,9 +103,7 @@ def sealed(entries: dict[str, bytes], level: int = 1) -> bytes:
             archive.writestr(zipfile.ZipInfo(name), entries[name])
         if front:
             end = buffer.tell()
-            summed = io.BytesIO()
-            np.lib.format.write_array(summed, sums_of(io.BytesIO(buffer.getvalue()), end))
-            entries = entries | {"chunk_sums.npy": summed.getvalue()}
+            entries = entries | {"chunk_sums.npy": npy(sums_of(io.BytesIO(buffer.getvalue()), end))}
         if isinstance(header, dict) and isinstance(header.get("arrays"), dict):
             entries = entries | {"header.json": json.dumps(_with_sums(header, entries)).encode()}
         for name, content in entries.items():
@@ -112,6 +111,23 @@ def sealed(entries: dict[str, bytes], level: int = 1) -> bytes:
                 archive.writestr(name, content)
         archive.comment = (f"front:{end:016}" if front else "").encode() + b" " * (len(_SUM) + 64)
     return _summed(buffer.getvalue()[: -len(_SUM) - 64], end)
+
+
+def npy(array: Any) -> bytes:
+    """The file of an array."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def fields_of(entries: dict[str, bytes]) -> Any:
+    """The fields of a map that are no arrays."""
+    return decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
+
+
+def with_fields(entries: dict[str, bytes], fields: Any) -> bytes:
+    """A map with other fields that are no arrays."""
+    return sealed(entries | {"rest.npy": npy(np.frombuffer(encode(fields), np.uint8))})
 
 
 def _with_sums(header: dict[str, Any], entries: dict[str, bytes]) -> dict[str, Any]:
@@ -167,10 +183,7 @@ def arrays(random: Random, files: Files) -> Files:
         return files
     if array.size > MAX_ITEMS:
         return files
-    array = mutated(random, array)
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
-    return files | {MAP: sealed(entries | {name: buffer.getvalue()})}
+    return files | {MAP: sealed(entries | {name: npy(mutated(random, array))})}
 
 
 def mutated(random: Random, array: Any) -> Any:
@@ -215,9 +228,8 @@ def members(random: Random, files: Files) -> Files:
         entries[name] = entries.get(name, b"") + bytes(random.choice((10, 10**6, 5 * 10**7)))
     else:
         shape = "(" + ", ".join(str(random.choice(SIZES)) for _ in range(random.randrange(4))) + ",)"
-        head = (
-            f"{{'descr': '{random.choice(('<f8', '|O', '<U9999', '|V0'))}', 'fortran_order': False, 'shape': {shape}}}"
-        )
+        kind_of_items = random.choice(("<f8", "|O", "<U9999", "|V0"))
+        head = f"{{'descr': '{kind_of_items}', 'fortran_order': False, 'shape': {shape}}}"
         packed = head.encode().ljust(118) + b"\n"
         entries[name] = b"\x93NUMPY\x01\x00" + len(packed).to_bytes(2, "little") + packed
     return files | {MAP: sealed(entries)}
@@ -225,10 +237,10 @@ def members(random: Random, files: Files) -> Files:
 
 def rest(random: Random, files: Files) -> Files:
     """Other values in the fields that are no arrays."""
-    values: tuple[Any, ...] = (None, -1, 2**70, "x" * 9, float("nan"), [], {}, (1, 2), True, b"", "", 1e308)
+    values: tuple[Any, ...] = (None, -1, 2**70, "x" * 9, math.nan, [], {}, (1, 2), True, b"", "", 1e308)
     entries = _entries(files)
     try:
-        fields = decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
+        fields = fields_of(entries)
     except Exception:
         return files
     if not isinstance(fields, dict):
@@ -237,32 +249,25 @@ def rest(random: Random, files: Files) -> Files:
         fields[random.choice(sorted(fields))] = random.choice(values)
     else:
         fields[random.choice(("poses", "kind", "surplus", "features"))] = random.choice(values)
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.frombuffer(encode(fields), np.uint8), allow_pickle=False)
-    return files | {MAP: sealed(entries | {"rest.npy": buffer.getvalue()})}
+    return files | {MAP: with_fields(entries, fields)}
 
 
 def landmarks(random: Random, files: Files) -> Files:
     """An array of a map's landmarks, or of their words, of another shape, type or content; or another deviation."""
     entries = _entries(files)
     try:
-        fields = decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
+        fields = fields_of(entries)
         found = fields["landmarks"]
         inner = random.choice((found, found, found.words))
     except Exception:
         return files
-    name = random.choice(
-        [field.name for field in dataclasses.fields(inner) if field.name != "words" or inner is not found]
-    )
+    names = [field.name for field in dataclasses.fields(inner) if field.name != "words" or inner is not found]
+    name = random.choice(names)
     value = getattr(inner, name)
-    changed = (
-        mutated(random, value) if isinstance(value, np.ndarray) else random.choice((0.0, -1.0, 1e300, float("nan")))
-    )
-    inner = dataclasses.replace(inner, **{name: changed})
+    value = mutated(random, value) if isinstance(value, np.ndarray) else random.choice((0.0, -1.0, 1e300, math.nan))
+    inner = dataclasses.replace(inner, **{name: value})
     fields["landmarks"] = dataclasses.replace(found, words=inner) if isinstance(inner, VisualWords) else inner
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.frombuffer(encode(fields), np.uint8), allow_pickle=False)
-    return files | {MAP: sealed(entries | {"rest.npy": buffer.getvalue()})}
+    return files | {MAP: with_fields(entries, fields)}
 
 
 def header(random: Random, files: Files) -> Files:
@@ -271,17 +276,8 @@ def header(random: Random, files: Files) -> Files:
     head = _plain(entries.get("header.json", b""))
     if not isinstance(head, dict):
         return files
-    things: tuple[Any, ...] = (
-        None,
-        [],
-        {},
-        1,
-        -1.5,
-        "x",
-        "os.system",
-        "omninav.stages.values.maps.ReferenceGraph",
-        [1],
-    )
+    reference_graph = "omninav.stages.values.maps.ReferenceGraph"
+    things: tuple[Any, ...] = (None, [], {}, 1, -1.5, "x", "os.system", reference_graph, [1])
     head[random.choice((*sorted(head), "surplus"))] = random.choice(things)
     return files | {MAP: sealed(entries | {"header.json": json.dumps(head).encode()})}
 

@@ -5,20 +5,20 @@ import itertools
 import struct
 import tempfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
 import made_logs
-import numpy as np
 import zstandard
 
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings.opening import open_recording
 
 from .harness import Format, Wrong, not_finite
-from .mutations import BINARY, REALS, SIZES, TEXT, Files, on
+from .mutations import BINARY, REALS, SIZES, TEXT, Files, Mutation, on
+from .recording_files import read_all
 
 LOG = "log.mcap"
 MAGIC = b"\x89MCAP0\r\n"
@@ -55,13 +55,8 @@ def _whole() -> tuple[int, int]:
 def read(folder: Path, files: Files) -> Any:
     """Every image, pose and message of a log."""
     recording = open_recording(str(folder / LOG))
-    if len(recording.stamps) > 1 and not (np.diff(recording.stamps) > 0).all():
-        raise Wrong("stamps do not ascend")
-    for frame in range(len(recording.stamps)):
-        recording.image(frame)
-        recording.scan(frame)
-    for what in (recording.camera, recording.odometry):
-        not_finite(what, "recording")
+    read_all(recording)
+    not_finite(recording.odometry, "odometry")
     return dict(recording.dropped)
 
 
@@ -112,33 +107,31 @@ def records(random: Random, files: Files) -> Files:
     return files | {LOG: resealed(pieces)}
 
 
-def in_chunk(random: Random, files: Files) -> Files:
-    """The same within a chunk whose size and checksum are right."""
-    pieces = pieces_of(files[LOG])
-    number, inside = _some_chunk(random, pieces)
-    if number < 0:
-        return files
-    _rearrange(random, inside)
-    pieces[number] = _packed(pieces[number], joined(inside))
-    return files | {LOG: resealed(pieces)}
+def within_chunk(change: Callable[[Random, list[Piece]], None]) -> Mutation:
+    """A mutation of the records in a chunk whose size and checksum are right."""
+
+    def mutate(random: Random, files: Files) -> Files:
+        pieces = pieces_of(files[LOG])
+        number, inside = _some_chunk(random, pieces)
+        if number < 0:
+            return files
+        change(random, inside)
+        pieces[number] = _packed(pieces[number], joined(inside))
+        return files | {LOG: resealed(pieces)}
+
+    return mutate
 
 
-def in_message(random: Random, files: Files) -> Files:
-    """Hostile numbers in messages of a chunk whose size and checksum are right."""
-    pieces = pieces_of(files[LOG])
-    number, inside = _some_chunk(random, pieces)
+def _hostile_numbers(random: Random, inside: list[Piece]) -> None:
+    """Numbers in some messages that no robot says."""
     chosen = [n for n, piece in enumerate(inside) if piece.opcode == MESSAGE and len(piece.content) > 40]
-    if number < 0 or not chosen:
-        return files
-    for at in random.sample(chosen, random.randrange(1, len(chosen) + 1)):
+    for at in random.sample(chosen, random.randrange(1, len(chosen) + 1)) if chosen else ():
         content = bytearray(inside[at].content)
         place = 22 + 4 + 4 * random.randrange((len(content) - 26) // 4)
         form = random.choice(("<d", "<I", "<Q"))
         packed = struct.pack(form, random.choice(REALS) if form == "<d" else random.choice(SIZES) % 2**32)
         content[place : place + len(packed)] = packed
         inside[at] = Piece(MESSAGE, bytes(content))
-    pieces[number] = _packed(pieces[number], joined(inside))
-    return files | {LOG: resealed(pieces)}
 
 
 def chunk_head(random: Random, files: Files) -> Files:
@@ -210,11 +203,6 @@ def _packed(chunk: Piece, data: bytes) -> Piece:
     return Piece(CHUNK, head + b"zstd" + struct.pack("<Q", len(packed)) + packed)
 
 
-BYTES = Format("mcap bytes", samples, [on(BINARY)], read_all_or_count, cases=200)
-RECORDS = Format(
-    "mcap records",
-    samples,
-    [records, in_chunk, in_chunk, in_message, in_message, in_message, chunk_head, camera],
-    read,
-    cases=200,
-)
+IN_CHUNK, IN_MESSAGE = within_chunk(_rearrange), within_chunk(_hostile_numbers)
+BYTES = Format("mcap bytes", samples, [on(BINARY)], read_all_or_count)
+RECORDS = Format("mcap records", samples, [records, *2 * [IN_CHUNK], *3 * [IN_MESSAGE], chunk_head, camera], read)

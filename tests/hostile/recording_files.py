@@ -18,6 +18,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.recordings.occupancy_grid import read_grid, read_occupancy
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import Recording
 from omninav.stages.source.goal_image import read_image
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 
@@ -138,14 +139,19 @@ def recording_of(folder: Path, files: Files) -> Any:
     elif any(name.startswith("bag/") for name in files):
         log = folder / "bag"
     recording = open_recording(str(log))
-    if len(recording.stamps) > 1 and not (np.diff(recording.stamps) > 0).all():
+    read_all(recording)
+    recording.digest()
+    return recording.odometry
+
+
+def read_all(recording: Recording) -> None:
+    """Every image and scan of a recording."""
+    if not (np.diff(recording.stamps) > 0).all():
         raise Wrong("stamps do not ascend")
     for frame in range(len(recording.stamps)):
         recording.image(frame)
         recording.scan(frame)
-    recording.digest()
     not_finite(recording.camera, "camera")
-    return recording.odometry
 
 
 def image_of(folder: Path, files: Files) -> Any:
@@ -180,11 +186,9 @@ def more_scans(random: Random, files: Files) -> Files:
     name = random.choice(sorted(files))
     data = files[name]
     at = data.find(b"\xff\xda")
-    return (
-        files
-        if at < 0 or len(data) > 10_000
-        else files | {name: data[:at] + data[at:-2] * random.choice((2, 30, 3000)) + b"\xff\xd9"}
-    )
+    if at < 0 or len(data) > 10_000:
+        return files
+    return files | {name: data[:at] + data[at:-2] * random.choice((2, 30, 3000)) + b"\xff\xd9"}
 
 
 def sqlite_rows(random: Random, files: Files) -> Files:
