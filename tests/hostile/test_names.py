@@ -1,53 +1,59 @@
 """Names in files: none leads out of its folder, none is a program for a terminal, and each is of its type."""
 
 import io
-import shutil
 import sys
 from pathlib import Path
 
 import made_values
 import pytest
-from conftest import DATA, needs_data
+import yaml
+from rich.table import Table
 
 from omninav.pipeline import BadInput
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.cli.terminal import show
 from omninav.pipeline.engine.artifact import artifact_bytes, read_artifact, read_header
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_text import cleaned, plain
 from omninav.stages.recordings.opening import open_recording
 
-NEW = DATA / "hostile" / "new"
 ESCAPE = "\x1b]0;owned\x07\x1b[2J\x9b1m\r"
 
 
-@pytest.mark.parametrize(
-    "name", ["../../above", "/tmp/omninav_absolute", "a" * 300, "a\\0b", "a b", "", "a.b", "ä", "\\e[2J"]
-)
-def test_an_experiments_name_is_a_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+EXPERIMENT = {
+    "name": "mine",
+    "title": "T",
+    "about": "A",
+    "variant": "omniview_mcl",
+    "set": "start=truth",
+    "sweep": {"match": {"a": "match=selective", "b": "match=l2"}},
+    "measures": {"error": {"title": "E", "path": ["position_error_m.median"], "digits": 2}},
+    "page": {"rows": [], "columns": "match"},
+}
+
+
+@pytest.mark.parametrize("name", ["/tmp/absolute", "a" * 300, "a\0b", "a b", "", "a.b", "ä", "\x1b[2J"])
+def test_an_experiments_name_is_a_name(name: str):
+    assert read_experiment(EXPERIMENT, "full").name == "mine"
+    with pytest.raises(ProblemsFound) as refused:
+        read_experiment({**EXPERIMENT, "name": name}, "full")
+    assert [problem.where for problem in refused.value.problems] == ["experiment.name"]
+
+
+@pytest.mark.parametrize("command", [[], ["check"]])
+def test_an_experiment_whose_name_leads_out_of_its_folder_is_refused_by_each_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: list[str]
 ):
     monkeypatch.chdir(tmp_path)
     Path("my/experiment").mkdir(parents=True)
-    Path("my/experiment/mine.yaml").write_text(
-        f'# @package experiment\ndefaults: [test_worlds, _self_]\nname: "{name}"\ntitle: T\nabout: A\n'
-        "variant: omniview_mcl\nset: start=truth\nsweep: {match: {a: match=selective, b: match=l2}}\n"
-        "measures: {error: {title: E, path: [position_error_m.median], digits: 2}}\nclaims: {}\n"
-        "page: {rows: [], columns: match}\n"
-    )
-    for command in ([], ["check"]):
-        assert main([*command, "--config-dir=my", "+experiment=mine"]) == 2
-        said = capsys.readouterr().err
-        assert "experiment.name" in said
-        assert "Traceback" not in said
-    assert not Path("/tmp/omninav_absolute").exists()
-
-
-@needs_data
-@pytest.mark.parametrize("name", ["nul", "above", "absolute", "long"])
-def test_an_experiment_among_the_examples_is_refused(name: str, capsys: pytest.CaptureFixture[str]):
-    assert main(["check", f"--config-dir={NEW / 'experiment_name'}", f"+experiment={name}"]) == 2
-    assert "experiment.name: " in capsys.readouterr().err
+    described = {"defaults": ["test_worlds", "_self_"], **EXPERIMENT, "name": "../../above"}
+    Path("my/experiment/mine.yaml").write_text("# @package experiment\n" + yaml.safe_dump(described, sort_keys=False))
+    assert main([*command, "--config-dir=my", "+experiment=mine"]) == 2
+    said = capsys.readouterr().err
+    assert "experiment.name" in said
+    assert "Traceback" not in said
 
 
 LAYOUT = "frames: {csv: images.csv, file: filename, images: '%s', time: {column: t, unit: s}}\n"
@@ -74,15 +80,6 @@ def test_a_folder_that_describes_itself_describes_no_other(tmp_path: Path):
         open_recording(str(tmp_path))
 
 
-@needs_data
-def test_the_example_of_names_above_is_refused(tmp_path: Path):
-    folder = tmp_path / "table_names_above"
-    shutil.copytree(NEW / "table_names_above", folder)
-    shutil.copy(NEW / "above.jpg", tmp_path)
-    with pytest.raises(BadInput, match="is not within the recording's folder"):
-        open_recording(f"{folder}/layout.yaml:{folder}")
-
-
 @pytest.mark.parametrize(
     ("fact", "value"),
     [
@@ -107,17 +104,12 @@ def test_a_maps_facts_are_of_their_types(tmp_path: Path, fact: str, value: objec
             read(file)
 
 
-@needs_data
-def test_the_example_of_a_map_with_facts_of_wrong_types_is_refused_when_it_is_opened():
-    with pytest.raises(BadInput, match="its header's dropped is 5, expected counts by kind"):
-        read_artifact(NEW / "map_facts_of_wrong_types.omap")
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
 
 
 def test_no_control_character_of_a_file_reaches_a_terminal():
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
     terminal = Terminal()
     with cleaned(terminal):
         print(f"warning: {ESCAPE}", file=terminal)
@@ -132,22 +124,14 @@ def test_no_control_character_of_a_file_reaches_a_terminal():
 
 
 def test_of_a_table_no_control_character_reaches_a_terminal(monkeypatch: pytest.MonkeyPatch):
-    from rich.table import Table
-
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     table = Table("a")
     table.add_row(f"[bold]{ESCAPE}x[/bold]")
     with cleaned(terminal):
         show(table)
-    assert "\x1b]" not in terminal.getvalue()
-    assert "\x07" not in terminal.getvalue()
-    assert "\x1b[2J" not in terminal.getvalue()
     assert "owned" in terminal.getvalue()
+    assert not any(code in terminal.getvalue() for code in ("\x1b]", "\x07", "\x1b[2J"))
 
 
 def test_a_facts_escape_sequences_are_shown_by_a_command(
