@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.donut import Donut
@@ -18,6 +17,8 @@ from omninav.stages.camera.perspective import Perspective
 from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.recording import UnreadableRecording
+
+from .conftest import refused
 
 SIZE = {"width": 640, "height_px": 480}
 PINHOLE = {"focal_x": 497.0, "focal_y": 496.0, "centre_x": 319.5, "centre_y": 239.5, "skew": 0.1}
@@ -83,9 +84,8 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
 )
 def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) -> None:
     assert old in HOUSE
-    with pytest.raises(BadInput, match=said) as caught:
+    with refused(said):
         parse_camera(HOUSE.replace(old, new, 1), "camera.yaml")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -111,10 +111,8 @@ def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) 
     ],
 )
 def test_a_hostile_file_is_refused_in_one_short_line(text: str | bytes) -> None:
-    with pytest.raises(BadInput, match=r"^camera\.yaml(, line \d+(, column \d+)?)?: ") as caught:
+    with refused(r"^camera\.yaml(, line \d+(, column \d+)?)?: .{,270}$"):
         parse_camera(text, "camera.yaml")
-    assert len(str(caught.value).splitlines()) == 1
-    assert len(str(caught.value)) < 300
 
 
 def test_remarks_in_a_camera_file_do_no_harm() -> None:

@@ -10,9 +10,11 @@ import cv2
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
+from made_logs import picture
+from turned_views import columns_moved
 
 from omninav.pipeline import Context
-from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
@@ -20,6 +22,8 @@ from omninav.stages.recordings.tables import NO_TIME, Angle, Length, Time, read_
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.encoded_image import decode_image, orientation_of
+
+from .conftest import refused
 
 DESCRIPTION = """
 frames:
@@ -48,9 +52,8 @@ def folder(tmp_path: Path, description: str = DESCRIPTION, skip: tuple[int, ...]
     rows = ["File , Clock"]
     for number in range(6):
         rows.append(f"/home/robot/p{number}.png, {number * 100}")
-        pixels = np.random.default_rng(number).integers(0, 256, (4, 16, 3), dtype=np.uint8)
         if number not in skip:
-            cv2.imwrite(str(tmp_path / "pictures" / f"p{number}.png"), pixels)
+            cv2.imwrite(str(tmp_path / "pictures" / f"p{number}.png"), picture(number)[:4, :16])
     (tmp_path / "frames.csv").write_text("\n".join(rows))
     track = [f"{10.05 + n * 0.1:.2f};{n};2.54 m;{20 * n} deg" for n in range(5)]
     (tmp_path / "track.csv").write_text("\n".join(track))
@@ -71,18 +74,20 @@ def test_columns_units_clock_and_heading_conventions_are_configuration(tmp_path:
     assert recording.image(0).shape == (4, 16, 3)
 
 
-def test_a_quote_that_is_not_closed_is_refused_with_its_line(tmp_path: Path) -> None:
-    path = folder(tmp_path)
-    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("p2.png, 200", 'p2.png, 200, "'))
-    with pytest.raises(UnreadableRecording, match=r"frames\.csv, line 4: a quote is opened and not closed"):
-        open_recording(str(path))
-
-
-def test_a_delimiter_that_is_not_stated_is_suggested(tmp_path: Path) -> None:
-    path = folder(tmp_path)
-    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace(" , ", ";").replace(", ", ";"))
-    with pytest.raises(UnreadableRecording, match=r"no column 'File'; write delimiter: \";\" beside csv:"):
-        open_recording(str(path))
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("p2.png, 200", 'p2.png, 200, "', r"frames\.csv, line 4: a quote is opened and not closed"),
+        (" , ", ";", r"no column 'File'; write delimiter: \";\" beside csv:"),
+    ],
+)
+def test_a_table_that_is_read_otherwise_than_it_was_meant_is_refused(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    table = folder(tmp_path) / "frames.csv"
+    table.write_text(table.read_text().replace(old, new))
+    with refused(said):
+        open_recording(str(tmp_path))
 
 
 def test_why_no_row_has_a_position_is_counted(tmp_path: Path) -> None:
@@ -154,18 +159,6 @@ def test_a_layout_from_a_users_folder_may_change_another(tmp_path: Path) -> None
         ("camera: {", "camera: {sense: left, ", "'sense': 'left'"),
         ("time: {column: Clock", "time: {column: File", "no_time"),
         ("unit: in", "unit: s", r"positions\.x\.unit: 's'"),
-    ],
-)
-def test_a_wrong_description_is_one_line_that_names_the_place(tmp_path: Path, old: str, new: str, said: str) -> None:
-    assert old in DESCRIPTION
-    with pytest.raises(UnreadableRecording, match=said) as caught:
-        open_recording(str(folder(tmp_path, DESCRIPTION.replace(old, new, 1))))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
         ('"^.*/"', "'['", r"frames\.rename\[0\]: '\[' or its replacement '' is not understood"),
         ('by: ""', "by: '\\9'", "invalid group reference"),
         ('"^.*/"', "'(a+)+$'", "repeats a group; repeat characters"),
@@ -183,56 +176,44 @@ def test_a_wrong_description_is_one_line_that_names_the_place(tmp_path: Path, ol
         ("images: pictures", "images: " + "x" * 300, r"6 missing_image; .*frames\.csv, line 2: no file"),
     ],
 )
-def test_a_hostile_description_is_one_line_that_names_the_place(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_wrong_or_hostile_description_is_one_line_that_names_the_place(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
     assert old in DESCRIPTION
-    with pytest.raises(BadInput, match=said) as caught:
+    with refused(said):
         open_recording(str(folder(tmp_path, DESCRIPTION.replace(old, new, 1))))
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 1000
 
 
 @pytest.mark.parametrize(
     ("table", "line", "said"),
     [
-        (
-            "track.csv",
-            "10.15;1e999999999;1;1",
-            r"track\.csv, line 2: column '1': '1e999999999' is out of all proportion",
-        ),
+        ("track.csv", "1;1e999999999;1;1", r"track\.csv, line 2: column '1': '1e999999999' is out of all proportion"),
         ("track.csv", "9e30;1;1;1", r"track\.csv, line 2: column '0': '9e30' is out of all proportion"),
         ("track.csv", "1;" + "9" * 70 + ";1;1", r"track\.csv, line 2: column '1': .* is out of all proportion"),
         ("track.csv", '1;"' + "x" * 200_000 + '";1;1', r"track\.csv, line 2: a row of more than 100,000"),
-        (
-            "frames.csv",
-            "x" * 300 + ", 100",
-            r"frames\.csv, line 2: 'xxx.*… has 300 characters, which no",
-        ),
+        ("frames.csv", "x" * 300 + ", 100", r"frames\.csv, line 2: 'xxx.*… has 300 characters, which no"),
     ],
 )
 def test_a_hostile_row_is_one_line_that_names_it(tmp_path: Path, table: str, line: str, said: str) -> None:
     path = folder(tmp_path)
     lines = (path / table).read_text().splitlines()
     (path / table).write_text("\n".join([lines[0], line, *lines[2:]]))
-    with pytest.raises(BadInput, match=said) as caught:
+    with refused(said):
         open_recording(str(path))
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 1000
 
 
 def test_a_row_whose_file_no_folder_can_hold_is_a_missing_image(tmp_path: Path) -> None:
     path = folder(tmp_path, DESCRIPTION.replace('rename: [{replace: "^.*/", by: "", regex: true}]', ""))
-    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("/home/robot/p3", "x" * 300))
-    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("/home/robot/", ""))
+    table = path / "frames.csv"
+    table.write_text(table.read_text().replace("/home/robot/p3", "x" * 300).replace("/home/robot/", ""))
     recording = open_recording(str(path))
     assert recording.dropped["missing_image"] == 1
     assert "frames.csv, line 5: no file" in recording.details["missing_image"]
 
 
 def test_a_wrong_layout_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableRecording, match="did you mean 'antworld'"):
+    with refused("did you mean 'antworld'"):
         open_recording(f"antwrld:{tmp_path}")
-    with pytest.raises(UnreadableRecording, match="type log=LAYOUT"):
-        open_recording(str(tmp_path))
 
 
 def test_a_number_read_with_its_column_is_the_one_that_is_read_alone(tmp_path: Path) -> None:
@@ -268,11 +249,9 @@ def test_the_tangent_of_a_circle_is_at_right_angles_to_its_radius() -> None:
     positions = np.column_stack([np.cos(angle), np.sin(angle)]) + noise
     directions = track_directions(angle, positions, window=0.1)
     inside = slice(40, -40)  # at the ends the fit is one-sided and turns too little
-    error = directions[inside] - (angle[inside] + math.pi / 2)
-    assert np.degrees(np.abs(np.angle(np.exp(1j * error)))).max() < 6
+    assert np.degrees(np.abs(wrap(directions - angle - math.pi / 2)[inside])).max() < 6
     late = track_directions(angle, positions, window=0.1, lag=0.2)
-    lagging = np.angle(np.exp(1j * (directions - late)))[100:-100]
-    assert np.mean(lagging) == pytest.approx(0.2, abs=0.01)
+    assert np.mean(wrap(directions - late)[100:-100]) == pytest.approx(0.2, abs=0.01)
 
 
 def test_a_track_that_stands_still_keeps_its_direction() -> None:
@@ -306,37 +285,27 @@ def test_the_sample_folders_are_read_by_configuration_alone(log: str, frames: in
 def test_antworld_headings_point_along_the_walk() -> None:
     truth = open_recording(f"antworld:{DATA}/antworld-rendered/ant1_route1").truth
     way = truth[4:, :2] - truth[:-4, :2]
-    error = truth[2:-2, 2] - np.arctan2(way[:, 1], way[:, 0])
-    assert np.degrees(np.percentile(np.abs(np.angle(np.exp(1j * error))), 90)) < 2
+    error = wrap(truth[2:-2, 2] - np.arctan2(way[:, 1], way[:, 0]))
+    assert np.degrees(np.percentile(np.abs(error), 90)) < 2
 
 
 @needs_data
 def test_sussex_images_turn_with_the_tangent_of_the_track() -> None:
     recording = open_recording(f"sussex_training:{DATA}/sussex-outdoor-route")
-    spectra = np.fft.fft(
-        [
-            cv2.resize(cv2.cvtColor(recording.image(n), cv2.COLOR_BGR2GRAY).astype(float), (1200, 25))
-            for n in range(455)
-        ],
-        axis=2,
-    )
-    spectra[..., 0] = 0
-    match = np.fft.ifft(spectra[3:] * np.conj(spectra[:-3]), axis=2).real.sum(axis=1)
-    moved_right = (np.argmax(match, axis=1) + 600) % 1200 - 600
-    turn = np.angle(np.exp(1j * (recording.truth[3:, 2] - recording.truth[:-3, 2])))
+    grey = [cv2.cvtColor(recording.image(n), cv2.COLOR_BGR2GRAY) for n in range(0, 455, 3)]
+    moved_right = columns_moved(np.array([cv2.resize(each, (600, 25)) for each in grey]))
+    turn = wrap(np.diff(recording.truth[::3, 2]))
     assert np.corrcoef(turn, moved_right)[0, 1] < -0.6  # counter-clockwise columns: a turn to the left moves them left
 
 
 def test_a_folder_of_images_alone_is_taken_in_the_order_of_its_numbers(tmp_path: Path) -> None:
     for number in (10, 9, 1):
-        pixels = np.random.default_rng(number).integers(0, 256, (8, 16, 3), dtype=np.uint8)
-        cv2.imwrite(str(tmp_path / f"img{number}.png"), pixels)
+        cv2.imwrite(str(tmp_path / f"img{number}.png"), picture(number)[:, :32])
     (tmp_path / "thumbnail.JPG").write_bytes(b"")
     (tmp_path / "notes.txt").write_text("of a walk")
     recording = open_recording(str(tmp_path), rate=4.0)
     assert recording.stamps.tolist() == [0, 250_000_000, 500_000_000]
-    first = np.random.default_rng(1).integers(0, 256, (8, 16, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(recording.image(0), first)
+    np.testing.assert_array_equal(recording.image(0), picture(1)[:, :32])
     assert recording.odometry is recording.truth is None
     assert recording.camera.projection == "equirectangular"
     slow = open_recording(str(tmp_path))
@@ -354,7 +323,7 @@ def as_held(picture: np.ndarray, orientation: int) -> bytes:
 
 @pytest.mark.parametrize("orientation", range(1, 9))
 def test_an_image_is_turned_as_its_exif_says(orientation: int) -> None:
-    data = as_held(np.random.default_rng(0).integers(0, 256, (16, 40, 3), dtype=np.uint8), orientation)
+    data = as_held(picture(0), orientation)
     peer = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)  # OpenCV's own turning
     np.testing.assert_array_equal(decode_image(data, upright=True), peer)
     assert orientation_of(data) == orientation

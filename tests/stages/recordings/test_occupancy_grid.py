@@ -8,7 +8,6 @@ from conftest import DATA, needs_data
 from world_files import DEMO
 
 from omninav.pipeline import Context
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
@@ -17,6 +16,8 @@ from omninav.stages.source.occupancy_grid_loader import OccupancyGridLoader, alo
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
+
+from .conftest import refused
 
 YAML = "image: map.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 CTX = Context("grid")
@@ -80,7 +81,7 @@ def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("mode: pretty\n", "mode: 'pretty' .* 'trinary' | 'scale' | 'raw'"),
+        ("mode: pretty\n", r"mode: 'pretty' .* 'trinary' \| 'scale' \| 'raw'"),
         ("negate: 7\n", "negate: 7 .* expected bool"),
         ("image: [\n", "no YAML"),
         ("image: other.pgm\n", "line 6: the key 'image' stands there twice"),
@@ -88,10 +89,8 @@ def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where
 )
 def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, text, said):
     file = written(tmp_path, [[0]], YAML + text)
-    with pytest.raises(BadInput, match=said) as raised:
+    with refused(f"{file}.*{said}"):
         read_occupancy(file)
-    assert str(file) in str(raised.value)
-    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -113,14 +112,12 @@ def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, tex
 def test_values_without_bounds_are_refused_by_name(tmp_path, key, value, said):
     text = "".join(f"{key}: {value}\n" if line.startswith(f"{key}:") else f"{line}\n" for line in YAML.splitlines())
     file = written(tmp_path, [[254]], text)
-    with pytest.raises(BadInput, match=said) as raised:
+    with refused(said):
         OccupancyGridLoader(grid=str(file), log="drive.mcap").inputs_digest()
-    assert "\n" not in str(raised.value)
-    assert len(str(raised.value)) < 900
 
 
 def test_a_grid_that_leaves_no_room_is_refused_before_anything_runs(tmp_path):
-    with pytest.raises(BadInput, match=r"no cell is free and 0\.2 m from obstacles"):
+    with refused(r"no cell is free and 0\.2 m from obstacles"):
         OccupancyGridLoader(grid=str(written(tmp_path, [[0, 0]]))).inputs_digest()
 
 
@@ -175,7 +172,7 @@ def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path
     assert out.grid.made_from == "world"
     np.testing.assert_array_equal(out.grid.cells, read.cells)
     assert OccupancyGridLoader().inputs_digest() is None
-    with pytest.raises(BadInput, match=r"grid: none is named; give grid=FOLDER/map.yaml"):
+    with refused(r"grid: none is named; give grid=FOLDER/map.yaml"):
         OccupancyGridLoader().step(CTX)
 
 
@@ -185,17 +182,16 @@ def test_a_world_gives_no_grid_of_a_log_or_beside_one_that_is_named():
 
 
 def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
-    with pytest.raises(BadInput, match=r"grid=FOLDER/map.yaml .* grid=from_tour") as raised:
+    with refused(r"grid=FOLDER/map.yaml .* grid=from_tour"):
         OccupancyGridLoader(log=str(tmp_path / "drive.mcap")).inputs_digest()
-    assert "\n" not in str(raised.value)
     written(tmp_path / "tour.grid", [[0]])
     (tmp_path / "tour.mcap").touch()
-    with pytest.raises(BadInput, match=f"grid={tmp_path}/tour.grid/map.yaml"):
+    with refused(f"grid={tmp_path}/tour.grid/map.yaml"):
         OccupancyGridLoader(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
 
 
 def test_a_grid_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(BadInput, match=r"none.yaml is no file"):
+    with refused(r"none.yaml is no file"):
         OccupancyGridLoader(grid=str(tmp_path / "none.yaml")).inputs_digest()
 
 
@@ -221,7 +217,7 @@ def test_a_stand_in_without_edges_is_free_around_the_references_alone():
 
 
 def test_a_stand_in_without_a_map_is_refused():
-    with pytest.raises(BadInput, match="from_tour needs a map"):
+    with refused("from_tour needs a map"):
         OccupancyGridLoader(grid="from_tour").step(CTX)
 
 

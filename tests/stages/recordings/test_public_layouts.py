@@ -13,11 +13,13 @@ import pytest
 from made_rings import ring_picture
 from scipy.spatial.transform import Rotation
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.recordings.description import known_layouts, read_description
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording
 from omninav.stages.recordings.tables import read_table
+
+from .conftest import refused
 
 HEADINGS = np.radians([-170.0, -91.3, 0.0, 12.7, 88.8, 179.9])
 """True headings of the frames, counter-clockwise from x."""
@@ -39,8 +41,7 @@ def turns(mount: npt.ArrayLike, tilt_deg: float = 4.0) -> npt.NDArray[np.float64
 def assert_poses(recording: Recording) -> None:
     assert recording.truth is not None
     np.testing.assert_allclose(recording.truth[:, :2], np.column_stack([X, Y]), atol=1e-3)
-    error = np.angle(np.exp(1j * (recording.truth[:, 2] - HEADINGS)))
-    assert np.degrees(abs(error)).max() < 0.1
+    assert np.degrees(abs(wrap(recording.truth[:, 2] - HEADINGS))).max() < 0.1
 
 
 def write_images(paths: list[Path], size: tuple[int, int] = (64, 32)) -> None:
@@ -172,16 +173,15 @@ def test_a_malformed_row_is_named(tmp_path: Path, data_set, file: str, old: str,
     (path,) = (tmp_path / "data").glob(file)
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(BadInput, match=said) as caught:
+    with refused(said):
         open_recording(log)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("stray", [b"thumbnail.jpeg", b"t_x_y_a.jpeg", b"t1_x\xff_y2_a3.jpeg"])
 def test_a_name_of_another_form_is_refused(tmp_path: Path, stray: bytes) -> None:
     log = cold(tmp_path)
     (tmp_path / "omni_cam" / os.fsdecode(stray)).write_bytes(b"x")
-    with pytest.raises(BadInput, match=r"the image's name '\w.*\.jpeg' is not of the form 't\{time\}_x\{x\}"):
+    with refused(r"the image's name '\w.*\.jpeg' is not of the form 't\{time\}_x\{x\}"):
         open_recording(log)
 
 
@@ -231,10 +231,8 @@ def test_names_in_a_json_come_in_the_order_of_their_numbers_and_without_a_header
 )
 def test_a_hostile_json_is_one_short_line(tmp_path: Path, content: str, said: str) -> None:
     (tmp_path / "poses.json").write_text(content)
-    with pytest.raises(BadInput, match=said) as caught:
+    with refused(said):
         read_table(tmp_path / "poses.json")
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 500
 
 
 def test_a_row_without_a_rotation_has_no_heading(tmp_path: Path) -> None:
@@ -297,7 +295,7 @@ def test_what_a_description_cannot_mean_is_refused(tmp_path: Path, old: str, new
     pairs(tmp_path, "1,00000000001")
     assert old in PAIRS
     (tmp_path / "recording.yaml").write_text(PAIRS.replace(old, new))
-    with pytest.raises(BadInput, match=said):
+    with refused(said):
         open_recording(str(tmp_path))
 
 
@@ -316,7 +314,7 @@ def test_a_layout_that_does_not_fit_says_which_key(tmp_path: Path, changed: str,
     folder = tmp_path / "data"
     tum(folder)
     (tmp_path / "mine.yaml").write_text(f"like: tum\n{changed}\n")
-    with pytest.raises(BadInput, match=said):
+    with refused(said):
         open_recording(f"{tmp_path / 'mine.yaml'}:{folder}")
 
 

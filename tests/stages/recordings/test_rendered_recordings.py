@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from conftest import DRIVE, GRID, RECORDINGS, TOUR
+from turned_views import columns_moved
 
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.geometry.plane.se2 import wrap
@@ -43,11 +44,8 @@ def test_the_folder_of_panoramas_is_the_drive_with_another_camera():
 
 def test_panoramas_turn_against_the_robot():
     recording = open_recording(str(RECORDINGS / "images"))
-    grey = [cv2.cvtColor(recording.image(n), cv2.COLOR_BGR2GRAY).astype(float) for n in range(len(recording.stamps))]
-    spectra = np.fft.fft(grey, axis=2)
-    spectra[..., 0] = 0.0
-    match = np.fft.ifft(spectra[1:] * np.conj(spectra[:-1]), axis=2).real.sum(axis=1)
-    moved = (np.argmax(match, axis=1) + 120) % 240 - 120  # columns clockwise: a turn to the left moves them right
+    grey = [cv2.cvtColor(recording.image(n), cv2.COLOR_BGR2GRAY) for n in range(len(recording.stamps))]
+    moved = columns_moved(np.array(grey))  # columns clockwise: a turn to the left moves them right
     turned = np.degrees(wrap(np.diff(recording.truth[:, 2])))
     assert np.abs(turned).max() > 20.0
     assert np.median(np.abs(moved * 1.5 - turned)) < 1.5  # one column

@@ -11,10 +11,12 @@ from made_logs import FRAMES, START, TRUTH, Made, messages, pose_at, pose_fields
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.truth_file import read_trajectory
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
+
+from .conftest import refused
 
 SECONDS = tuple(0.1 * number for number in range(101))
 
@@ -43,9 +45,9 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
     rows = [header]
     for at in SECONDS:
         x, y, h = pose_at(at)
-        rows.append(row.format(
-            t=at, ns=round(at * 1e9), ms=at * 1e3, x=x, y=y, h=h, x_mm=x * 1e3, y_mm=y * 1e3, deg=math.degrees(h),
-            qw=math.cos(h / 2), qz=math.sin(h / 2)))  # fmt: skip
+        in_si = {"t": at, "x": x, "y": y, "h": h, "qw": math.cos(h / 2), "qz": math.sin(h / 2)}
+        others = {"ns": round(at * 1e9), "ms": at * 1e3, "x_mm": x * 1e3, "y_mm": y * 1e3, "deg": math.degrees(h)}
+        rows.append(row.format(**in_si, **others))
     (tmp_path / "truth.csv").write_text("\n".join(rows))
     stamps, poses, *_ = read_trajectory(tmp_path / "truth.csv")
     np.testing.assert_allclose(stamps, np.array(SECONDS) * 1e9, atol=1)
@@ -57,15 +59,19 @@ def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Pat
     assert read_trajectory(tmp_path / "truth.csv")[1][:, 2] == pytest.approx(np.full(9, math.pi / 4))
 
 
-def test_what_is_no_trajectory_says_what_is_missing(tmp_path: Path) -> None:
-    for content, what in (
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
         ("name,x,z\na,1,2\n", "no column for time and y among 'name, x, z'; a trajectory is a CSV with time, x, y"),
         ("1 2 3 0 0 0 0 1\n2 3\n", "line 2: 2 numbers, expected time x y z qx qy qz qw"),
         ("t,x,y\n1,2,3\n", "fewer than two rows"),
-    ):
-        (tmp_path / "truth.csv").write_text(content)
-        with pytest.raises(UnreadableRecording, match=what):
-            read_trajectory(tmp_path / "truth.csv")
+        ("1 1 0 0 0 0 0 0\n" * 9, "9 orientations whose quaternion is shorter than"),
+    ],
+)
+def test_what_is_no_trajectory_says_what_is_missing(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "truth.csv").write_text(content)
+    with refused(said):
+        read_trajectory(tmp_path / "truth.csv")
 
 
 def outs(source: LogSource, ctx: Context) -> list:
@@ -88,8 +94,8 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
     assert len(found) == FRAMES
     known = [out for out in found if out.truth is not None]
     for out in known:
-        x, y, heading = pose_at((out.tick.stamp - START) / 1e9)
-        assert (out.truth.x, out.truth.y, out.truth.heading) == pytest.approx((x, y, heading), abs=2e-2)
+        expected = pose_at((out.tick.stamp - START) / 1e9)
+        assert (out.truth.x, out.truth.y, out.truth.heading) == pytest.approx(expected, abs=2e-2)
     assert 0 < ctx.counts["no_truth"] == FRAMES - len(known)
     assert ctx.facts["odometry"] == "measured"
     assert source.inputs_digest() != LogSource(log=log).inputs_digest()
@@ -97,7 +103,7 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
 
 def test_clocks_that_do_not_meet_are_said_with_both_spans(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
-    with pytest.raises(UnreadableRecording, match=r"times are 0.000 to 10.000 s, the images' 17.*truth_clock_offset_s"):
+    with refused(r"times are 0.000 to 10.000 s, the images' 17.*truth_clock_offset_s"):
         outs(LogSource(log=log, truth=str(tum(tmp_path / "truth.tum", 0.0))), Context("source"))
 
 
@@ -134,20 +140,15 @@ def transform_of(stamp: int, transform: dict, child: str) -> object:
 )
 def test_truth_comes_from_any_message_that_holds_a_pose(tmp_path: Path, kind: str, fields: str, truth: str) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", replaced(kind, fields)))
-    recording, plain = (
-        open_recording(path, Topics(truth=truth)),
-        open_recording(str(write_mcap(tmp_path / "plain.mcap"))),
-    )
-    np.testing.assert_allclose(recording.truth, plain.truth, atol=1e-9)
+    plain = open_recording(str(write_mcap(tmp_path / "plain.mcap")))
+    np.testing.assert_allclose(open_recording(path, Topics(truth=truth)).truth, plain.truth, atol=1e-9)
 
 
 def test_a_transform_that_is_not_there_is_said_with_those_that_are(tmp_path: Path) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", replaced("tf2_msgs/msg/TFMessage", "tf")))
-    with pytest.raises(
-        UnreadableRecording, match=r"no transform /truth:world:base; type .*: /truth:map:base, /truth:map:arm"
-    ):
+    with refused(r"no transform /truth:world:base; type .*: /truth:map:base, /truth:map:arm"):
         open_recording(path, Topics(truth="/truth:world:base"))
-    with pytest.raises(UnreadableRecording, match="/odom carries nav_msgs/msg/Odometry, not transforms"):
+    with refused("/odom carries nav_msgs/msg/Odometry, not transforms"):
         open_recording(path, Topics(truth="/odom:map:base"))
 
 
@@ -159,9 +160,6 @@ def test_orientations_that_are_no_rotation_are_counted_and_left_out(tmp_path: Pa
     ctx = Context("source")
     outs(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(file)), ctx)
     assert ctx.counts["impossible_pose"] == 3
-    file.write_text("\n".join(f"{n} {n} 0 0 0 0 0 0" for n in range(9)))
-    with pytest.raises(UnreadableRecording, match="9 orientations whose quaternion is shorter than"):
-        read_trajectory(file)
 
 
 @pytest.mark.parametrize(
