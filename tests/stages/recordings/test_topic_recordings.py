@@ -5,6 +5,7 @@ import random
 import shutil
 import sqlite3
 from contextlib import closing
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -28,15 +29,16 @@ from made_logs import (
     write_rosbag2,
 )
 
-from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings import rosbag
 from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.stamps import ascending
 from omninav.stages.values.encoded_image import decode_image
+
+from .conftest import refused
 
 
 def only(topic: str):
@@ -113,43 +115,46 @@ def test_a_bad_chunk_costs_its_images_and_no_others(tmp_path: Path) -> None:
         np.testing.assert_array_equal(recording.image(frame), picture(round((stamp - START) / 5e8 - 0.534)))
 
 
-def test_a_pose_that_is_no_number_is_counted(tmp_path: Path) -> None:
-    @only(ODOMETRY)
-    def broken(made: Made, number: int) -> list[Made]:
-        fields = {"pose": {"pose": {"position": {"x": float("nan")}}}}
-        nowhere = make_message("nav_msgs/msg/Odometry", fields, made.stamp)
-        return [made._replace(content=nowhere) if number == 7 else made]
-
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(broken))))
-    assert recording.dropped == {"bad_message": 1}
-    assert len(recording.stamps) == FRAMES
+def later(made: Made, seconds: float) -> Made:
+    """An image of the same picture with another stamp."""
+    stamp = made.stamp + round(seconds * 1e9)
+    return made._replace(stamp=stamp, content=compressed(stamp, made.content.data.tobytes()))
 
 
-def test_an_image_with_a_stamp_far_ahead_costs_only_itself(tmp_path: Path) -> None:
-    @only(IMAGE)
-    def late(made: Made, number: int) -> list[Made]:
-        if number != 4:
-            return [made]
-        stamp = made.stamp + 3_600_000_000_000
-        return [made._replace(stamp=stamp, content=compressed(stamp, encoded(picture(number))))]
-
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(late))))
-    assert recording.dropped == {"backward_stamp": 1}
-    assert len(recording.stamps) == FRAMES - 1
+def no_number(made: Made, number: int) -> list[Made]:
+    nowhere = make_message("nav_msgs/msg/Odometry", {"pose": {"pose": {"position": {"x": float("nan")}}}}, made.stamp)
+    return [made._replace(content=nowhere) if number == 7 else made]
 
 
-def test_stamps_that_jump_back_and_frames_that_come_twice_are_counted(tmp_path: Path) -> None:
-    @only(IMAGE)
-    def odd(made: Made, number: int) -> list[Made]:
-        if number == 5:
-            return [made, made._replace(log_time=made.log_time + 1)]
-        if number == 9:
-            stamp = made.stamp - 1_200_000_000
-            return [made._replace(stamp=stamp, content=compressed(stamp, encoded(picture(number))))]
-        return [made]
+def far_ahead(made: Made, number: int) -> list[Made]:
+    return [later(made, 3600.0) if number == 4 else made]
 
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(odd))))
-    assert recording.dropped == {"duplicate_frame": 1, "backward_stamp": 1}
+
+def after_2262(made: Made, number: int) -> list[Made]:
+    return [made._replace(log_time=2**63 + 1) if number == 5 else made]
+
+
+def twice_and_back(made: Made, number: int) -> list[Made]:
+    if number == 5:
+        return [made, made._replace(log_time=made.log_time + 1)]
+    return [later(made, -1.2) if number == 9 else made]
+
+
+@pytest.mark.parametrize(
+    ("topic", "change", "dropped", "frames"),
+    [
+        (ODOMETRY, no_number, {"bad_message": 1}, FRAMES),
+        (IMAGE, far_ahead, {"backward_stamp": 1}, FRAMES - 1),
+        (IMAGE, after_2262, {"backward_stamp": 1}, FRAMES - 1),
+        (IMAGE, twice_and_back, {"duplicate_frame": 1, "backward_stamp": 1}, FRAMES - 1),
+    ],
+)
+def test_a_message_that_cannot_be_is_counted_and_costs_only_itself(
+    tmp_path: Path, topic: str, change, dropped: dict[str, int], frames: int
+) -> None:
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(only(topic)(change)))))
+    assert recording.dropped == dropped
+    assert len(recording.stamps) == frames
     assert np.all(np.diff(recording.stamps) > 0)
 
 
@@ -173,38 +178,27 @@ def test_undecodable_cut_off_and_blank_images_are_left_out_when_met(tmp_path: Pa
     assert recording.dropped == {"undecodable_image": 4, "blank_image": 1, "wrong_size": 1}
 
 
+FIRST, LAST = START + 2_000_000_000, START + 8_000_000_000
+
+
 def test_images_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
-    first, last = START + 2_000_000_000, START + 8_000_000_000
-    made = (m for m in messages() if m.topic != ODOMETRY or first <= m.stamp <= last)
+    made = (m for m in messages() if m.topic != ODOMETRY or FIRST <= m.stamp <= LAST)
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
-    assert recording.stamps[0] >= first
-    assert recording.stamps[-1] <= last
+    assert FIRST <= recording.stamps[0] < recording.stamps[-1] <= LAST
     assert recording.dropped == {"outside_odometry": FRAMES - len(recording.stamps)}
 
 
-def test_an_image_that_was_logged_after_the_year_2262_is_out_of_order(tmp_path: Path) -> None:
-    later = only(IMAGE)(lambda made, number: [made._replace(log_time=2**63 + 1) if number == 5 else made])
-    made = (changed for m in messages() for changed in later(m))
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
-    assert recording.dropped == {"backward_stamp": 1}
-
-
-def test_without_odometry_images_without_a_position_are_counted(tmp_path: Path) -> None:
-    last = START + 8_000_000_000
-    made = (m for m in messages() if m.topic != ODOMETRY and not (m.topic == TRUTH and m.stamp > last))
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
-    assert recording.odometry is None
-    assert recording.dropped == {"no_position": FRAMES - len(recording.stamps)}
-    assert np.isfinite(recording.truth).all()
-
-
-def test_truth_that_ends_early_leaves_images_without_truth(tmp_path: Path) -> None:
-    last = START + 8_000_000_000
-    made = (m for m in messages() if m.topic != TRUTH or m.stamp <= last)
-    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+def test_truth_that_ends_early_leaves_images_without_truth_and_without_odometry_out(tmp_path: Path) -> None:
+    made = [m for m in messages() if m.topic != TRUTH or m.stamp <= LAST]
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", iter(made))))
     assert len(recording.stamps) == FRAMES
     assert np.isnan(recording.truth[-1]).all()
     assert np.isfinite(recording.truth[0]).all()
+    alone = (m for m in made if m.topic != ODOMETRY)
+    recording = open_recording(str(write_mcap(tmp_path / "alone.mcap", alone)))
+    assert recording.odometry is None
+    assert recording.dropped == {"no_position": FRAMES - len(recording.stamps)}
+    assert np.isfinite(recording.truth).all()
 
 
 def renamed(made: Made) -> list[Made]:
@@ -214,37 +208,32 @@ def renamed(made: Made) -> list[Made]:
 
 def test_a_missing_topic_is_refused_with_what_to_type(tmp_path: Path) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", messages(renamed)))
-    with pytest.raises(UnreadableRecording, match=r"log\.mcap: no topic /camera/image.*type topics\.image=/omni/image"):
-        open_recording(path)
-    with pytest.raises(UnreadableRecording, match=r"no topic /odom; type topics\.odometry=/wheels/odom, or"):
-        open_recording(path, Topics(image="/omni/image"))
+    for topics, said in (
+        (Topics(), r"log\.mcap: no topic /camera/image.*type topics\.image=/omni/image"),
+        (Topics(image="/omni/image"), r"no topic /odom; type topics\.odometry=/wheels/odom, or"),
+        (Topics(image="/wheels/odom"), r"/wheels/odom carries nav_msgs/msg/Odometry, not images"),
+    ):
+        with refused(said):
+            open_recording(path, topics)
     recording = open_recording(path, Topics(image="/omni/image", odometry="/wheels/odom"))
     assert len(recording.stamps) == FRAMES
     assert open_recording(path, Topics(image="/omni/image", odometry=None)).odometry is None
-    with pytest.raises(UnreadableRecording, match=r"/wheels/odom carries nav_msgs/msg/Odometry, not images"):
-        open_recording(path, Topics(image="/wheels/odom"))
 
 
-def test_every_user_error_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "empty").mkdir()
+def test_every_user_error_is_one_line_that_names_the_log(tmp_path: Path) -> None:
     (tmp_path / "text.bag").write_text("no bag")
-    (tmp_path / "notes.txt").write_text("hello")
     nothing = write_mcap(tmp_path / "nothing.mcap", (m for m in messages() if m.topic != IMAGE))
     no_camera = write_mcap(tmp_path / "camera.mcap", camera=None)
     wrong_camera = write_mcap(tmp_path / "wrong.mcap", camera=CAMERA.replace(b"48", b"64"))
     for log, said in (
-        (tmp_path / "empty", "no recording is in this folder"),
         (tmp_path / "text.bag", "not a readable bag"),
-        (tmp_path / "notes.txt", "not a recording"),
         (tmp_path / "gone.mcap", "no such file"),
         (nothing, "no images"),
         (no_camera, "give camera="),
         (wrong_camera, "48 x 16, but its camera says 64 x 16"),
     ):
-        with pytest.raises(BadInput, match=said) as caught:
+        with refused(f"{log}.*{said}"):
             open_recording(str(log))
-        assert str(log) in str(caught.value)
-        assert "\n" not in str(caught.value)
 
 
 def test_a_camera_beside_the_log_or_named_by_the_user_is_taken(tmp_path: Path) -> None:
@@ -267,28 +256,24 @@ def test_the_digest_follows_the_content_and_not_the_name(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("encoding", ["bgr8", "rgb8", "bgra8", "mono8"])
 def test_raw_images_are_read_with_their_row_padding(encoding: str) -> None:
-    pixels, pad = picture(1), 5
-    if encoding == "mono8":
-        pixels = np.repeat(pixels[..., :1], 3, axis=2)
-    raw = {
-        "bgr8": pixels,
-        "rgb8": pixels[..., ::-1],
-        "bgra8": np.dstack([pixels, pixels[..., 0]]),
-        "mono8": pixels[..., :1],
-    }[encoding]
-    rows = np.hstack([raw.reshape(16, -1), np.zeros((16, pad), np.uint8)])
-    fields = {"height": 16, "width": 48, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
-    np.testing.assert_array_equal(pixels_of(make_message("sensor_msgs/msg/Image", fields)), pixels)
+    pixels = picture(1) if encoding != "mono8" else np.repeat(picture(1)[..., :1], 3, axis=2)
+    channels = {"bgr8": [0, 1, 2], "rgb8": [2, 1, 0], "bgra8": [0, 1, 2, 0], "mono8": [0]}[encoding]
+    rows = np.hstack([pixels[..., channels].reshape(16, -1), np.zeros((16, 5), np.uint8)])
+    np.testing.assert_array_equal(pixels_of(raw_image(encoding, rows)), pixels)
 
 
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
 def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
     colour = {"b": 200, "g": 100, "r": 20}
-    tile = np.array([[colour[c] for c in pattern[:2]], [colour[c] for c in pattern[2:]]], np.uint8)
-    raw = np.tile(tile, (8, 24))
-    fields = {"height": 16, "width": 48, "encoding": f"bayer_{pattern}8", "step": 48, "data": raw.tobytes()}
-    pixels = pixels_of(make_message("sensor_msgs/msg/Image", fields))
-    np.testing.assert_array_equal(pixels[4:12, 4:44].reshape(-1, 3), np.tile([200, 100, 20], (8 * 40, 1)))
+    tile = np.array([colour[letter] for letter in pattern], np.uint8).reshape(2, 2)
+    pixels = pixels_of(raw_image(f"bayer_{pattern}8", np.tile(tile, (8, 24))))
+    assert (pixels[4:12, 4:44] == (200, 100, 20)).all()
+
+
+def raw_image(encoding: str, rows: np.ndarray) -> object:
+    """A message of 48 x 16 pixels, whose rows may be longer."""
+    fields = {"height": 16, "width": 48, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
+    return make_message("sensor_msgs/msg/Image", fields)
 
 
 def test_an_image_is_blank_only_when_it_is_constant() -> None:
@@ -299,8 +284,6 @@ def test_an_image_is_blank_only_when_it_is_constant() -> None:
 
 
 def test_ascending_keeps_the_longest_run_by_brute_force() -> None:
-    from itertools import combinations
-
     chance = random.Random(5)
     for _ in range(60):
         stamps = [chance.randrange(9) for _ in range(8)]
@@ -369,7 +352,7 @@ def test_a_pipe_in_a_bags_folder_is_refused_without_being_read(tmp_path: Path, n
     write_rosbag2(tmp_path / "bag")
     (tmp_path / "bag" / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / "bag" / name)
-    with pytest.raises(UnreadableRecording, match="pipe"):
+    with refused("pipe"):
         open_recording(str(tmp_path / "bag"))
 
 
@@ -387,5 +370,5 @@ def test_a_compressed_rosbag2_folder_is_read_within_limits(
     np.testing.assert_array_equal(recording.image(1), reference.image(1))
     monkeypatch.setattr(rosbag, "MAX_BYTES", 100)
     monkeypatch.setattr(rosbag, "MAX_RATIO", 1)
-    with pytest.raises(UnreadableRecording, match=r"not a readable bag|image"):
+    with refused(r"not a readable bag|image"):
         open_recording(str(folder))
