@@ -32,13 +32,44 @@ from omninav.stages.values.track import Track
 from omninav.stages.values.visual_words import words_of
 
 SCALE = LengthScale(0.3)
-LINE = ReferenceGraph(
+
+
+def map_of(poses: np.ndarray, features: np.ndarray) -> ReferenceGraph:
+    return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+LINE = map_of(
     np.column_stack([np.arange(40.0), np.zeros((40, 2))]),
     np.random.default_rng(0).dirichlet(np.ones(20), (40, 8)).astype(np.float32),
-    "histograms",
-    np.zeros((0, 2), np.int64),
-    "truth",
 )
+HERE = np.zeros((5, 3))
+"""Poses of a belief that is sure of the first reference's place."""
+
+
+def alike(row: int = 0, others: float = 0.0, every: int = 1, columns: int = 36) -> Similarities:
+    """An image that is most like one reference, and somewhat like all others or every so-many-th."""
+    values = np.zeros((len(LINE), columns), np.float32)
+    values[::every, 0] = others
+    values[row, 0] = 0.9
+    return Similarities(values)
+
+
+def judged(
+    monitor: ConfidenceMonitor,
+    poses: np.ndarray,
+    seen: Similarities | None,
+    recent: ConfidenceMonitorState | None = None,
+    tick: Tick | None = None,
+    map: ReferenceGraph = LINE,
+    scale: LengthScale = SCALE,
+    **inputs: Any,
+) -> PoseConfidence:
+    """What the monitor says of a belief of poses of equal weight."""
+    belief, ctx = Particles(poses, np.full(len(poses), 1 / len(poses))), Context("monitor")
+    ctx.tick = tick or ctx.tick
+    recent = recent or ConfidenceMonitorState()
+    wrong = WrongPoseAgreement(0.02)
+    return monitor.step(ctx, recent, belief, belief.estimate(), map, scale, wrong, seen, **inputs).confidence
 
 
 def drive(matches: list[int | None], **more: Any) -> list[float]:
@@ -62,26 +93,19 @@ def stated(
     """Confidences and states along a line; the best match of each image is given (None: no image), `elsewhere` the
     similarity of all references or of every so-many-th, and the estimate follows odometry."""
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
-    told = []
+    found = []
     for n, match in enumerate(matches):
-        values = np.zeros((len(LINE), 36), np.float32)
-        values[::every, 0] = elsewhere
-        values[0 if match is None else match, 0] = 0.9
         poses = np.array([at + step * n, 0.0, 0.0]) + rng.normal(0.0, spread, (500, 3))
-        belief = Particles(poses, np.full(500, 1 / 500))
-        ctx = Context("monitor")
-        ctx.tick = Tick(n, n * 10**9, first_of_log=n == 0)
-        seen = None if match is None else Similarities(values)
-        likelihood = None if match is None else Likelihood(np.ones(500), novelty=novelty if n else 1.0)
-        motion = Motion(step, 0.0, 0.0) if n else None
-        wrong = WrongPoseAgreement(0.02)
-        fix = fixes[n] if n < len(fixes) else None
-        out = monitor.step(
-            ctx, recent, belief, belief.estimate(), map, SCALE, wrong, seen, likelihood, motion,
-            features=None if match is None else features, fix=fix, track=Track(True, n == carried_at),
-        )  # fmt: skip
-        told.append(out.confidence)
-    return told
+        inputs: dict[str, Any] = {
+            "motion": Motion(step, 0.0, 0.0) if n else None,
+            "track": Track(True, n == carried_at),
+        }
+        inputs["fix"] = fixes[n] if n < len(fixes) else None
+        if match is not None:
+            inputs |= {"likelihood": Likelihood(np.ones(500), novelty=novelty if n else 1.0), "features": features}
+        seen = None if match is None else alike(match, elsewhere, every)
+        found.append(judged(monitor, poses, seen, recent, Tick(n, n * 10**9, first_of_log=n == 0), map, **inputs))
+    return found
 
 
 def test_matches_along_the_estimated_path_make_it_sure_and_scattered_ones_do_not():
@@ -162,34 +186,24 @@ def test_chance_is_small_where_images_are_taken_everywhere_and_large_where_all_l
     apart = LearnWrongPoseAgreement().step(ctx, LINE, SCALE).when_wrong.share
     views = np.repeat(LINE.features[:1], 40, axis=0)
     views[::4] += np.float32(1e-4)  # these few look the most like all others
-    alike = ReferenceGraph(LINE.poses * (0.05, 1.0, 1.0), views, "histograms", LINE.edges, "truth")
+    alike = map_of(LINE.poses * (0.05, 1.0, 1.0), views)
     assert apart < 0.03
     assert LearnWrongPoseAgreement(within_m=0.2).step(ctx, alike, LengthScale(0.05)).when_wrong.share > 0.1
 
 
 def test_chance_in_a_map_of_one_image_is_the_least(monkeypatch: pytest.MonkeyPatch):
-    lone = ReferenceGraph(LINE.poses[:1], LINE.features[:1], "histograms", LINE.edges, "truth")
+    lone = map_of(LINE.poses[:1], LINE.features[:1])
     assert LearnWrongPoseAgreement().step(Context("chance"), lone, SCALE).when_wrong.share == 0.005
     monkeypatch.setattr("omninav.stages.monitor.wrong_pose_agreement.MIN_SHARE", 0.1)
     assert math.isclose(LearnWrongPoseAgreement().step(Context("chance"), lone, SCALE).when_wrong.share, 0.1)
 
 
 def test_images_are_forgotten_as_new_ones_come_and_hardly_while_the_robot_stands():
-    monitor, recent, belief = (
-        ConfidenceMonitor(),
-        ConfidenceMonitorState(),
-        Particles(np.zeros((5, 3)), np.full(5, 0.2)),
-    )
-    values = np.zeros((len(LINE), 36), np.float32)
-    values[0, 0] = 0.9
+    monitor, recent = ConfidenceMonitor(), ConfidenceMonitorState()
 
     def weight_of_first(images: int, novelty: float) -> float:
         for _ in range(images):
-            likelihood = Likelihood(np.ones(1), novelty=novelty)
-            monitor.step(
-                Context("monitor"), recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02),
-                Similarities(values), likelihood,
-            )  # fmt: skip
+            judged(monitor, HERE, alike(), recent, likelihood=Likelihood(np.ones(1), novelty=novelty))
         return float(recent.weights[0])
 
     assert weight_of_first(1, 1.0) == pytest.approx(1.0, abs=1e-3)
@@ -204,7 +218,7 @@ def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right()
     one = np.random.default_rng(3).dirichlet(np.ones(20), 8).astype(np.float32)
     other = 0.9 * one + np.float32(0.1) * np.random.default_rng(4).dirichlet(np.ones(20), 8).astype(np.float32)
     poses = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [10.0, 0.0, 0.0], [10.2, 0.0, 0.0]])
-    pairs = ReferenceGraph(poses, np.stack([one, one, other, other]), "histograms", LINE.edges, "truth")
+    pairs = map_of(poses, np.stack([one, one, other, other]))
     assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5
 
 
@@ -223,21 +237,14 @@ def test_a_pose_at_the_same_place_is_wrong_where_it_is_turned_away(heading: floa
     # agrees with both: exp(-(0.083 / 0.175)^4 / 2) = 0.974.
     look, unlike = np.random.default_rng(3).dirichlet(np.ones(20), (2, 8)).astype(np.float32)
     poses = np.array([[0.0, 0.0, heading], [0.0, 0.0, other], [10.0, 0.0, 0.0], [20.0, 0.0, 0.0]])
-    places = ReferenceGraph(poses, np.stack([look, look, look, unlike]), "histograms", LINE.edges, "truth")
+    places = map_of(poses, np.stack([look, look, look, unlike]))
     share = LearnWrongPoseAgreement().step(Context("chance"), places, LengthScale(0.3)).when_wrong.share
     assert share == pytest.approx(expected, abs=0.01)
 
 
 def test_inputs_that_mislead_lower_the_confidence():
     def sure(conflicts: Conflicts | None) -> float:
-        monitor, recent = ConfidenceMonitor(right_in_conflict=0.3), ConfidenceMonitorState()
-        values = np.zeros((len(LINE), 36), np.float32)
-        values[0, 0] = 0.9
-        belief = Particles(np.zeros((5, 3)), np.full(5, 0.2))
-        return monitor.step(
-            Context("monitor"), recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02),
-            Similarities(values), conflicts=conflicts,
-        ).confidence.probability  # fmt: skip
+        return judged(ConfidenceMonitor(right_in_conflict=0.3), HERE, alike(), conflicts=conflicts).probability
 
     alone = sure(None)
     assert alone > 0.5
@@ -252,7 +259,7 @@ def test_the_best_place_is_the_most_similar_references_turned_as_the_view_is(col
     poses = np.array([[0.0, 0.0, 0.5], [3.0, 4.0, -1.0], [8.0, 8.0, 2.0]])
     values = np.full((2, 36), 0.1, np.float32)
     values[1, column] = 0.9
-    map = ReferenceGraph(poses, LINE.features[:3], "histograms", LINE.edges, "truth")
+    map = map_of(poses, LINE.features[:3])
     place = best_place(Similarities(values, np.array([0, 2])), map)
     assert place[:2] == pytest.approx((8.0, 8.0))
     assert math.remainder(place[2] - 2.0 - math.radians(10 * column), math.tau) == pytest.approx(0.0, abs=1e-6)
@@ -286,14 +293,8 @@ def test_the_mass_within_a_tolerance_counts_position_and_heading_by_weight():
 @pytest.mark.parametrize(("metres", "scale"), [(0.5, 2.0), (2.0, 0.5)])
 def test_matches_agree_within_the_wider_of_tolerance_and_length_scale(metres: float, scale: float):
     def sure(within_m: float, length_scale_m: float) -> float:
-        monitor, recent = ConfidenceMonitor(within_m=within_m), ConfidenceMonitorState()
-        values = np.zeros((len(LINE), 1), np.float32)
-        values[1, 0] = 0.9  # 1 m beside the estimate
-        belief = Particles(np.zeros((5, 3)), np.full(5, 0.2))
-        return monitor.step(
-            Context("monitor"), recent, belief, belief.estimate(), LINE, LengthScale(length_scale_m),
-            WrongPoseAgreement(0.02), Similarities(values),
-        ).confidence.probability  # fmt: skip
+        beside = alike(1, columns=1)  # 1 m from the estimate
+        return judged(ConfidenceMonitor(within_m=within_m), HERE, beside, scale=LengthScale(length_scale_m)).probability
 
     assert sure(metres, scale) == pytest.approx(sure(2.0, 2.0))
     assert sure(0.5, 0.5) < sure(metres, scale) - 0.1

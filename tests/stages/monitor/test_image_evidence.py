@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from landmark_tour import graph_of
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.monitor.image_evidence import MeasureEvidence, MeasureEvidenceState
@@ -9,17 +10,10 @@ from omninav.stages.values.evidence import MatchLeads
 from omninav.stages.values.image import Strip
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
-from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 
 POSE = Pose(10.0, 2.0, 0.0)
-MAP = ReferenceGraph(
-    np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]),
-    np.zeros((41, 8, 20), np.float32),
-    "histograms",
-    np.zeros((0, 2), np.int64),
-    "truth",
-)
+MAP = graph_of(np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]))
 
 
 def measured(state, tick=1, **inputs):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from landmark_tour import graph_of
 
 import omninav
 from omninav.pipeline import Context
@@ -12,16 +13,9 @@ from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
-from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
 
-MAP = ReferenceGraph(
-    np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]),
-    np.zeros((41, 8, 20), np.float32),
-    "histograms",
-    np.zeros((0, 2), np.int64),
-    "truth",
-)
+MAP = graph_of(np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]))
 OWN = np.diag((0.01, 0.02, 0.003))
 POSE = Pose(10.0, 0.0, 0.0)
 

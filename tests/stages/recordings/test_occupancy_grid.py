@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
+from landmark_tour import graph_of
 from world_files import DEMO
 
 from omninav.pipeline import Context
@@ -37,9 +38,7 @@ def states_at(grid: OccupancyGrid, points: np.ndarray) -> np.ndarray:
 
 
 def a_map(*places: tuple[float, float]) -> ReferenceGraph:
-    poses = np.array([(*place, 0.0) for place in places], float)
-    edges = np.column_stack([np.arange(len(poses) - 1), np.arange(1, len(poses))])
-    return ReferenceGraph(poses, np.zeros((len(poses), 1, 1), np.float32), "histograms", edges, "truth")
+    return graph_of(np.array([(*place, 0.0) for place in places]))
 
 
 # map_server's rule: p = (255 - level) / 255 is compared with the thresholds; 205 is 0.1961, just above free_thresh.
