@@ -18,6 +18,7 @@ from omninav.stages.monitor.input_conflicts import (
     compare_strips,
     foreign,
     frozen,
+    judge,
     late,
     leap,
     lies_at,
@@ -186,28 +187,32 @@ def test_the_best_match_of_a_standing_robot_goes_back_and_forth(correlation: flo
 
 
 def swaying(delay_s: float, gain: float = 1.0) -> Watched:
-    """A robot that drives 0.2 m/s and turns to and fro; images show its turns so much later, odometry `gain` times."""
+    """A robot that drives 0.4 m/s and turns to and fro; images show its turns so much later, odometry `gain` times."""
 
     def headings(times: Array) -> Array:
         return np.asarray(2.0 * np.sin(times / 3.0) + np.sin(times / 1.7))
 
     times = 0.5 * np.arange(64)
     rows = np.full((64, COLUMNS), np.nan)
-    rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = times, 0.2 * times, 0.0, gain * headings(times)
+    rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = times, 0.4 * times, 0.0, gain * headings(times)
     rows[1:, 8], rows[1:, 9], rows[:, 10] = np.diff(headings(times - delay_s)), 0.9, 0.0
     return Watched(rows)
 
 
-@pytest.mark.parametrize(("delay_s", "said"), [(0.0, False), (0.2, False), (0.5, True), (-0.5, True), (1.0, True)])
-def test_late_images_are_said_with_their_delay(delay_s: float, said: bool) -> None:
-    found = late(swaying(delay_s), SCALE_M)
-    assert bool(found) == said
-    if said:
+@pytest.mark.parametrize(
+    ("delay_s", "kind"), [(0.0, ""), (0.2, ""), (0.5, "late"), (-0.5, "late"), (1.0, "late"), (2.0, "misplacing")]
+)
+def test_late_images_are_said_with_their_delay_and_mislead_where_the_robot_is_elsewhere_by_then(
+    delay_s: float, kind: str
+) -> None:
+    images, driven = swaying(delay_s), 0.4 * abs(delay_s)
+    found, sentence = judge(images, SCALE_M)
+    assert found == kind
+    if kind:
         side = "after" if delay_s > 0 else "before"
-        driven = 0.2 * abs(delay_s)
-        assert f"{abs(delay_s)} s {side} odometry measures them, in which the robot drives {driven:.2f} m" in found
-        assert late(swaying(delay_s), SCALE_M, driven - 0.01)
-        assert not late(swaying(delay_s), SCALE_M, driven + 0.01)
+        assert f"{abs(delay_s)} s {side} odometry measures them, in which the robot drives {driven:.2f} m" in sentence
+        assert late(images, SCALE_M, driven - 0.01)
+        assert not late(images, SCALE_M, driven + 0.01)
 
 
 def test_reversed_turns_are_said_and_are_no_delay() -> None:

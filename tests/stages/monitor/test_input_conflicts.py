@@ -1,7 +1,6 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from conflicting_logs import (
     AT_TWO_HERTZ,
@@ -23,7 +22,7 @@ from conftest import DATA, DRIVE, TOUR, needs_data
 import omninav
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message import Message
-from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState, Watched, judge
+from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.image import Strip
@@ -108,23 +107,6 @@ def test_a_finding_stands_for_as_long_as_it_is_found_and_is_said_once() -> None:
     assert not set(stood) & set(range(60, 80))
     assert set(stood) & set(range(80, 101))
     assert [sentence[:20] for sentence in ctx.warnings] == ["the camera is frozen"]
-
-
-@pytest.mark.parametrize(("delay_s", "kind"), [(0.0, ""), (0.5, "late"), (-0.5, "late"), (2.0, "misplacing")])
-def test_late_images_mislead_where_the_robot_is_elsewhere_by_then(delay_s: float, kind: str) -> None:
-    def headings(times: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        return 2.0 * np.sin(times / 3.0) + np.sin(times / 1.7)
-
-    times = 0.5 * np.arange(64)
-    odometry = np.column_stack([0.4 * times, np.zeros(64), headings(times)])  # 0.4 m/s
-    seen = np.concatenate([[np.nan], np.diff(headings(times - delay_s))])
-    matches, alike = np.full((64, 4), np.nan), np.full(64, 0.9)
-    watched = Watched(np.column_stack([times, odometry, matches, seen, alike, np.zeros(64)]))
-    found, sentence = judge(watched, np.inf)
-    assert found == kind
-    if kind:
-        assert f"{abs(delay_s)} s {'after' if delay_s > 0 else 'before'}" in sentence
-        assert f"drives {0.4 * abs(delay_s):.2f} m" in sentence
 
 
 @pytest.mark.parametrize("fits", [0.0, 0.25, 1.0])
