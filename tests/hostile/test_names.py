@@ -4,10 +4,10 @@ import io
 import sys
 from pathlib import Path
 
-import made_values
 import pytest
 import yaml
 from rich.table import Table
+from small_run import reference_graph
 
 from omninav.pipeline import BadInput
 from omninav.pipeline.cli.main import main
@@ -98,7 +98,7 @@ def test_a_folder_that_describes_itself_describes_no_other(tmp_path: Path):
 )
 def test_a_maps_facts_are_of_their_types(tmp_path: Path, fact: str, value: object):
     file = tmp_path / "map.omap"
-    file.write_bytes(artifact_bytes(made_values.made_values()[0], {fact: value}))
+    file.write_bytes(artifact_bytes(reference_graph(6), {fact: value}))
     for read in (read_header, read_artifact):
         with pytest.raises(BadInput, match=f"its header's {fact} is"):
             read(file)
@@ -138,7 +138,7 @@ def test_a_facts_escape_sequences_are_shown_by_a_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.chdir(tmp_path)
-    Path("map.omap").write_bytes(artifact_bytes(made_values.made_values()[0], {"variant": ESCAPE, "made_by": ESCAPE}))
+    Path("map.omap").write_bytes(artifact_bytes(reference_graph(6), {"variant": ESCAPE, "made_by": ESCAPE}))
     assert main(["map", "show", "map.omap"]) == 0
     out, err = capsys.readouterr()
     assert "owned" in out + err

@@ -6,6 +6,12 @@ from landmark_tour import FEW, mapped_room
 
 from omninav.pipeline.graph.contents import violation
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.values.landmarks import Landmarks
+
+
+def seen_by(landmarks: Landmarks, row: int) -> np.ndarray:
+    """Rows of the landmarks that a reference sees."""
+    return landmarks.seen[landmarks.starts[row] : landmarks.starts[row + 1]]
 
 
 def test_some_references_keep_what_they_see_in_their_order() -> None:
@@ -14,20 +20,15 @@ def test_some_references_keep_what_they_see_in_their_order() -> None:
     some = map.landmarks.of_references(rows)
     assert some.references == len(some.words) == 3
     for number, row in enumerate(rows):
-        own, before = (
-            each.seen[each.starts[n] : each.starts[n + 1]] for each, n in ((some, number), (map.landmarks, row))
-        )
+        own, before = seen_by(some, number), seen_by(map.landmarks, row)
         assert (some.points[own] == map.landmarks.points[before]).all()
         assert (some.descriptors[own] == map.landmarks.descriptors[before]).all()
     assert len(some) == len(np.unique(some.seen)) < len(map.landmarks)
     whole = map.landmarks.words
-    assert (
-        some.words.weights.tolist()
-        == np.concatenate([whole.weights[whole.starts[row] : whole.starts[row + 1]] for row in rows]).tolist()
-    )
-    assert (
-        violation(replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)) is None
-    )
+    weights = [whole.weights[whole.starts[row] : whole.starts[row + 1]] for row in rows]
+    assert some.words.weights.tolist() == np.concatenate(weights).tolist()
+    cut = replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)
+    assert violation(cut) is None
 
 
 def test_references_that_came_later_and_none_at_all_see_nothing() -> None:
@@ -43,9 +44,7 @@ def test_a_map_that_is_moved_takes_its_landmarks_along() -> None:
     motion = np.array([5.0, -2.0, 2.2])
     poses = np.array([compose(motion, pose) for pose in map.poses])
     moved = map.moved(poses)
-    points = map.landmarks.points.astype(np.float64)
-    there = np.column_stack([points[:, :2], np.zeros(len(points))])
-    expected = np.array([compose(motion, each) for each in there])
+    expected = np.array([compose(motion, (x, y, 0.0)) for x, y, _ in map.landmarks.points.tolist()])
     assert moved.landmarks.points[:, :2] == pytest.approx(expected[:, :2], abs=1e-4)
     assert (moved.landmarks.points[:, 2] == map.landmarks.points[:, 2]).all()
     assert (moved.poses == poses).all()
