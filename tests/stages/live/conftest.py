@@ -18,14 +18,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conflicting_logs import ticks
 from conftest import DRIVE, ROOT
 
 import omninav
+from omninav.pipeline import Context
 from omninav.pipeline.api.run import Run
 from omninav.pipeline.mcap.message_types import make_message, standard_types
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake, live_source, publish, publish_truth, robot_driver, watchdog
 from omninav.stages.live.transport import Arrival, Transport, disconnect
+from omninav.stages.source.log import LogSource
 
 CAMERA = ROOT / "tests/data/camera.yaml"
 IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odom", "/ground_truth/pose"
@@ -141,6 +144,22 @@ def localised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Pat
     return run
 
 
+def replayed(record: Path, **parameters: Any) -> list[Any]:
+    """Every tick of a record."""
+    return list(ticks(LogSource(log=str(record), **parameters), Context("source")))
+
+
+def same(driven: list[Any], played: list[Any]) -> None:
+    """Ticks of a drive and of its record are the same."""
+    assert len(driven) == len(played) > 0
+    for one, other in zip(driven, played, strict=True):
+        assert vars(one.tick) == vars(other.tick)
+        assert one.image.pixels.tobytes() == other.image.pixels.tobytes()
+        for name in ("odometry", "motion", "truth", "restart", "goal"):
+            mine, theirs = getattr(one, name), getattr(other, name)
+            assert mine is theirs is None or vars(mine) == vars(theirs), name
+
+
 class OtherEnd:
     """A ROS 2 node in a process of its own."""
 
@@ -173,25 +192,21 @@ class OtherEnd:
         """Have it publish CDR on a topic that it has advertised."""
         self.order("publish", topic, data=base64.b64encode(data).decode())
 
-    def next(self, timeout_s: float = WAIT_S) -> dict[str, Any]:
-        """The next thing that it says."""
-        return self._heard.get(timeout=timeout_s)
+    def said(self, key: str, value: object = None) -> dict[str, Any]:
+        """The next thing that it says with that key, and that value where one is given."""
+        until = time.monotonic() + WAIT_S
+        while True:
+            said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
+            if key in said and value in (None, said[key]):
+                return said
 
-    def wait(self, key: str, timeout_s: float = WAIT_S) -> Any:
+    def wait(self, key: str) -> Any:
         """The next thing that it says with that key."""
-        until = time.monotonic() + timeout_s
-        while True:
-            said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
-            if key in said:
-                return said[key]
+        return self.said(key)[key]
 
-    def hear(self, topic: str, timeout_s: float = WAIT_S) -> bytes:
+    def hear(self, topic: str) -> bytes:
         """The next message that it hears on a topic."""
-        until = time.monotonic() + timeout_s
-        while True:
-            said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
-            if said.get("topic") == topic:
-                return base64.b64decode(said["data"])
+        return base64.b64decode(self.said("topic", topic)["data"])
 
     def close(self) -> None:
         """End it."""

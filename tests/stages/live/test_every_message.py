@@ -214,17 +214,6 @@ def test_over_zenoh(router: object, one: list[dict[str, dict[str, Any]]]):
     check_all_heard("zenoh", one)
 
 
-def with_rclpy(other_end: OtherEnd, topics: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    """Each topic's message as rclpy decodes it."""
-    for topic, kind in topics.items():
-        other_end.order("subscribe", topic, type=kind, decoded=True)
-        while True:
-            said = other_end.next()
-            if said.get("topic") == topic and "message" in said:
-                break
-        yield topic, said["message"]
-
-
 @pytest.mark.parametrize("transport", ["dds", "rclpy"])
 def test_rclpy_reads_what_it_has_types_for(transport: str, other_end: OtherEnd, one: list[dict[str, dict[str, Any]]]):
     own = transport == "rclpy"
@@ -235,8 +224,9 @@ def test_rclpy_reads_what_it_has_types_for(transport: str, other_end: OtherEnd, 
         left_out = set(json.loads(output.readline())["left_out"])
         threading.Thread(target=output.read, daemon=True).start()
         assert left_out == (topics.keys() - readable.keys() if own else set())
-        for topic, message in with_rclpy(other_end, readable):
-            check(topic, message)
+        for topic, kind in readable.items():
+            other_end.order("subscribe", topic, type=kind, decoded=True)
+            check(topic, other_end.said("topic", topic)["message"])
 
 
 def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):

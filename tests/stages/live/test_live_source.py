@@ -21,10 +21,8 @@ from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, MessageQueue
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
-from omninav.stages.source.log import LogSource
-from omninav.stages.source.playback import PlaybackState
 
-from .conftest import CAMERA, IMAGE, ODOMETRY, TRUTH, Wire, encode, recorded
+from .conftest import CAMERA, IMAGE, ODOMETRY, TRUTH, Wire, encode, recorded, replayed, same
 
 POSE, POSE_STAMPED = "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseStamped"
 COMPRESSED, SCAN = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/LaserScan"
@@ -83,27 +81,6 @@ def driven(robot: Wire, folder: Path, arrivals: list[Arrival], **parameters: obj
     drive.end()
     same(drive.outs, replayed(folder / "live.mcap"))
     return drive
-
-
-def replayed(record: Path) -> list[LogSource.Out]:
-    source, state = LogSource(log=str(record)), PlaybackState()
-    ctx = Context("source")
-    source.setup(ctx)
-    outs = []
-    while (out := source.step(ctx, state)) is not None:
-        outs.append(out)
-    return outs
-
-
-def same(live_outs: list[LiveSource.Out], log_outs: list[LogSource.Out]) -> None:
-    assert len(live_outs) == len(log_outs) > 0
-    for one, other in zip(live_outs, log_outs, strict=True):
-        assert vars(one.tick) == vars(other.tick)
-        assert one.image.pixels.tobytes() == other.image.pixels.tobytes()
-        for name in ("odometry", "motion", "truth", "restart", "goal"):
-            mine, theirs = getattr(one, name), getattr(other, name)
-            assert type(mine) is type(theirs), name
-            assert mine is None or vars(mine) == vars(theirs), name
 
 
 def test_the_record_of_a_live_drive_gives_the_same_ticks_as_the_drive(wire: Wire, tmp_path: Path):

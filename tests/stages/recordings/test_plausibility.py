@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conflicting_logs import ticks
 from made_logs import (
     FRAMES,
     IMAGE,
@@ -29,7 +30,6 @@ from omninav.stages.motion.rotation_translation_rotation import RotationTranslat
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits, believed, seconds_within, without_jumps
 from omninav.stages.source.log import LogSource
-from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.pose import BridgedMotion, Motion
 
 Pose = tuple[float, float, float]
@@ -129,9 +129,8 @@ def test_true_poses_may_jump_as_those_of_a_robot_that_is_carried(tmp_path: Path)
 
 def test_the_motion_across_a_gap_is_less_certain(tmp_path: Path) -> None:
     path = log_with(tmp_path / "log.mcap", far(1e4))
-    source, state, ctx = LogSource(log=str(path)), PlaybackState(), Context("source", np.random.default_rng(0))
-    source.setup(ctx)
-    motions = [source.step(ctx, state).motion for _ in range(FRAMES)]
+    ctx = Context("source")
+    motions = [out.motion for out in ticks(LogSource(log=str(path)), ctx)]
     assert ctx.counts == {"impossible_motion": 1}
     assert [number for number, motion in enumerate(motions) if isinstance(motion, BridgedMotion)] == [8]
     assert motions[8].unmeasured_s == pytest.approx(0.1)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conflicting_logs import ticks
 from made_logs import FRAMES, START, TRUTH, Made, messages, pose_at, pose_fields, write_mcap
 
 from omninav.pipeline import Context
@@ -14,7 +15,6 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.truth_file import read_trajectory
 from omninav.stages.source.log import LogSource
-from omninav.stages.source.playback import PlaybackState
 
 from .conftest import refused
 
@@ -74,14 +74,6 @@ def test_what_is_no_trajectory_says_what_is_missing(tmp_path: Path, content: str
         read_trajectory(tmp_path / "truth.csv")
 
 
-def outs(source: LogSource, ctx: Context) -> list:
-    source.setup(ctx)
-    position, found = PlaybackState(), []
-    while (out := source.step(ctx, position)) is not None:
-        found.append(out)
-    return found
-
-
 def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) -> None:
     without = (made for made in messages() if made.topic != TRUTH)
     log = str(write_mcap(tmp_path / "log.mcap", without))
@@ -90,7 +82,7 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
     source = LogSource(
         log=log, truth=str(tum(tmp_path / "truth.tum", 100.0, gap)), truth_clock_offset_s=100 - START / 1e9
     )
-    found = outs(source, ctx)
+    found = list(ticks(source, ctx))
     assert len(found) == FRAMES
     known = [out for out in found if out.truth is not None]
     for out in known:
@@ -104,7 +96,7 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
 def test_clocks_that_do_not_meet_are_said_with_both_spans(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
     with refused(r"times are 0.000 to 10.000 s, the images' 17.*truth_clock_offset_s"):
-        outs(LogSource(log=log, truth=str(tum(tmp_path / "truth.tum", 0.0))), Context("source"))
+        list(ticks(LogSource(log=log, truth=str(tum(tmp_path / "truth.tum", 0.0))), Context("source")))
 
 
 def replaced(kind: str, fields: str) -> Iterator[Made]:
@@ -158,7 +150,7 @@ def test_orientations_that_are_no_rotation_are_counted_and_left_out(tmp_path: Pa
         rows[number] = " ".join([*rows[number].split()[:4], "0 0 0 0"])
     file.write_text("\n".join(rows))
     ctx = Context("source")
-    outs(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(file)), ctx)
+    list(ticks(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(file)), ctx))
     assert ctx.counts["impossible_pose"] == 3
 
 
@@ -197,5 +189,5 @@ def test_a_doubt_about_true_poses_is_a_warning_of_the_run(tmp_path: Path) -> Non
     rows = "\n".join(f"{START / 1e9 + at},{pose_at(at)[0]},{pose_at(at)[1]},{20 * at}" for at in SECONDS)
     (tmp_path / "truth.csv").write_text(f"time,x,y,yaw\n{rows}\n")
     ctx = Context("source")
-    outs(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.csv")), ctx)
+    list(ticks(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.csv")), ctx))
     assert sum("read as radians" in sentence for sentence in ctx.warnings) == 1
