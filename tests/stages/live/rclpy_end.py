@@ -9,7 +9,7 @@ import threading
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 
 def type_of(name: str) -> type:
@@ -22,11 +22,7 @@ def say(**what: object) -> None:
 
 
 def qos_of(order: dict) -> QoSProfile:
-    return QoSProfile(
-        depth=order.get("depth", 10),
-        reliability=ReliabilityPolicy[order.get("reliability", "RELIABLE")],
-        durability=DurabilityPolicy[order.get("durability", "VOLATILE")],
-    )
+    return QoSProfile(depth=10, durability=DurabilityPolicy[order.get("durability", "VOLATILE")])
 
 
 def plain(value: object) -> object:

@@ -93,7 +93,7 @@ def test_discovery_reaches_as_far_as_ros_says(domain: int, monkeypatch: pytest.M
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", reach)
     assert "<AllowMulticast>false" in _settings()  # nothing is sent to the network to be found
     connect("dds").publish("/hello", "std_msgs/msg/String", encode("std_msgs/msg/String", {"data": "x"}))
-    words = [sys.executable, "-c", SEE, "30" if reach == "LOCALHOST" else "5"]
+    words = [sys.executable, "-c", SEE, "30" if reach == "LOCALHOST" else "3"]
     assert subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S, check=True).stdout.strip() == seen
 
 
