@@ -30,6 +30,8 @@ from . import every_message
 from .conftest import ROS2_PYTHON, WAIT_S, OtherEnd, Wire, ours_for_rclpy
 
 HERE = Path(__file__).parent
+Told = list[dict[str, dict[str, Any]]]
+"""Options of `publish`: of each, node -> its parameters."""
 STAMP = {"sec": 1_700_000_000, "nanosec": 250_000_000}
 INSTALLED = ("geometry_msgs", "nav_msgs", "std_msgs", "diagnostic_msgs")
 """Packages of messages that have wheels for rclpy."""
@@ -41,7 +43,7 @@ NAV2 = {
 
 
 @functools.cache
-def options() -> list[dict[str, dict[str, Any]]]:
+def options() -> Told:
     """The nodes of all options of `publish`, with their parameters; the command also without a header."""
     found = []
     for option in group_options("publish"):
@@ -56,7 +58,7 @@ def options() -> list[dict[str, dict[str, Any]]]:
     return [{name: {k: v for k, v in node.items() if k != "_target_"} for name, node in one.items()} for one in found]
 
 
-def topics_declared(told: list[dict[str, dict[str, Any]]]) -> dict[str, str]:
+def topics_declared(told: Told) -> dict[str, str]:
     """Topic -> message type of all that these parameters say, and of the diagnostics."""
     found = {"/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
     for one in told:
@@ -173,7 +175,7 @@ def check(topic: str, found: Any) -> None:
 
 
 @contextmanager
-def teller(transport: str, python: str, told: list[dict[str, dict[str, Any]]], **more: str) -> Iterator[Any]:
+def teller(transport: str, python: str, told: Told, **more: str) -> Iterator[Any]:
     """A process that tells all; its output."""
     words = [python, str(HERE / "every_message.py"), transport, json.dumps(told)]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, **more})
@@ -185,12 +187,12 @@ def teller(transport: str, python: str, told: list[dict[str, dict[str, Any]]], *
 
 
 @pytest.fixture(params=[0, 1, 2], ids=["ros2 or amcl 0", "ros2 or amcl 1", "a bare command"])
-def one(request: pytest.FixtureRequest) -> list[dict[str, dict[str, Any]]]:
+def one(request: pytest.FixtureRequest) -> Told:
     """One option at a time: both say something else on /map."""
     return [options()[request.param]]
 
 
-def check_all_heard(name: str, told: list[dict[str, dict[str, Any]]]) -> None:
+def check_all_heard(name: str, told: Told) -> None:
     transport, topics, heard = connect(name), topics_declared(told), dict[str, bytes]()
     for topic, kind in topics.items():
         transport.subscribe(topic, kind)
@@ -205,31 +207,27 @@ def check_all_heard(name: str, told: list[dict[str, dict[str, Any]]]) -> None:
         check(topic, decoded(topics[topic], data))
 
 
-def test_over_dds(domain: int, one: list[dict[str, dict[str, Any]]]):
+def test_over_dds(domain: int, one: Told):
     check_all_heard("dds", one)
 
 
-def test_over_zenoh(router: object, one: list[dict[str, dict[str, Any]]]):
+def test_over_zenoh(router: object, one: Told):
     register_nav2()  # a subscription's key has the type's hash
     check_all_heard("zenoh", one)
 
 
-@pytest.mark.parametrize("transport", ["dds", "rclpy"])
-def test_rclpy_reads_what_it_has_types_for(transport: str, other_end: OtherEnd, one: list[dict[str, dict[str, Any]]]):
-    own = transport == "rclpy"
-    libraries = {"PYTHONPATH": ours_for_rclpy()} if own else {}
+def test_rclpy_reads_what_it_has_types_for(other_end: OtherEnd, one: Told):
     topics = topics_declared(one)
     readable = {topic: kind for topic, kind in topics.items() if kind.partition("/")[0] in INSTALLED}
-    with teller(transport, str(ROS2_PYTHON) if own else sys.executable, one, **libraries) as output:
-        left_out = set(json.loads(output.readline())["left_out"])
+    with teller("rclpy", str(ROS2_PYTHON), one, PYTHONPATH=ours_for_rclpy()) as output:
+        assert set(json.loads(output.readline())["left_out"]) == topics.keys() - readable.keys()
         threading.Thread(target=output.read, daemon=True).start()
-        assert left_out == (topics.keys() - readable.keys() if own else set())
         for topic, kind in readable.items():
             other_end.order("subscribe", topic, type=kind, decoded=True)
             check(topic, other_end.said("topic", topic)["message"])
 
 
-def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):
+def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: Told):
     class Bytes(Wire):
         def publish(self, topic, msgtype, data, latched=False):
             self.sent.append((topic, decoded(msgtype, data)))
