@@ -29,6 +29,7 @@ from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits, believed, seconds_within, without_jumps
+from omninav.stages.recordings.recording import Recording
 from omninav.stages.source.log import LogSource
 from omninav.stages.values.pose import BridgedMotion, Motion
 
@@ -92,10 +93,9 @@ DAMAGES: dict[str, tuple[Callable[[Made, int], Made], dict[str, int]]] = {
 @pytest.mark.parametrize("topic", [ODOMETRY, TRUTH])
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_impossible_poses_are_dropped_and_the_track_is_the_undamaged_one(
-    damage: str, topic: str, tmp_path: Path
+    damage: str, topic: str, tmp_path: Path, whole: Recording
 ) -> None:
     change, counted = DAMAGES[damage]
-    whole = open_recording(str(write_mcap(tmp_path / "whole.mcap")))
     recording = open_recording(str(log_with(tmp_path / "log.mcap", change, topic)))
     assert recording.dropped == counted
     assert f"log.mcap: {'' if counted.get('impossible_motion') else 'a message on '}{topic}" in next(
@@ -106,11 +106,10 @@ def test_impossible_poses_are_dropped_and_the_track_is_the_undamaged_one(
     np.testing.assert_allclose(recording.truth, whole.truth, atol=0.005)
 
 
-def test_odometry_that_is_reset_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_odometry_that_is_reset_goes_on_where_it_was(tmp_path: Path, whole: Recording) -> None:
     def reset(made: Made, step: int) -> Made:
         return posed(made, pose_at((step - 100) * 0.05)) if step >= 100 else made
 
-    whole = open_recording(str(write_mcap(tmp_path / "whole.mcap")))
     recording = open_recording(str(log_with(tmp_path / "log.mcap", reset)))
     assert recording.dropped == {"odometry_jump": 1}
     assert "/odom at 1700000005.000 s" in recording.details["odometry_jump"]

@@ -12,7 +12,7 @@ from made_logs import FRAMES, START, TRUTH, Made, messages, pose_at, pose_fields
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import Topics
+from omninav.stages.recordings.recording import Recording, Topics
 from omninav.stages.recordings.truth_file import read_trajectory
 from omninav.stages.source.log import LogSource
 
@@ -130,10 +130,11 @@ def transform_of(stamp: int, transform: dict, child: str) -> object:
         ("tf2_msgs/msg/TFMessage", "tf", "/truth:map:base"),
     ],
 )
-def test_truth_comes_from_any_message_that_holds_a_pose(tmp_path: Path, kind: str, fields: str, truth: str) -> None:
+def test_truth_comes_from_any_message_that_holds_a_pose(
+    tmp_path: Path, whole: Recording, kind: str, fields: str, truth: str
+) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", replaced(kind, fields)))
-    plain = open_recording(str(write_mcap(tmp_path / "plain.mcap")))
-    np.testing.assert_allclose(open_recording(path, Topics(truth=truth)).truth, plain.truth, atol=1e-9)
+    np.testing.assert_allclose(open_recording(path, Topics(truth=truth)).truth, whole.truth, atol=1e-9)
 
 
 def test_a_transform_that_is_not_there_is_said_with_those_that_are(tmp_path: Path) -> None:
