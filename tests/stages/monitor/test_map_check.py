@@ -3,17 +3,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from landmark_tour import graph_of
 
 from omninav.pipeline import Context
 from omninav.stages.monitor.map_check import MAX_COMPARED, CheckMap, of_headings, of_poses
 from omninav.stages.values.maps import ReferenceGraph
-
-LINE = np.column_stack([np.arange(30) * 0.5, np.zeros(30), np.zeros(30)])
-
-
-def line_of(number: int, extent_m: float) -> np.ndarray:
-    """Poses on a line, evenly spaced."""
-    return np.column_stack([np.linspace(0.0, extent_m, number), np.zeros(number), np.zeros(number)])
 
 
 def drifting(number: int, turn_deg: float = 0.0) -> ReferenceGraph:
@@ -27,8 +21,7 @@ def drifting(number: int, turn_deg: float = 0.0) -> ReferenceGraph:
         peaks = np.exp(-0.5 * ((bins - middle[:, None]) / 2.0) ** 2)
         views.append(peaks / peaks.sum(axis=1, keepdims=True))
     poses = np.column_stack([0.5 * np.arange(number), np.zeros(number), headings])
-    features = np.asarray(views, np.float32)
-    return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+    return replace(graph_of(poses), features=np.asarray(views, np.float32))
 
 
 def said(map: ReferenceGraph) -> tuple[str, ...]:
@@ -41,28 +34,23 @@ def said(map: ReferenceGraph) -> tuple[str, ...]:
 
 @pytest.mark.parametrize(("number", "judged"), [(19, False), (20, True)])
 def test_a_small_map_is_not_judged(number: int, judged: bool) -> None:
-    at_one_place = np.zeros((number, 3))
-    map = ReferenceGraph(at_one_place, np.ones((number, 12, 4)), "histograms", np.zeros((0, 2), np.int64), "truth")
-    assert bool(said(map)) == judged
-
-
-def test_poses_that_cannot_be_are_named() -> None:
-    assert of_poses(LINE) == ""
-    assert of_poses(LINE * 0.0) == ("all 30 references of the map lie at one place, within 0 m: check its positions")
-    assert "the map's images lie 500 m apart" in of_poses(LINE * 1000.0)
-    far = LINE.copy()
-    far[7, 1] = 1e6
-    assert "reference 7 of the map lies 1000000 m from its middle" in of_poses(far)
+    assert bool(said(graph_of(np.zeros((number, 3))))) == judged  # all at one place
 
 
 @pytest.mark.parametrize(
-    ("extent_m", "beginning"),
-    [(0.009, "all 30 references"), (0.011, ""), (29 * 49.9, ""), (29 * 50.1, "the map's images")],
+    ("extent_m", "said"),
+    [
+        (0.0, "all 30 references of the map lie at one place, within 0 m: check its positions"),
+        (0.009, "all 30 references"),
+        (0.011, ""),
+        (29 * 49.9, ""),
+        (29 * 50.1, "the map's images lie 50.1 m apart"),
+    ],
 )
-def test_a_map_has_an_extent_and_a_spacing(extent_m: float, beginning: str) -> None:
-    found = of_poses(line_of(30, extent_m))
-    assert found.startswith(beginning)
-    assert bool(found) == bool(beginning)
+def test_a_map_has_an_extent_and_a_spacing(extent_m: float, said: str) -> None:
+    found = of_poses(np.column_stack([np.linspace(0.0, extent_m, 30), np.zeros((30, 2))]))
+    assert found.startswith(said)
+    assert bool(found) == bool(said)
 
 
 @pytest.mark.parametrize(("times", "lost"), [(990.0, False), (1010.0, True)])
@@ -72,7 +60,7 @@ def test_a_reference_is_lost_a_thousand_times_further_away_than_half_of_all(time
     poses[40, :2] = times, 0.0
     poses[:, :2] += 700.0, -300.0  # wherever its frame begins
     found = of_poses(poses)
-    assert ("reference 40 of the map" in found) == lost
+    assert ("reference 40 of the map lies 1010 m from its middle" in found) == lost
     assert bool(found) == lost
 
 
