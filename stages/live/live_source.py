@@ -22,7 +22,7 @@ from omninav.stages.source.outputs import DriveOutputs, pose_of
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import AssumedPose, Pose
 
 from .amcl_services import serve_amcl, serve_restart
 from .camera_device import TOPIC, device_camera
@@ -259,12 +259,13 @@ class LiveSource(Source):
         image = Image(pixels)
         tick, since = position.turn(stamp)
         motion = position.move(self._guess, image, camera, since, frame)
+        pose = Pose if self._guess is None else AssumedPose
         return self.Out(
             tick=tick,
             image=image,
             camera=camera,
             motion=motion,
-            odometry=Pose(position.x, position.y, position.heading),
+            odometry=pose(position.x, position.y, position.heading),
             reported_odometry=pose_of(frame.reported_odometry),
             truth=pose_of(frame.truth),
             scan=frame.scan,
