@@ -3,6 +3,7 @@
 import glob
 import io
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from unittest.mock import patch
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.codec import decode, unseal
+from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.graph.registry import built_in
 
 
@@ -75,6 +77,28 @@ def killed_and_resumed(place: Path, *words: str, ticks: int) -> Path:
     assert process.poll() is None, "it was over before it could be killed"
     kill(process)
     return finished(place, "resume", "runs/latest")
+
+
+def whole_and_resumed(place: Path, *words: str, ticks: int) -> tuple[Path, Path]:
+    """The folders of a run that was left to end, and of what `kill -9` would have left of it on its way, resumed.
+
+    Its folder is copied two ticks after a checkpoint at that many ticks. Graphs whose checkpoints lie elsewhere, as
+    those of a map that is kept in a cache, do not count.
+    """
+    copy, tick = place.with_name(f"{place.name}_killed"), Engine.tick
+
+    def ticked(engine: Engine) -> bool:
+        goes_on, memory = tick(engine), engine.options.memory
+        if goes_on and memory is not None and memory.is_relative_to(place) and not copy.exists():
+            if engine.ticks == ticks:
+                engine.save()
+            elif engine.ticks == ticks + 2:
+                shutil.copytree(place / "runs", copy / "runs", symlinks=True)
+        return goes_on
+
+    with patch.object(Engine, "tick", ticked):
+        whole = finished(place, *words)
+    return whole, finished(copy, "resume", "runs/latest")
 
 
 def assert_same_bytes(run: Path, whole: Path, *names: str) -> None:

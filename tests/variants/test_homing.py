@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from background_runs import assert_same_bytes, finished, killed_and_resumed
+from background_runs import assert_same_bytes, whole_and_resumed
 from golden_figures import SMALL_CAMERA
 
 from omninav.pipeline.mcap.reader import LogReader
@@ -15,14 +15,19 @@ WORDS = (
     "nodes.source.seconds=16",
     "nodes.source.start=[5.0,5.0,0.4]",
     "kidnappings=[{at: 0.5, to: [4.0, 4.2, 1.5]}]",
-    "checkpoint_s=0.1",
     "cache=null",
 )
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished(tmp_path_factory.mktemp("homing"), *WORDS)
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    place = tmp_path_factory.mktemp("homing")
+    return whole_and_resumed(place, *WORDS, ticks=30)  # the local map has been made
+
+
+@pytest.fixture
+def whole(runs: tuple[Path, Path]) -> Path:
+    return runs[0]
 
 
 def test_a_robot_that_was_carried_away_comes_back_and_stands_as_before(whole: Path):
@@ -47,9 +52,8 @@ def test_the_report_shows_what_it_followed_frame_by_frame(whole: Path):
     assert "target: the start" in captions
 
 
-def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path):
-    run = killed_and_resumed(tmp_path, *WORDS, ticks=30)  # the local map has been made
-    assert_same_bytes(run, whole, "metrics.json", "result.mcap")
+def test_killed_on_its_way_it_goes_on_to_the_same_bytes(runs: tuple[Path, Path]):
+    assert_same_bytes(*runs, "metrics.json", "result.mcap")
 
 
 WARPED = (
@@ -60,15 +64,14 @@ WARPED = (
     "nodes.source.spacing_m=0.4",
     "nodes.source.radius_m=1.2",
     "nodes.local_map.max_false_alarms=1e-300",  # no features ever suffice
-    "checkpoint_s=0.05",
     "cache=null",
     "plots=none",
 )
 
 
 def test_warping_finds_the_target_without_features_and_goes_on_to_the_same_bytes(tmp_path: Path):
-    run = killed_and_resumed(tmp_path / "killed", *WARPED, ticks=4)
-    field = json.loads((run / "metrics.json").read_text())["homing_field"]
+    whole, resumed = whole_and_resumed(tmp_path / "run", *WARPED, ticks=4)
+    field = json.loads((whole / "metrics.json").read_text())["homing_field"]
     assert field["found_rate"] == 1.0
     assert field["median_deg"] < 10.0
-    assert_same_bytes(run, finished(tmp_path / "whole", *WARPED), "metrics.json")
+    assert_same_bytes(resumed, whole, "metrics.json")

@@ -1,13 +1,11 @@
 """Concurrent map building with mixtures of Gaussians: stopped anywhere, killed, and as a user runs it."""
 
 import json
-import random
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
+from background_runs import assert_same_bytes, finished, whole_and_resumed
 from conftest import DATA, DRIVE, TOUR, needs_data
 
 from omninav.pipeline.engine.artifact import read_artifact
@@ -73,12 +71,18 @@ def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
 
 HOUSE = DATA / "photoreal-house"
 OPTIONS = ("nodes.source.stop=45", "nodes.novelty_threshold.views=40", "cache=null")
-WORDS = ("variant=omniview_cml", f"log=[{TOUR},{DRIVE}]", *OPTIONS, "checkpoint_s=0.05")
+WORDS = ("variant=omniview_cml", f"log=[{TOUR},{DRIVE}]", *OPTIONS)
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished(tmp_path_factory.mktemp("omniview_cml"), *WORDS)
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    place = tmp_path_factory.mktemp("omniview_cml")
+    return whole_and_resumed(place, *WORDS, ticks=60)  # the first log is over
+
+
+@pytest.fixture
+def whole(runs: tuple[Path, Path]) -> Path:
+    return runs[0]
 
 
 @needs_data
@@ -93,21 +97,8 @@ def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(tmp_
     assert (whole / "trajectory.tum").read_bytes() == (whole / "trajectory_1.tum").read_bytes()
 
 
-def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_path: Path):
-    moments = random.Random(3)
-    process, kills = start(tmp_path, *WORDS), 0
-    while process.poll() is None and kills < 2:
-        wait_for_checkpoint(process, tmp_path)
-        if kills:  # the first one is killed at once: a fast machine is soon done
-            time.sleep(moments.uniform(0.0, 1.0))
-        if process.poll() is None:
-            kill(process)
-            kills += 1
-            process = start(tmp_path, "resume", "runs/latest")
-    assert kills > 0
-    assert process.wait(timeout=300) == 0
-    run = tmp_path / "runs" / "latest"
-    assert_same_bytes(run, whole, "map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json")
+def test_a_killed_run_resumes_to_the_same_map_and_trajectory(runs: tuple[Path, Path]):
+    assert_same_bytes(*runs, "map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json")
 
 
 def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Path, tmp_path: Path):

@@ -4,19 +4,20 @@ import json
 from pathlib import Path
 
 import pytest
-from background_runs import assert_same_bytes, finished, killed_and_resumed
+from background_runs import assert_same_bytes, whole_and_resumed
 
 from omninav.pipeline.mcap.reader import LogReader
 
-WORDS = ("variant=wander", "nodes.source.seconds=8", "checkpoint_s=0.1", "cache=null")
+WORDS = ("variant=wander", "nodes.source.seconds=8", "cache=null")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished(tmp_path_factory.mktemp("wander"), *WORDS)
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return whole_and_resumed(tmp_path_factory.mktemp("wander"), *WORDS, ticks=20)
 
 
-def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(whole: Path):
+def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(runs: tuple[Path, Path]):
+    whole, _ = runs
     metrics = json.loads((whole / "metrics.json").read_text())
     assert metrics["frames"] == 40
     assert metrics["drive"]["collisions"] == 0
@@ -31,6 +32,5 @@ def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(wh
     assert "Frame by frame" in report
 
 
-def test_a_killed_closed_loop_resumes_to_the_same_bytes(whole: Path, tmp_path: Path):
-    run = killed_and_resumed(tmp_path, *WORDS, ticks=10)
-    assert_same_bytes(run, whole, "metrics.json", "result.mcap")
+def test_a_killed_closed_loop_resumes_to_the_same_bytes(runs: tuple[Path, Path]):
+    assert_same_bytes(*runs, "metrics.json", "result.mcap")
