@@ -8,58 +8,65 @@ from pathlib import Path
 
 import pytest
 import yaml
+from conftest import Command
 
 ROOT = Path(__file__).resolve().parents[2]
 EDGES = ROOT / "examples" / "edges"
 SHORT = ("landmarks=none", "nodes.source.stop=12")  # of tour and drive, where a result is not looked at
+RAISES = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", *SHORT)
 
 
-def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: Path, tmp_path: Path):
-    ended = omninav("-m", "match=selective,l2", "seed=0,1", *SHORT, f"cache={shared_cache}", check=True)
-    (sweep,) = (tmp_path / "runs").glob("*_sweep")
+@pytest.fixture
+def swept(omninav, shared_cache: Path, tmp_path: Path):
+    """Runs a sweep beside the examples. Returns how it ended, and its folder."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+
+    def run(*words: str, command: Command = omninav) -> tuple[subprocess.CompletedProcess[str], Path]:
+        ended = command("-m", *words, f"cache={shared_cache}")
+        (folder,) = (tmp_path / "runs").glob("*_sweep")
+        return ended, folder
+
+    return run
+
+
+def row_of_edges(listed: str) -> str:
+    """The line of `omninav stages features` that is the example's."""
+    return next(line for line in listed.splitlines() if line.startswith("features.edges"))
+
+
+def manifests(sweep: Path) -> list[dict]:
+    return [json.loads(file.read_text()) for file in sorted(sweep.glob("*/manifest.json"))]
+
+
+def test_a_sweep_runs_every_combination_and_has_one_page(swept):
+    ended, sweep = swept("match=selective,l2", "seed=0,1", *SHORT)
     assert ended.stdout.splitlines()[-1] == f"sweep: runs/{sweep.name}/sweep.html"
-    manifests = [json.loads((sweep / str(n) / "manifest.json").read_text()) for n in range(4)]
-    assert [m["status"] for m in manifests] == ["complete"] * 4
-    assert manifests[0]["overrides"].startswith("match=selective seed=0")
-    assert all((sweep / str(n) / "report.html").exists() for n in range(4))
+    assert [m["status"] for m in manifests(sweep)] == ["complete"] * 4
+    assert manifests(sweep)[0]["overrides"].startswith("match=selective seed=0")
     assert not any("<figure id=" in (sweep / str(n) / "report.html").read_text() for n in range(4))
-    page = next(sweep.glob("*.html")).read_text()
-    values = [m["overrides"].split()[0].partition("=")[2] for m in manifests]
-    assert all(f"<code>{value}</code>" in page for value in values)
+    page = (sweep / "sweep.html").read_text()
+    assert all(f"<code>{value}</code>" in page for value in ("selective", "l2"))
     assert '<th class="text">match</th>' in page
 
 
-def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_cache: Path, tmp_path: Path):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", "seed=0,1,2", *SHORT)
-    ended = omninav("-m", *words, f"cache={shared_cache}")
+def test_a_failing_job_is_named_at_once_and_the_others_finish(swept):
+    ended, sweep = swept(*RAISES, "seed=0,1,2")
     assert ended.returncode == 1
     assert "job 1: stage 'features'" in ended.stderr
     assert "raises at seed 1" in ended.stderr
-    (sweep,) = (tmp_path / "runs").glob("*_sweep")
-    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(3)]
-    assert statuses == ["complete", "failed", "complete"]
-    assert "raises at seed 1" in next(sweep.glob("*.html")).read_text()
+    assert [m["status"] for m in manifests(sweep)] == ["complete", "failed", "complete"]
+    assert "raises at seed 1" in (sweep / "sweep.html").read_text()
     assert "Traceback" in (sweep / "1" / "run.log").read_text()
 
 
 def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
-    omninav, omninav_process, shared_cache: Path, tmp_path: Path
+    omninav, omninav_process, swept, shared_cache: Path, tmp_path: Path
 ):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    words = (
-        "--config-dir",
-        "examples/edges/conf",
-        "hydra/launcher=joblib",
-        "hydra.launcher.n_jobs=2",
-        f"cache={shared_cache}",
-    )
-    ended = omninav_process("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=1", *SHORT)
+    joblib = ("hydra/launcher=joblib", "hydra.launcher.n_jobs=2")
+    ended, sweep = swept(*RAISES, "seed=0,1", *joblib, command=omninav_process)
     assert ended.returncode == 1, ended.stdout + ended.stderr
-    (sweep,) = (tmp_path / "runs").glob("*_sweep")
-    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(2)]
-    assert statuses == ["complete", "failed"]
-    omninav("features=hsv_histogram", "seed=1", *SHORT, f"cache={shared_cache}", check=True)
+    assert [m["status"] for m in manifests(sweep)] == ["complete", "failed"]
+    omninav(*RAISES, "seed=0", f"cache={shared_cache}", check=True)
     same = tmp_path / "runs" / "latest" / "trajectory.tum"
     assert (sweep / "0" / "trajectory.tum").read_bytes() == same.read_bytes()
 
@@ -76,42 +83,24 @@ def test_a_stage_by_a_config_folder(omninav, tmp_path: Path):
     assert "nothing wrong" in omninav("check", *words, check=True).stdout
 
 
-def test_a_stage_by_the_environment_runs_by_name(omninav_process, shared_cache: Path, tmp_path: Path):
-    named = f"features.edges={EDGES / 'omninav_edges.py'}:EdgeHistogram"
-    omninav_process("features=edges", *SHORT, f"cache={shared_cache}", check=True, OMNINAV_STAGES=named)
+def test_a_stage_by_the_environment_runs_by_name(
+    omninav, shared_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("OMNINAV_STAGES", f"features.edges={EDGES / 'omninav_edges.py'}:EdgeHistogram")
+    omninav("features=edges", *SHORT, f"cache={shared_cache}", check=True)
     config = (tmp_path / "runs" / "latest" / "config.yaml").read_text()
     assert "omninav_edges.py:EdgeHistogram" in config
-    listed = omninav_process("stages", "features", check=True, OMNINAV_STAGES=named).stdout
-    row = next(line for line in listed.split("\n") if line.startswith("features.edges"))
-    assert "[environment]" in row
+    assert "[environment]" in row_of_edges(omninav("stages", "features", check=True).stdout)
 
 
-def test_a_stage_of_an_installed_package_by_name(omninav_process, tmp_path: Path):
+def test_a_stage_of_an_installed_package_by_name(omninav, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     place = tmp_path / "site"
-    command = [
-        sys.executable,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "--no-index",
-        "--target",
-        str(place),
-        str(EDGES),
-    ]
-    made = subprocess.run(command, capture_output=True, text=True)
-    if made.returncode != 0:  # no setuptools in this environment: what pip would have laid down, by hand
-        info = place / "omninav_edges-0.1.0.dist-info"
-        info.mkdir(parents=True, exist_ok=True)
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: omninav-edges\nVersion: 0.1.0\n")
-        (info / "entry_points.txt").write_text("[omninav.stages]\nfeatures.edges = omninav_edges:EdgeHistogram\n")
-        (place / "omninav_edges.py").write_text((EDGES / "omninav_edges.py").read_text())
-    listed = omninav_process("stages", "features", check=True, PYTHONPATH=str(place)).stdout
-    row = next(line for line in listed.split("\n") if line.startswith("features.edges"))
-    assert "[installed]" in row
-    assert "nothing wrong" in omninav_process("check", "features=edges", check=True, PYTHONPATH=str(place)).stdout
+    offline = ("--quiet", "--no-deps", "--no-build-isolation", "--no-index")
+    command = [sys.executable, "-m", "pip", "install", *offline, "--target", str(place), str(EDGES)]
+    subprocess.run(command, capture_output=True, check=True)
+    monkeypatch.syspath_prepend(place)
+    assert "[installed]" in row_of_edges(omninav("stages", "features", check=True).stdout)
+    assert "nothing wrong" in omninav("check", "features=edges", check=True).stdout
 
 
 def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -127,18 +116,13 @@ def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path, mon
     assert "No module named 'not_there'" in used.stderr
 
 
-def test_an_optimiser_gets_each_jobs_objective_and_a_failed_one_counts_as_a_failed_trial(
-    omninav, shared_cache: Path, tmp_path: Path
-):
+def test_an_optimiser_gets_each_jobs_objective_and_a_failed_one_counts_as_a_failed_trial(swept):
     pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="pip install 'omninav[optuna]'")
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", *SHORT, f"cache={shared_cache}")
     # The grid's sampler raises where the last of its points fails, and it takes them in any order.
     optuna = ("hydra/sweeper=optuna", "hydra/sweeper/sampler=random", "hydra.sweeper.sampler.seed=1")
-    swept = ("hydra.sweeper.n_trials=4", "seed=choice(0,1)", "nodes.match.headings=choice(18,36)")
-    ended = omninav("-m", *words, *optuna, *swept, "objective=position_error_m.median")
+    choices = ("hydra.sweeper.n_trials=4", "seed=choice(0,1)", "nodes.match.headings=choice(18,36)")
+    ended, sweep = swept(*RAISES, *optuna, *choices, "objective=position_error_m.median")
     failed = re.findall(r"^job \d: stage 'features'", ended.stderr, re.MULTILINE)
-    (sweep,) = (tmp_path / "runs").glob("*_sweep")
     assert f"optimum: runs/{sweep.name}/optimization_results.yaml" in ended.stdout
     found = yaml.safe_load((sweep / "optimization_results.yaml").read_text())
     figures = [json.loads(file.read_text()) for file in sweep.glob("*/metrics.json")]
@@ -148,12 +132,10 @@ def test_an_optimiser_gets_each_jobs_objective_and_a_failed_one_counts_as_a_fail
     assert found["best_params"]["seed"] == 0
 
 
-def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(omninav, shared_cache: Path, tmp_path: Path):
+def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(swept):
     pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="pip install 'omninav[optuna]'")
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", *SHORT, f"cache={shared_cache}")
     optuna = ("hydra/sweeper=optuna", "hydra/sweeper/sampler=grid", "hydra.sweeper.n_trials=1")
-    ended = omninav("-m", *words, *optuna, "seed=choice(1)", "objective=position_error_m.median")
+    ended, _ = swept(*RAISES, *optuna, "seed=choice(1)", "objective=position_error_m.median")
     assert ended.returncode == 1
     assert "every job failed: there is no best one" in ended.stderr
     assert "Traceback" not in ended.stderr
