@@ -15,16 +15,6 @@ def _configured() -> Iterator[None]:
         yield
 
 
-def test_each_word_that_does_not_fit_is_a_problem_and_the_others_are_none():
-    found = invalid_overrides(["sead=3", "match=l2", "nodes.match.headngs=18", "mach=l2"], (), "not used")
-    assert [problem.where for problem in found] == ["sead", "nodes.match.headngs", "mach"], [
-        str(problem) for problem in found
-    ]
-    assert "did you mean 'seed=3'?" in found[0].hint
-    assert "did you mean 'nodes.match.headings=18'?" in found[1].hint
-    assert "did you mean 'match=l2'?" in found[2].hint
-
-
 def test_where_no_word_is_to_blame_hydras_own_message_is_given_in_one_line():
     (problem,) = invalid_overrides(["seed=3"], (), "In 'config': something\n  else\nConfig search path:\n  here")
     assert (problem.where, problem.what) == ("command line", "In 'config': something else")

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from conftest import DATA, ROOT, needs_data
+from conftest import DATA, DRIVE, ROOT, TOUR, needs_data
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.files import write_json
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.opening import open_recording
 
+LOGS = (f"tour={TOUR}", f"log={DRIVE}")
 MARK = "open('EXECUTED', 'w')\n"
 STAGE = """
 from omninav.pipeline import Context, Outputs, Stage
@@ -119,13 +120,11 @@ def hostile_folder() -> None:
         Path(f"{name}.py").write_text(MARK)
 
 
-@pytest.mark.parametrize("words", [("check",), ("stages", "match")])
-def test_a_folder_of_data_runs_no_code(words: tuple[str, ...]) -> None:
+def test_a_folder_of_data_runs_no_code() -> None:
     hostile_folder()
-    start = (
-        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from omninav.pipeline.cli.main import main; main({words!r})"
-    )
-    subprocess.run([sys.executable, "-P", "-c", start], check=True, capture_output=True, timeout=120)
+    start = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from omninav.pipeline.cli.main import main"
+    run = "main(('check',)); main(('stages', 'match'))"
+    subprocess.run([sys.executable, "-P", "-c", f"{start}; {run}"], check=True, capture_output=True, timeout=120)
     assert not Path("EXECUTED").exists()
 
 
@@ -165,10 +164,7 @@ def test_resume_runs_only_stages_that_are_listed_or_typed_again(
 
 def test_a_program_that_a_folder_names_is_run_only_where_it_is_typed_again(capsys: pytest.CaptureFixture[str]) -> None:
     program = f"{sys.executable} -c \"open('EXECUTED', 'w'); raise SystemExit('gave up')\""
-    recordings = [
-        f"{name}={ROOT / 'tests' / 'data' / file}.mcap" for name, file in (("tour", "tour"), ("log", "drive"))
-    ]
-    words = ["variant=peer", f"command={quoted(program)}", *recordings, "nodes.source.stride=8", "plots=none"]
+    words = ["variant=peer", f"command={quoted(program)}", *LOGS, "nodes.source.stride=8", "plots=none"]
     assert main(words) == 2
     again = Path("runs/latest").resolve()
     for typed in ((), ("python",), (program,)):
@@ -183,10 +179,7 @@ def test_a_program_that_a_folder_names_is_run_only_where_it_is_typed_again(capsy
 
 def test_neither_an_experiments_folder_nor_a_report_runs_a_program_unasked(capsys: pytest.CaptureFixture[str]) -> None:
     program = f"{sys.executable} -c \"import sys; open('EXECUTED', 'w'); open(sys.argv[1] + '/poses.csv', 'w')\""
-    recordings = [
-        f"{name}={ROOT / 'tests' / 'data' / file}.mcap" for name, file in (("tour", "tour"), ("log", "drive"))
-    ]
-    words = [f"command={quoted(program)}", *recordings, "nodes.source.stride=8", "cache=null"]
+    words = [f"command={quoted(program)}", *LOGS, "nodes.source.stride=8", "cache=null"]
     Path("conf/experiment").mkdir(parents=True)
     experiment = {"name": "foreign", "title": "Foreign", "about": "Foreign.", "variant": "peer", "repetitions": 1}
     experiment |= {
@@ -318,16 +311,15 @@ def test_the_shared_examples_are_refused_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     hostile = DATA / "hostile"
-    drive = ROOT / "tests" / "data" / "drive.mcap"
     assert main(["check", f"--config-dir={hostile / 'config_with_callback'}", "match=mine"]) == 2
     capsys.readouterr()
     for camera in sorted(hostile.glob("camera_*.yaml")):
-        assert main(["check", f"log={drive}", f"tour={drive}", f"camera={camera}"]) == 2
+        assert main(["check", f"log={DRIVE}", f"tour={DRIVE}", f"camera={camera}"]) == 2
         said = capsys.readouterr().err
         assert camera.name in said
         assert len(said.splitlines()) == 1
     for grid in sorted(hostile.glob("grid_*")):
-        words = ("variant=retrieval_mcl", f"log={drive}", f"tour={drive}", f"grid={grid}")
+        words = ("variant=retrieval_mcl", f"log={DRIVE}", f"tour={DRIVE}", f"grid={grid}")
         assert main(["check", *words]) == 2
         said = capsys.readouterr().err
         assert f"{grid.name}/map.yaml" in said
