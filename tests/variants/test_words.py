@@ -4,34 +4,40 @@ import json
 from pathlib import Path
 
 import pytest
-from background_runs import assert_same_bytes, finished, killed_and_resumed
-from conftest import DRIVE, GRID, TOUR
+from background_runs import assert_same_bytes, finished, whole_and_resumed
+from conftest import DRIVE, TOUR
 
 import omninav
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.run.plan import plan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
 
 FOUND = ("candidates=words", f"log={DRIVE}", "nodes.candidates.compare_all_up_to=0", "plots=none")
 MADE = ("variant=omniview_mcl", *FOUND, f"tour={TOUR}", "nodes.source.stop=12")
-LOCALISERS = {
-    "omninav": "nodes.mapping.distance_m=0.6",
-    "omniview_mcl": "nodes.mapping.distance_m=0.6",
-    "omniview_mcl_as_printed": "nodes.mapping.distance_m=0.6",
-    "plain_matching": "nodes.mapping.distance_m=0.6",
-    "retrieval_mcl": "nodes.mapping.min_distance_m=0.6",
+DISTANCES = {
+    "omninav": "distance_m",
+    "omniview_mcl": "distance_m",
+    "omniview_mcl_as_printed": "distance_m",
+    "plain_matching": "distance_m",
+    "retrieval_mcl": "min_distance_m",
 }
-"""What localises in a map of references, and how the map of each is made with more or fewer references."""
+"""What localises in a map of references, and what the distance between its references is called."""
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> Path:
-    return finished(tmp_path_factory.mktemp("words"), *MADE, f"cache={shared_cache}")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return whole_and_resumed(tmp_path_factory.mktemp("words"), *MADE, "cache=null", ticks=10)
 
 
-def test_killed_while_learning_it_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -> None:
-    run = killed_and_resumed(tmp_path, *MADE, "checkpoint_s=0.1", "cache=null", ticks=10)
-    assert_same_bytes(run, made, "map.omap", "words.omap")
+@pytest.fixture
+def made(runs: tuple[Path, Path]) -> Path:
+    return runs[0]
+
+
+def test_killed_while_learning_it_goes_on_to_the_same_bytes(runs: tuple[Path, Path]) -> None:
+    assert_same_bytes(*runs, "map.omap", "words.omap")
 
 
 def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
@@ -41,23 +47,30 @@ def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
     assert json.loads((run / "metrics.json").read_text())["frames"] == 6
 
 
-@pytest.mark.parametrize("variant", LOCALISERS)
-def test_words_are_of_the_map_that_is_used(variant: str, tmp_path: Path, shared_cache: Path) -> None:
-    overrides = {"its own parameter": (f"+artifacts.map.{LOCALISERS[variant]}",)}
-    if variant == "omniview_mcl":
-        overrides |= {
-            "another stage's": (
-                "artifacts.map.choices.mapping=image_database",
-                "+artifacts.map.nodes.mapping.min_distance_m=0.3",
-            ),
-            "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
-        }
-    settings = {"tour": TOUR, "grid": GRID} if variant == "retrieval_mcl" else {"tour": TOUR}
+@pytest.mark.parametrize("variant", DISTANCES)
+def test_what_is_typed_for_a_map_is_of_its_words_too(variant: str) -> None:
+    typed = f"+artifacts.map.nodes.mapping.{DISTANCES[variant]}=0.7"
+    with composed([f"variant={variant}", "candidates=words", typed]) as config:
+        made = {artifact.name: artifact.graph for artifact in plan(complete(config)).artifacts}
+    for name in ("map", "words"):
+        graph = made[name]
+        assert graph is not None
+        assert getattr(graph.nodes["mapping"].stage, DISTANCES[variant]) == 0.7
+
+
+def test_words_are_of_the_map_that_is_used(tmp_path: Path, shared_cache: Path) -> None:
+    overrides = {
+        "its own parameter": ("+artifacts.map.nodes.mapping.distance_m=0.6",),
+        "another stage's": (
+            "artifacts.map.choices.mapping=image_database",
+            "+artifacts.map.nodes.mapping.min_distance_m=0.3",
+        ),
+        "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
+    }
     sizes = set()
     for name, words in overrides.items():
-        landmarks = ["landmarks=none"] if variant == "omninav" else []  # the others have none
-        few = ("cuts=[[3,50]]", *landmarks, f"cache={shared_cache}")
-        run = omninav.run(variant, *FOUND, *few, *words, folder=tmp_path / name, progress=False, **settings)
+        few = ("cuts=[[3,50]]", f"cache={shared_cache}")
+        run = omninav.run("omniview_mcl", *FOUND, *few, *words, tour=TOUR, folder=tmp_path / name, progress=False)
         map, learned = (read_artifact(run.folder / f"{artifact}.omap") for artifact in ("map", "words"))
         assert isinstance(map, ReferenceGraph)
         assert isinstance(learned, VisualWords)
