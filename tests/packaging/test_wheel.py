@@ -96,26 +96,15 @@ def test_an_installed_wheel_makes_a_map_and_localises_in_it_in_an_empty_folder(w
     venv.create(tmp_path / "environment", with_pip=False)
     (tmp_path / "empty").mkdir()
     (installed,) = (tmp_path / "environment").glob("lib/python*/site-packages")
-    call(
-        sys.executable,
-        "-m",
-        "pip",
-        "install",
-        "-q",
-        "--no-deps",
-        "--no-index",
-        "--no-compile",
-        "--target",
-        installed,
-        wheel,
-        cwd=tmp_path,
-    )
+    offline = ("--no-deps", "--no-index", "--no-compile")
+    call(sys.executable, "-m", "pip", "install", "-q", *offline, "--target", installed, wheel, cwd=tmp_path)
     dependencies = Path(importlib.metadata.distribution("numpy").locate_file(""))
     (installed / "dependencies.pth").write_text(f"{dependencies}\n")
     python, empty = tmp_path / "environment" / "bin" / "python", tmp_path / "empty"
     where = call(python, "-c", "import omninav; print(omninav.__file__)", cwd=empty, PYTHONPATH="").strip()
     assert Path(where).is_relative_to(installed)
-    tour, drive = (ROOT / "tests" / "data" / f"{name}.mcap" for name in ("tour", "drive"))
-    call(python, "-m", "omninav", "variant=plain_matching", f"tour={tour}", f"log={drive}", cwd=empty, PYTHONPATH="")
+    logs = (f"{word}={ROOT / 'tests' / 'data' / file}.mcap" for word, file in (("tour", "tour"), ("log", "drive")))
+    words = ("variant=plain_matching", *logs, "nodes.source.stop=5")
+    call(python, "-m", "omninav", *words, cwd=empty, PYTHONPATH="")
     assert (empty / "runs" / "latest" / "report.html").exists()
     assert [path.name for path in empty.iterdir()] == ["runs"]
