@@ -29,12 +29,13 @@ def test_a_walk_becomes_a_map_and_another_is_localised_in_it_without_odometry(
 ) -> None:
     images_alone(TOUR, tmp_path / "tour")
     truth = images_alone(DRIVE, tmp_path / "drive")
-    line = [f"tour={tmp_path / 'tour'}", f"log={tmp_path / 'drive'}", f"camera={TOUR.with_name('camera.yaml')}"]
+    line = ["+artifacts.map.nodes.source.stop=37", "nodes.source.stop=26"]  # the first halves
+    line += [f"tour={tmp_path / 'tour'}", f"log={tmp_path / 'drive'}", f"camera={TOUR.with_name('camera.yaml')}"]
     assert main([*line, "plots=none", f"cache={shared_cache}", f"runs={tmp_path / 'runs'}"]) == 0
     run = tmp_path / "runs" / "latest"
     for trajectory in ("trajectory.tum", "trajectory_smoothed.tum"):
         rows = np.loadtxt(run / trajectory)
-        found, true = rows[:, 1] + 1j * rows[:, 2], truth[:, 0] + 1j * truth[:, 1]
+        found, true = rows[:, 1] + 1j * rows[:, 2], truth[: len(rows), 0] + 1j * truth[: len(rows), 1]
         found, true = found - found.mean(), true - true.mean()
         errors = np.abs((found.conj() * true).sum() / (np.abs(found) ** 2).sum() * found - true)
         assert np.sqrt((errors**2).mean()) < 0.1, trajectory  # images of 280 x 210 pixels
