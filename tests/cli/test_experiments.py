@@ -324,7 +324,7 @@ def test_a_closed_loop_drives_for_itself(omninav, tmp_path: Path):
 
 
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
-    process = start(dice.place, *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed")
+    process = start(dice.place, *MINE, TT1, "nodes.noisy.wait_s=0.01", "runs=killed")
     folder = dice.place / "killed/dice_full"
     while len(results(folder)) < 5:
         assert process.poll() is None
@@ -356,25 +356,19 @@ def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place
 
 
 def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: Path):
-    wrong = EXPERIMENT.replace("below: {method: loaded}", "below: {method: loadad}").replace(
-        "columns: tour", "columns: tours"
-    )
-    (place / "mine/experiment/dice.yaml").write_text(wrong)
-    ended = omninav(*MINE)
-    assert ended.returncode == 2
-    assert "there is no 'loadad'" in ended.stderr
-    assert "did you mean 'loaded'?" in ended.stderr
-    assert "there is no 'tours'" in ended.stderr
-    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("bias=2.0", "biass=2.0"))
-    ended = omninav(*MINE)
-    assert ended.returncode == 2
-    assert "biass" in ended.stderr
-    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("scale: 100.0", "stages: [nosy]"))
-    ended = omninav(*MINE)
-    assert ended.returncode == 2
-    assert "no condition has a stage 'nosy'" in ended.stderr
-    assert "did you mean 'noisy'?" in ended.stderr
-    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT + "  slow: [1\n")
+    ours = place / "mine/experiment/dice.yaml"
+    two = EXPERIMENT.replace("below: {method: loaded}", "below: {method: loadad}")
+    for wrong, *said in (
+        (two.replace("columns: tour", "columns: tours"), "no 'loadad'", "did you mean 'loaded'?", "no 'tours'"),
+        (EXPERIMENT.replace("bias=2.0", "biass=2.0"), "biass"),
+        (EXPERIMENT.replace("scale: 100.0", "stages: [nosy]"), "no condition has a stage 'nosy'", "mean 'noisy'?"),
+    ):
+        ours.write_text(wrong)
+        ended = omninav(*MINE)
+        assert ended.returncode == 2
+        for words in said:
+            assert words in ended.stderr
+    ours.write_text(EXPERIMENT + "  slow: [1\n")
     ended = omninav(*MINE)
     assert ended.returncode == 2
     assert re.fullmatch(r"\S+/mine/experiment/dice.yaml, line \d+, column \d+: this is no YAML: .*\n", ended.stderr)
