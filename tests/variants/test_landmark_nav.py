@@ -5,22 +5,25 @@ import math
 from pathlib import Path
 
 import pytest
-from background_runs import assert_same_bytes, finished, killed_and_resumed
+from background_runs import assert_same_bytes, whole_and_resumed
 from conftest import TOUR
 from golden_figures import DATA, SMALL_CAMERA, write_goal
 
-from omninav.pipeline.graph.ground_truth import truth_in_the_loop
 from omninav.pipeline.mcap.reader import LogReader
 
 WORDS = ("variant=landmark_nav", "world=home_store_demo", *SMALL_CAMERA, f"tour={TOUR}", "goal=goal.png")
-LIMITS = ("nodes.source.seconds=40", "checkpoint_s=0.5")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> Path:
+def runs(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> tuple[Path, Path]:
     place = tmp_path_factory.mktemp("landmarks")
     write_goal(place)
-    return finished(place, *WORDS, *LIMITS, f"cache={shared_cache}")
+    return whole_and_resumed(place, *WORDS, "nodes.source.seconds=40", f"cache={shared_cache}", ticks=40)
+
+
+@pytest.fixture
+def whole(runs: tuple[Path, Path]) -> Path:
+    return runs[0]
 
 
 def test_a_robot_that_does_not_know_where_it_is_stops_where_the_image_was_taken(whole: Path):
@@ -33,27 +36,14 @@ def test_a_robot_that_does_not_know_where_it_is_stops_where_the_image_was_taken(
     assert math.dist((truth[-1].x, truth[-1].y), write_goal(whole)) < 0.05  # and not only where it took the goal to be
 
 
-def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path, shared_cache: Path):
-    write_goal(tmp_path)
-    run = killed_and_resumed(tmp_path, *WORDS, *LIMITS, f"cache={shared_cache}", ticks=40)
-    assert_same_bytes(run, whole, "metrics.json", "result.mcap", "trajectory.tum")
+def test_killed_on_its_way_it_goes_on_to_the_same_bytes(runs: tuple[Path, Path]):
+    assert_same_bytes(*runs, "metrics.json", "result.mcap", "trajectory.tum")
 
 
 def test_a_name_is_no_goal_since_the_map_has_no_places(omninav):
     ended = omninav("check", "variant=landmark_nav", "world=home_store_demo", "goal=kitchen")
     assert ended.returncode != 0
     assert "goal: kitchen is no image, and the map has no places; type goal=IMAGE.png" in ended.stderr
-
-
-def test_nothing_that_steers_the_robot_knows_the_truth(tmp_path: Path, monkeypatch):
-    from omninav.pipeline.cli.composition import complete, composed
-    from omninav.pipeline.run.plan import plan
-
-    write_goal(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    with composed([*WORDS]) as config:
-        graph = plan(complete(config)).graph
-    assert list(truth_in_the_loop(graph)) == []
 
 
 def test_a_robot_that_runs_now_takes_the_map_and_the_goal(omninav, whole: Path, tmp_path: Path):

@@ -73,7 +73,6 @@ def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav
 @pytest.mark.parametrize(
     ("tour", "log", "grid", "stride"),
     [
-        pytest.param(TOUR, DRIVE, GRID, 1, id="a store and its grid"),
         pytest.param(TOUR, DRIVE, "from_tour", 1, id="a store and a stand-in"),
         pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", HOUSE / "map.yaml", 2, id="a house", marks=needs_data),
     ],
