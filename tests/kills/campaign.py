@@ -29,7 +29,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1]), str(HERE.parent / "variants")]
 
 from disturbances import KINDS, Ended, Workplace  # noqa: E402
-from golden_figures import DRIVE, RUNS, TOUR  # noqa: E402
+from golden_figures import DRIVE, RUNS, TOUR, started_by, write_goal  # noqa: E402
 
 TIMES = ("report.html", "timing.json", "config.yaml", "sweep.html", "manifest.json", "run.log", "multirun.yaml")
 """Files that hold times or places."""
@@ -74,11 +74,11 @@ class Case:
 def cases() -> Iterator[Case]:
     """All that is disturbed."""
     kept = ("runs=runs", "cache=cache", "seed=0", "checkpoint_s=0.05")
-    for name, words in sorted(RUNS.items()):
+    for name in sorted(RUNS):
         if name == "simulate":
-            yield Case(name, ("simulate", *words), resumes=False)
+            yield Case(name, started_by(name), resumes=False)
         else:
-            yield Case(name, (f"variant={name}", *words, *kept))
+            yield Case(name, (*started_by(name), *kept))
     swept = ("variant=plain_matching", TOUR, DRIVE, "nodes.source.stride=3", *kept[1:2], "checkpoint_s=0.05")
     yield Case("sweep", ("-m", *swept, "seed=0,1", "hydra.sweep.dir=runs/swept"), resumes=False)
     yield Case("experiment", ("--config-dir", "mine", "+experiment=matching", *kept[:2]), resumes=False)
@@ -143,6 +143,7 @@ class Campaign:
         shutil.rmtree(folder, ignore_errors=True)
         (folder / "mine" / "experiment").mkdir(parents=True)
         (folder / "mine" / "experiment" / "matching.yaml").write_text(EXPERIMENT)
+        write_goal(folder)
         return Workplace(folder)
 
     def begun(self, workplace: Workplace) -> bool:

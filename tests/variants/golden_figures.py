@@ -18,7 +18,7 @@ GOLDEN = Path(__file__).with_name("golden.json")
 TOUR, DRIVE = f"tour={DATA / 'tour.mcap'}", f"log={DATA / 'drive.mcap'}"
 MAPPED = f"log={DATA / 'tour.mcap'}"
 BOTH = f"log=[{DATA / 'tour.mcap'},{DATA / 'drive.mcap'}]"
-EVERY_SECOND = "nodes.source.stride=2"
+EVERY_SECOND, EVERY_FOURTH = "nodes.source.stride=2", "nodes.source.stride=4"
 SMALL_CAMERA = (
     "world.timing.images=1",
     "world.camera.image={width: 280, height: 210}",
@@ -53,8 +53,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "peer": (TOUR, DRIVE, f'command="python {PEERS / "nearest_image.py"}"'),
     "plain_matching": (TOUR, DRIVE),
     "retrieval_mcl": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
-    "retrieval_mcl_as_printed": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
-    "retrieval_mcl_as_printed_map": (MAPPED, EVERY_SECOND),
+    "retrieval_mcl_as_printed": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_FOURTH),
+    "retrieval_mcl_as_printed_map": (MAPPED, EVERY_FOURTH),
     "retrieval_mcl_map": (MAPPED, EVERY_SECOND),
     "simulate": (
         "world=home_store_demo",
@@ -79,13 +79,19 @@ RUNS: dict[str, tuple[str, ...]] = {
 """Variant -> what is typed after variant=NAME; NAME_map -> … after `map variant=NAME`."""
 
 
+def started_by(variant: str) -> tuple[str, ...]:
+    """What is typed to run a variant, or the making of its map."""
+    if variant == "simulate":
+        return ("simulate", *RUNS[variant])
+    of = variant.removesuffix("_map")
+    return (*(["map"] if of != variant else []), f"variant={of}", *RUNS[variant])
+
+
 def measured(variant: str, place: Path, cache: Path) -> dict[str, Any]:
     """The figures of a variant that was run in this folder."""
     place.mkdir(parents=True, exist_ok=True)
     kept = ("runs=runs", f"cache={cache}", "seed=0")
-    of = variant.removesuffix("_map")
-    named = ("map", f"variant={of}") if of != variant else (f"variant={variant}",)
-    words = ("simulate", *RUNS[variant]) if variant == "simulate" else (*named, *RUNS[variant], *kept)
+    words = started_by(variant) if variant == "simulate" else (*started_by(variant), *kept)
     write_goal(place)
     with chdir(place):
         code = main(words)
