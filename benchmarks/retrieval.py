@@ -74,7 +74,7 @@ def _query() -> list[Row]:
     rng, ctx = np.random.default_rng(1), Context("query")
     window = Windows(a_picture(240, 320)[None], np.zeros(1), 1.0)
     panorama = Panorama(a_picture(80, 360))
-    stage, match = HaarIntegral(), Retrieval()
+    stage, of_windows, of_panoramas = HaarIntegral(), Retrieval(), Retrieval()  # each is calibrated for one map
     sampled = HaarIntegral(integration="monte_carlo")
     maps = {}
     for name, picture in (("window", window), ("panorama", panorama)):
@@ -86,9 +86,9 @@ def _query() -> list[Row]:
     dense = SegmentHistograms(histograms(rng, 8, 125))
     taken = medians(
         {
-            "window": lambda: match.step(ctx, stage.step(ctx, window).features, maps["window"]),
-            "panorama": lambda: match.step(ctx, stage.step(ctx, panorama).features, maps["panorama"]),
-            "dense": lambda: match.step(ctx, dense, maps["panorama"]),
+            "window": lambda: of_windows.step(ctx, stage.step(ctx, window).features, maps["window"]),
+            "panorama": lambda: of_panoramas.step(ctx, stage.step(ctx, panorama).features, maps["panorama"]),
+            "dense": lambda: of_panoramas.step(ctx, dense, maps["panorama"]),
             "features": lambda: stage.step(ctx, window),
             "sampled": lambda: sampled.step(ctx, window),
         },
