@@ -25,11 +25,6 @@ NEIGHBOURS = 12
 
 
 def rows() -> list[Row]:
-    """Every figure of this part."""
-    return [*step_rows()]
-
-
-def step_rows() -> list[Row]:
     """A step at 2000 references, and how much longer it takes at 4000 (linear at worst)."""
     found = []
     for variant in KINDS:

@@ -15,7 +15,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 
-from .table import Row, medians
+from .table import Row, medians, milliseconds
 
 NUMBER = 5000
 STEPS = 20
@@ -58,18 +58,12 @@ def _step() -> list[Row]:
         functions["particles"] = peer
     taken = medians(functions, rounds=40)
     limit = {"limit": 1.0, "of_peer": False}
-    found = [Row(f"filter step, {NUMBER} particles: motion, weights, resampling", taken["ours"] * 1e3, "ms", **limit)]
+    found = [milliseconds(f"filter step, {NUMBER} particles: motion, weights, resampling", taken["ours"], **limit)]
     if peer is not None:
         theirs = taken["particles"] / STEPS
         found.append(
-            Row(
-                "the same, beside",
-                taken["ours"] * 1e3,
-                "ms",
-                "particles.SMC, 10 range landmarks",
-                theirs * 1e3,
-                limit=1.0,
-                of_peer=True,
+            milliseconds(
+                "the same, beside", taken["ours"], "particles.SMC, 10 range landmarks", theirs, limit=1.0, of_peer=True
             )
         )
     return found
@@ -124,7 +118,7 @@ def _resampling() -> list[Row]:
     taken = medians(functions, rounds=60)
     what = f"systematic resampling of {NUMBER}"
     return [
-        Row(what, taken["ours"] * 1e3, "ms", name, taken[name] * 1e3, limit=1.0, of_peer=True)
+        milliseconds(what, taken["ours"], name, taken[name], limit=1.0, of_peer=True)
         for name in ("particles", "filterpy")
         if name in taken
     ]
@@ -133,4 +127,4 @@ def _resampling() -> list[Row]:
 def _estimate() -> Row:
     belief = _particles()
     taken = medians({"ours": belief.estimate}, rounds=40)
-    return Row(f"estimate of {NUMBER} particles (heaviest mode, covariance)", taken["ours"] * 1e3, "ms")
+    return milliseconds(f"estimate of {NUMBER} particles (heaviest mode, covariance)", taken["ours"])

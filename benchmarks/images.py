@@ -15,19 +15,14 @@ from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Image
 from omninav.stages.values.maps import ReferenceGraph
 
-from .table import Row, medians
+from .table import Row, medians, milliseconds
 
 CAMERA = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
 
 
 def rows() -> list[Row]:
-    """Medians on one OpenCV thread, so that ratios hold on any machine."""
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        return [*_unwarp(), _features(), *_match()]
-    finally:
-        cv2.setNumThreads(threads)
+    """Unwarping, features and matches."""
+    return [*_unwarp(), _features(), *_match()]
 
 
 def _unwarp() -> list[Row]:
@@ -50,12 +45,11 @@ def _unwarp() -> list[Row]:
     }
     taken = medians(functions, rounds=200)
     return [
-        Row(
+        milliseconds(
             "unwarp 640x480 -> 360x80",
-            taken["ours"] * 1e3,
-            "ms",
+            taken["ours"],
             "cv2.remap alone, fixed point",
-            taken["remap"] * 1e3,
+            taken["remap"],
             limit=1.3,
             of_peer=True,
         )
@@ -78,13 +72,7 @@ def _features() -> Row:
             cv2.calcHist([part], [2], None, [4], [0, 256])
 
     taken = medians({"ours": lambda: stage.step(ctx, panorama), "peer": peer}, rounds=200)
-    return Row(
-        "HSV histograms, 10 segments of 360x80",
-        taken["ours"] * 1e3,
-        "ms",
-        "cv2.calcHist in a loop",
-        taken["peer"] * 1e3,
-    )
+    return milliseconds("HSV histograms, 10 segments of 360x80", taken["ours"], "cv2.calcHist in a loop", taken["peer"])
 
 
 def histograms(rng: np.random.Generator, *shape: int) -> np.ndarray:
@@ -110,7 +98,7 @@ def _match() -> list[Row]:
     taken = medians(functions, rounds=15)
     what = "one view against 3500 references at 36 headings"
     return [
-        Row(f"{what}, cold, 36 segments", taken["cold"] * 1e3, "ms", limit=50.0),
-        Row(f"{what}, cold, 10 segments", taken["cold ten"] * 1e3, "ms", limit=50.0),
-        Row(f"{what}, tracking", taken["tracking"] * 1e3, "ms", limit=10.0),
+        milliseconds(f"{what}, cold, 36 segments", taken["cold"], limit=50.0),
+        milliseconds(f"{what}, cold, 10 segments", taken["cold ten"], limit=50.0),
+        milliseconds(f"{what}, tracking", taken["tracking"], limit=10.0),
     ]

@@ -13,7 +13,7 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours
 
-from .table import Row, medians
+from .table import Row, medians, milliseconds
 
 PARTICLES, COMPONENTS = 5000, 200
 VIEWS, PLACES, NEAR, BELIEVED = 2000, 4000, 50, 40
@@ -53,7 +53,7 @@ def _density() -> Row:
     taken = medians({"ours": ours, "scipy": scipys}, rounds=9)
     what = f"density of {PARTICLES} particles under {COMPONENTS} Gaussians"
     peer = "scipy multivariate_normal"
-    return Row(what, taken["ours"] * 1e3, "ms", peer, taken["scipy"] * 1e3, limit=1.0, of_peer=True)
+    return milliseconds(what, taken["ours"], peer, taken["scipy"], limit=1.0, of_peer=True)
 
 
 def _step() -> list[Row]:
@@ -83,18 +83,17 @@ def _step() -> list[Row]:
     )
     sizes = f"{BELIEVED} x {len(hypothesis)}"
     return [
-        Row(f"mixture step: motion, superposition, intersection; {VIEWS} views", taken["step"] * 1e3, "ms", limit=5.0),
-        Row(f"covariance intersection {sizes}, merged", taken["intersection"] * 1e3, "ms", limit=5.0),
-        Row(
+        milliseconds(f"mixture step: motion, superposition, intersection; {VIEWS} views", taken["step"], limit=5.0),
+        milliseconds(f"covariance intersection {sizes}, merged", taken["intersection"], limit=5.0),
+        milliseconds(
             f"covariance intersection {sizes}, pairs alone",
-            taken["pairs"] * 1e3,
-            "ms",
+            taken["pairs"],
             "numpy, pair by pair",
-            taken["plainly"] * 1e3,
+            taken["plainly"],
             limit=0.1,
             of_peer=True,
         ),
-        Row(f"merging {len(crowded[2])} Gaussians, the closest pair first", taken["merging"] * 1e3, "ms"),
+        milliseconds(f"merging {len(crowded[2])} Gaussians, the closest pair first", taken["merging"]),
     ]
 
 

@@ -25,9 +25,12 @@ PARTS = (
 
 
 def main() -> int:
-    """Run all parts, or those that are named, and print one table."""
+    """Run all parts, or those that are named, on one thread of OpenCV's, and print one table."""
+    import cv2
+
     from benchmarks.table import Row, printed
 
+    cv2.setNumThreads(1)  # so that ratios hold on any machine
     rows: list[Row] = []
     for part in sys.argv[1:] or PARTS:
         print(f"measuring {part} …", file=sys.stderr)

@@ -4,6 +4,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,12 @@ class Row:
         if self.limit is None or measured is None:
             return None
         return measured >= self.limit if self.higher_is_better else measured <= self.limit
+
+
+def milliseconds(what: str, seconds: float, peer: str = "", peer_seconds: float | None = None, **limits: Any) -> Row:
+    """A row in milliseconds of times in seconds."""
+    theirs = None if peer_seconds is None else 1e3 * peer_seconds
+    return Row(what, 1e3 * seconds, "ms", peer, theirs, **limits)
 
 
 def medians(functions: dict[str, Callable[[], object]], rounds: int = 30, inner: int = 1) -> dict[str, float]:

@@ -16,7 +16,7 @@ from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
-from .table import Row, medians
+from .table import Row, medians, milliseconds
 
 Array = npt.NDArray[np.float64]
 
@@ -81,6 +81,6 @@ def _of(
         Row("the same, stored", areas.nbytes / 1e6, "MB", limit=2.0),
         Row(f"lists of the views within {CUTOFF_SIGMAS * near:g} m of each cell", listing, "s", limit=5.0),
         Row("the same, in memory", lists.items.nbytes / 1e6, "MB"),
-        Row(f"weights of {SAMPLES} samples, views near them", weights["near"] * 1e3, "ms", limit=limit),
-        Row("the same, all views in sight (the paper's)", weights["all"] * 1e3, "ms", limit=5.0),
+        milliseconds(f"weights of {SAMPLES} samples, views near them", weights["near"], limit=limit),
+        milliseconds("the same, all views in sight (the paper's)", weights["all"], limit=5.0),
     ]
