@@ -13,7 +13,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 from omninav.pipeline.cli.main import main
-from omninav.pipeline.engine.codec import decode, unseal
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.graph.registry import built_in
 
@@ -53,30 +52,12 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path, ticks: int = 0) -> None:
-    """Returns once a run in that folder could be resumed after that many ticks of a graph, or is over."""
+def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path) -> None:
+    """Returns once a run in that folder could be resumed, or is over."""
     # Path.glob raises where a folder is renamed meanwhile, as that of a run that ends is.
     there = f"{place}/runs/*/checkpoints/**/checkpoint"
-    while process.poll() is None and not any(
-        _ticks(Path(found)) >= ticks for found in glob.iglob(there, recursive=True, include_hidden=True)
-    ):
+    while process.poll() is None and not any(glob.iglob(there, recursive=True, include_hidden=True)):
         time.sleep(0.02)
-
-
-def _ticks(checkpoint: Path) -> int:
-    try:
-        return int(decode(unseal(checkpoint.read_bytes(), ""))["ticks"])
-    except FileNotFoundError:
-        return -1
-
-
-def killed_and_resumed(place: Path, *words: str, ticks: int) -> Path:
-    """The folder of a run that was killed when its checkpoint had that many ticks, and resumed."""
-    process = start(place, *words)
-    wait_for_checkpoint(process, place, ticks)
-    assert process.poll() is None, "it was over before it could be killed"
-    kill(process)
-    return finished(place, "resume", "runs/latest")
 
 
 def whole_and_resumed(place: Path, *words: str, ticks: int) -> tuple[Path, Path]:
