@@ -1,17 +1,21 @@
 import numpy as np
 import pytest
+from made_beliefs import along_x, even, scattered_around
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
-from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Likelihood, Particles
-from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
+
+THERE = even(np.full((50, 3), 77.0))
+"""What is proposed, far from all that is believed."""
 
 
 def belief(number: int = 1000, spread: float = 1.0) -> Particles:
-    return Particles(np.random.default_rng(0).normal(0, spread, (number, 3)), np.full(number, 1 / number))
+    return scattered_around(0.0, spread, number)
+
+
+def share_there(belief: Particles) -> float:
+    return float(belief.weights[belief.poses[:, 0] == 77.0].sum())
 
 
 def fuse(
@@ -52,48 +56,36 @@ def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> Non
     assert ctx.counts["belief_without_support"] == 1
 
 
-def share_of_proposals(anywhere: float, believed: float) -> float:
-    proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
+@pytest.mark.parametrize(("anywhere", "believed"), [(1.0, 1.0), (1.0, 0.01), (0.001, 1.0)])
+def test_a_kidnapped_robot_is_where_the_evidence_says(anywhere: float, believed: float) -> None:
     # A tenth of the particles explain the view, so that resampling is due.
     values = np.where(np.arange(10_000) % 10 == 0, believed, 0.0)
     stage = ImportanceResampling(number=10_000, kidnapping_probability=0.01)
-    out = fuse(stage, belief(10_000), values, anywhere=anywhere, proposals=proposals)
+    out = fuse(stage, belief(10_000), values, anywhere=anywhere, proposals=THERE)
     assert out.weights.sum() == pytest.approx(1.0)
-    return float(out.weights[out.poses[:, 0] == 77.0].sum())
-
-
-def test_a_kidnapped_robot_is_where_the_evidence_says() -> None:
     # Bayes by hand: 0.01 x anywhere against 0.99 x the mean likelihood of the belief (a tenth of `believed`).
-    for anywhere, believed in ((1.0, 1.0), (1.0, 0.01), (0.001, 1.0)):
-        expected = 0.01 * anywhere / (0.01 * anywhere + 0.99 * 0.1 * believed)
-        assert share_of_proposals(anywhere, believed) == pytest.approx(expected, rel=1e-6)
+    expected = 0.01 * anywhere / (0.01 * anywhere + 0.99 * 0.1 * believed)
+    assert share_there(out) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> None:
     # All particles alike unlikely: nothing would have to be resampled, were it not for the proposals' share.
-    proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
-    stage = ImportanceResampling(number=5000, kidnapping_probability=1e-7)
     for believed, share in ((1e-3, 0.0), (1e-9, 0.1 / 1.1), (1e-12, 100 / 101)):
-        out = fuse(stage, belief(5000), np.full(5000, believed), anywhere=1e-3, proposals=proposals)
-        assert out.weights[out.poses[:, 0] == 77.0].sum() == pytest.approx(share, abs=1e-4)
+        out = fuse(ImportanceResampling(), belief(5000), np.full(5000, believed), anywhere=1e-3, proposals=THERE)
+        assert share_there(out) == pytest.approx(share, abs=1e-4)
 
 
 def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
     # Each picture speaks 10:1 against the belief, for the proposals of the first; later ones propose nothing of worth.
     # Bayes by hand, with a prior of 1e-6 for "put there at the first picture": odds 1e-6 x 10^n after n more pictures.
-    stage, ctx = (
-        ImportanceResampling(number=5000, kidnapping_probability=1e-6),
-        Context("fusion", np.random.default_rng(0)),
-    )
-    there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
-    elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
-    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
+    stage, ctx = ImportanceResampling(kidnapping_probability=1e-6), Context("fusion", np.random.default_rng(0))
+    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), THERE).belief
     assert now.recovery_particles == 500
     for picture in range(1, 11):
         values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
-        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
-        share, odds = now.weights[now.poses[:, 0] == 77.0].sum(), 1e-6 * 10.0**picture
-        assert share == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
+        now = stage.step(ctx, now, Likelihood(values, 1e-9), even(-THERE.poses)).belief
+        odds = 1e-6 * 10.0**picture
+        assert share_there(now) == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
     assert (now.poses[:, 0] == 77.0).mean() > 0.4  # the particles have followed the weights
 
 
@@ -103,20 +95,17 @@ def test_half_of_a_first_belief_that_may_be_anywhere_goes_to_what_the_image_sugg
 ) -> None:
     # Bayes by hand: half of it, or the kidnapping probability, where the image is as likely there as in the belief.
     ctx, stage = Context("fusion", np.random.default_rng(0)), ImportanceResampling()
-    there = Particles(np.full((50, 3), 777.0), np.full(50, 0.02))
     for first, expected in ((True, share), (False, 1e-7)):
         ctx.tick = Tick(0, 0, first_of_log=first)
-        out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), there).belief
-        assert out.weights[out.poses[:, 0] == 777.0].sum() == pytest.approx(expected, rel=1e-3)
+        out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE).belief
+        assert share_there(out) == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_and_one_whose_view_breaks_off_more_often() -> None:
-    proposals, particles = Particles(np.full((50, 3), 77.0), np.full(50, 0.02)), belief(5000)
     ctx, stage = Context("fusion"), ImportanceResampling(kidnapping_probability=1e-3)
     shares = []
     for seen in ((1.0,), (0.1,), (0.1, 0.2), (1.0, 1e-9)):
-        out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, *seen), proposals).belief
-        shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
+        shares.append(share_there(stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0, *seen), THERE).belief))
     assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
     assert shares[2:] == pytest.approx([0.2, shares[0]], rel=0.01)
 
@@ -135,7 +124,7 @@ def test_cells_are_as_high_in_heading_as_asked(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr("omninav.stages.fusion.importance_resampling.CELL_DEG", width)
     monkeypatch.setattr("omninav.stages.fusion.importance_resampling.MIN_PARTICLES", 1)
     stage = ImportanceResampling(number=900, adapt="kld")
-    assert len(fuse(stage, Particles(poses, np.full(4, 0.25)), np.ones(4)).poses) == number
+    assert len(fuse(stage, even(poses), np.ones(4)).poses) == number
 
 
 def test_without_adaptation_the_number_stays_however_narrow_the_belief_is() -> None:
@@ -145,12 +134,11 @@ def test_without_adaptation_the_number_stays_however_narrow_the_belief_is() -> N
 def with_recovery(weight: float, kidnapping_probability: float, novelty: float = 1.0) -> Particles:
     """Eight particles at 0 and two recovery particles at 5 of this weight, after an image that all explain alike and
     that proposes 9; of the ten that follow two are recovery particles."""
-    poses = np.array([[0.0, 0.0, 0.0]] * 8 + [[5.0, 0.0, 0.0]] * 2)
     weights = np.array([(1.0 - weight) / 8] * 8 + [weight / 2] * 2)
     stage = ImportanceResampling(number=10, recovery_share=0.2, kidnapping_probability=kidnapping_probability)
-    proposals = Particles(np.array([[9.0, 0.0, 0.0]] * 2), np.array([0.5, 0.5]))
+    believed = Particles(along_x(*[0.0] * 8, 5.0, 5.0).means, weights, 2)
     likelihood = Likelihood(np.ones(10), 1.0, novelty)
-    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals).belief
+    return stage.step(Context("fusion"), believed, likelihood, even([(9.0, 0.0, 0.0)] * 2)).belief
 
 
 def test_of_a_mixture_the_uniform_part_has_the_weight_of_a_kidnapping() -> None:
@@ -179,11 +167,9 @@ def test_recovery_particles_that_outweigh_their_share_are_resampled_with_the_oth
 
 def test_recovery_particles_that_weigh_just_their_share_stay_apart() -> None:
     # A quarter of eight particles is two, and half of a half of the weight is two of eight, in exact numbers.
-    poses = np.array([[0.0, 0.0, 0.0]] * 4 + [[5.0, 0.0, 0.0]] * 4)
     stage = ImportanceResampling(number=8, recovery_share=0.25, kidnapping_probability=0.5)
-    proposals = Particles(np.array([[9.0, 0.0, 0.0]]), np.ones(1))
-    believed = Particles(poses, np.full(8, 0.125), 4)
-    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals).belief
+    believed = Particles(along_x(*[0.0] * 4, *[5.0] * 4).means, np.full(8, 0.125), 4)
+    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), even([(9.0, 0.0, 0.0)])).belief
     assert out.poses[:6, 0].tolist() == [0.0] * 6
     assert 5.0 in out.poses[6:, 0]
 
@@ -192,14 +178,14 @@ def test_particles_are_resampled_where_their_effective_size_is_below_its_share()
     # Weights 0.4, 0.4, 0.1, 0.1: 1 / 0.34 = 2.94 of 4.
     poses, weights = np.arange(12.0).reshape(4, 3), np.array([0.4, 0.4, 0.1, 0.1])
     for below, kept in ((0.73, True), (0.74, False)):
-        out = fuse(ImportanceResampling(number=4, resample_below=below), Particles(poses, np.full(4, 0.25)), weights)
+        out = fuse(ImportanceResampling(number=4, resample_below=below), even(poses), weights)
         assert (out.weights == pytest.approx(weights)) == kept
         assert (out.weights == pytest.approx(np.full(4, 0.25))) != kept
 
 
 @pytest.mark.parametrize("told", ["proposals", "anywhere"])
 def test_without_proposals_or_what_is_likely_anywhere_there_is_no_recovery(told: str) -> None:
-    more = {"proposals": Particles(np.full((5, 3), 77.0), np.full(5, 0.2)), "anywhere": 1.0}
+    more = {"proposals": THERE, "anywhere": 1.0}
     stage = ImportanceResampling(number=20, kidnapping_probability=0.5)
     out = fuse(stage, belief(20), np.ones(20), **{told: more[told]})
     assert (len(out.poses), out.recovery_particles) == (20, 0)
@@ -207,9 +193,8 @@ def test_without_proposals_or_what_is_likely_anywhere_there_is_no_recovery(told:
 
 
 def test_without_recovery_particles_nothing_is_proposed() -> None:
-    there = Particles(np.full((5, 3), 77.0), np.full(5, 0.2))
     stage = ImportanceResampling(number=20, recovery_share=0.0, kidnapping_probability=0.5)
-    out = fuse(stage, belief(20), np.ones(20), anywhere=1.0, proposals=there)
+    out = fuse(stage, belief(20), np.ones(20), anywhere=1.0, proposals=THERE)
     assert len(out.poses) == 20
     assert out.poses[:, 0].max() < 77.0
     assert out.weights.sum() == pytest.approx(1.0)
@@ -228,43 +213,3 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
     values = np.random.default_rng(1).random(1000) ** 20
     one, other = (fuse(ImportanceResampling(number=1000), belief(), values, seed=4) for _ in range(2))
     assert one.poses.tobytes() == other.poses.tobytes()
-
-
-def a_map() -> ReferenceGraph:
-    poses = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
-    return ReferenceGraph(poses, np.zeros((2, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
-
-
-def start(
-    stage: ParticlePrior, map: ReferenceGraph | None = None, truth: Pose | None = None, first: bool = True
-) -> Particles | None:
-    ctx = Context("start", np.random.default_rng(0))
-    ctx.tick = Tick(index=0, stamp=0, first_of_log=first)
-    return stage.step(ctx, map, truth).belief
-
-
-def test_a_belief_is_given_at_the_first_picture_only() -> None:
-    assert start(ParticlePrior(), a_map(), first=False) is None
-    assert start(ParticlePrior(), a_map()) is not None
-
-
-def test_the_uniform_start_covers_the_map() -> None:
-    particles = start(ParticlePrior(number=4000), a_map())
-    assert particles is not None
-    assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
-
-
-@pytest.mark.parametrize(
-    ("at", "mean"),
-    [("truth", (3.0, 4.0, 1.0)), ("origin", (0.0, 0.0, 0.0)), ((1.0, 2.0, -1.0, 0.2, 0.1), (1.0, 2.0, -1.0))],
-)
-def test_other_starts_lie_around_their_pose(at: str, mean: tuple[float, float, float]) -> None:
-    particles = start(ParticlePrior(at=at, number=4000), None, Pose(3.0, 4.0, 1.0))  # type: ignore[arg-type]
-    assert particles is not None
-    assert np.allclose(particles.poses.mean(axis=0), mean, atol=0.02)
-
-
-@pytest.mark.parametrize("at", ["uniform", "truth"])
-def test_a_start_that_lacks_what_it_needs_says_what_to_type(at: str) -> None:
-    with pytest.raises(BadInput, match="start="):
-        start(ParticlePrior(at=at))  # type: ignore[arg-type]
