@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.fusion.best_match import BestMatch
-from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
-POSES = np.array([[1.0, 2.0, 0.5], [3.0, 4.0, 3.0], [5.0, 6.0, -2.0]])
-MAP = ReferenceGraph(POSES, np.zeros((3, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+MAP = references([[1.0, 2.0, 0.5], [3.0, 4.0, 3.0], [5.0, 6.0, -2.0]])
 
 
 def best(values: list[list[float]], candidates: list[int] | None = None) -> tuple[float, float, float] | None:

@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from landmark_world import NOISE
+from made_beliefs import even
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState
 from omninav.stages.geometry.plane.se2 import between
@@ -63,7 +64,8 @@ def driven(
     """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show a `twin`
     so far away; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not
     measure; the one of `dark_at` shows nothing."""
-    poses = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    believed = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
+    poses = believed.copy()
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0
     if turned_at is not None:
@@ -71,13 +73,12 @@ def driven(
     images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
     if dark_at is not None:
         images[dark_at] = none_found()
-    believed = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     for n in range(IMAGES):
         motion = Motion(*between(believed[n - 1], believed[n]).tolist()) if n else None
         spread = np.random.default_rng(n).normal(0.0, 0.05, (100, 3))
         belief = Particles(np.concatenate([believed[n] + spread, TWIN[None]]), np.full(101, 1 / 101), 1)
         fix = fix_at(believed[n] if n < twin_from else believed[n] + twin, probability)
-        ctx = Context("track", np.random.default_rng(0), Tick(1, n))
+        ctx = Context("track", np.random.default_rng(0))
         out.append(stage.step(ctx, state, belief, images[n], fix, motion, LengthScale(scale)))
     return out
 
@@ -94,8 +95,9 @@ def test_the_next_of_shelves_that_look_the_same_is_left_out():
     assert all(each.fix is None and each.track.unbroken for each in out[10:16])
 
 
-def test_a_robot_that_was_carried_may_be_anywhere_at_once():
-    out = driven(twin_from=10, jump_at=10)
+@pytest.mark.parametrize("moved", ["jump_at", "turned_at"])
+def test_a_robot_that_was_carried_or_turned_on_the_spot_may_be_anywhere_at_once(moved):
+    out = driven(10, **{moved: 10})
     assert all(each.fix is not None for each in out)
     assert not out[10].track.unbroken
 
@@ -110,8 +112,8 @@ def test_an_image_of_other_surroundings_tells_that_the_robot_was_carried_and_bli
 
 @pytest.mark.parametrize(("turn", "carried"), [(0.1, True), (1.0, False)])
 def test_a_narrow_view_that_has_turned_out_of_what_it_saw_was_not_carried(turn, carried):
-    state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0), Tick(1, 0))
-    belief = Particles(np.zeros((2, 3)), np.full(2, 0.5))
+    state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0))
+    belief = even(np.zeros((2, 3)))
     first, other = seen_from(np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]))
     assert not stage.step(ctx, state, belief, first, None, None).track.carried
     assert stage.step(ctx, state, belief, other, None, Motion(0.0, 0.0, turn)).track.carried is carried
@@ -134,8 +136,3 @@ def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_
     assert only.poses.tolist() == [pose.tolist()]
     assert only.probabilities == pytest.approx([0.8])
     assert only.agree.tolist() == [-1, 0, -1, 0]
-
-
-def test_a_robot_that_was_turned_on_the_spot_may_be_anywhere_at_once():
-    out = driven(twin_from=10, turned_at=10)
-    assert all(each.fix is not None for each in out)
