@@ -1,10 +1,10 @@
 """The whole filter on a map of some thousand references: tracking near the belief, and a robot put elsewhere."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.candidates.index import IndexedCandidates
@@ -47,8 +47,7 @@ class Land:
         rng = np.random.default_rng(1)
         along, across = np.meshgrid(np.arange(0, 30, 0.4), np.arange(0, 30, 0.7), indexing="ij")
         poses = np.column_stack([along.ravel(), across.ravel(), rng.uniform(-np.pi, np.pi, along.size)])
-        features = np.stack([self.seen_from(pose) for pose in poses])
-        return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+        return references(poses, np.stack([self.seen_from(pose) for pose in poses]))
 
 
 LAND = Land()
@@ -56,6 +55,8 @@ MAP = LAND.map()
 BUILD, BUILT = BuildReferenceIndex(), Context("reference_index")
 BUILD.setup(BUILT)
 INDEX = BUILD.step(BUILT, MAP, BuildReferenceIndexState()).index
+MATCHING = Context("match")
+MATCHING.read = frozenset({"similarities"})  # nobody asks for a calibration
 DRIVE = [np.array([4.0 + 0.3 * k, 5.25, 0.0]) for k in range(30)]
 ELSEWHERE = [np.array([24.15, 25.0 - 0.3 * k, -np.pi / 2]) for k in range(24)]
 
@@ -69,33 +70,24 @@ class Filtered(NamedTuple):
 
 
 def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) -> Filtered:
-    stages = {
-        "start": ParticlePrior(),
-        "motion": RotationTranslationRotation(),
-        "match": SelectiveMatch(),
-        "sensor": NearReferences(),
-        "proposals": SimilarityProposals(),
-        "fusion": ImportanceResampling(),
-        "candidates": candidates,
-    }
-    contexts = {name: Context(name, np.random.default_rng([seed, n])) for n, name in enumerate(stages)}
-    for name, stage in stages.items():
-        stage.setup(contexts[name])
-    start, motion, match, sensor, proposals, fusion, _ = stages.values()
+    ctx = Context("filter", np.random.default_rng(seed))
+    motion, match, sensor = RotationTranslationRotation(), SelectiveMatch(), NearReferences()
+    for stage in (motion, sensor, candidates):
+        stage.setup(ctx)
+    match.setup(MATCHING)
     noise, errors, said, compared = np.random.default_rng(9), [], [], []
+    ctx.tick = Tick(0, 0, first_of_log=True)
+    belief = ParticlePrior().step(ctx, MAP, None, LENGTH_SCALE).belief
     for k, pose in enumerate(path):
-        for ctx in contexts.values():
-            ctx.tick = Tick(index=k, stamp=k, first_of_log=k == 0)
+        ctx.tick = Tick(k, k, first_of_log=k == 0)
         moved = STEP if k else None
-        if k == 0:
-            belief = start.step(contexts["start"], MAP, None, LENGTH_SCALE).belief
-        belief = motion.step(contexts["motion"], belief, moved, MeasuredNoise()).belief
+        belief = motion.step(ctx, belief, moved, MeasuredNoise()).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
-        chosen = candidates.step(contexts["candidates"], view, MAP, INDEX, belief, LENGTH_SCALE).candidates
-        alike = match.step(contexts["match"], view, MAP, chosen).similarities
-        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, LENGTH_SCALE)
-        proposed = proposals.step(contexts["proposals"], out.field, MAP, LENGTH_SCALE).proposals
-        belief = fusion.step(contexts["fusion"], belief, out.likelihood, proposed).belief
+        chosen = candidates.step(ctx, view, MAP, INDEX, belief, LENGTH_SCALE).candidates
+        alike = match.step(MATCHING, view, MAP, chosen).similarities
+        out = sensor.step(ctx, alike, belief, MAP, moved, LENGTH_SCALE)
+        proposed = SimilarityProposals().step(ctx, out.field, MAP, LENGTH_SCALE).proposals
+        belief = ImportanceResampling().step(ctx, belief, out.likelihood, proposed).belief
         estimate = belief.estimate().pose
         errors.append(np.hypot(estimate.x - pose[0], estimate.y - pose[1]))
         said.append(out.likelihood)
@@ -103,16 +95,11 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
     return Filtered(np.array(errors), said, compared)
 
 
-def some() -> IndexedCandidates:
-    return IndexedCandidates()
-
-
-def whole() -> IndexedCandidates:
-    return IndexedCandidates(compare_all_up_to=len(MAP))
+SOME, WHOLE = IndexedCandidates(), IndexedCandidates(compare_all_up_to=len(MAP))
 
 
 def test_tracking_by_some_references_is_as_good_as_comparing_the_whole_map() -> None:
-    few, all_ = drive(DRIVE, some()), drive(DRIVE, whole())
+    few, all_ = drive(DRIVE, SOME), drive(DRIVE, WHOLE)
     assert len(MAP) > 3000
     assert all_.compared[-1] == len(MAP)
     assert max(few.compared[10:]) < 0.2 * len(MAP)
@@ -128,11 +115,11 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
     belief = Particles(rng.normal(DRIVE[0], (0.1, 0.1, 0.05), (200, 3)), np.full(200, 1 / 200))
     for pose in ELSEWHERE[::4]:
         view, said = SegmentHistograms(LAND.seen_from(pose, rng.normal(0, 0.5, (SEGMENTS, BINS)))), []
-        for candidates in (some(), whole()):
+        for candidates in (SOME, WHOLE):
             ctx = Context("candidates")
             candidates.setup(ctx)
             chosen = candidates.step(ctx, view, MAP, INDEX, belief, LENGTH_SCALE).candidates
-            alike = match.step(Context("match"), view, MAP, chosen).similarities
+            alike = match.step(MATCHING, view, MAP, chosen).similarities
             sensor = NearReferences()
             sensor.setup(ctx)
             said.append(sensor.step(ctx, alike, belief, MAP, None, LENGTH_SCALE).likelihood.mean_likelihood)
@@ -142,12 +129,10 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
     assert np.std(ratio) < 0.7
 
 
-@pytest.mark.parametrize("candidates", [some, whole])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_robot_that_is_put_elsewhere_is_found_within_ten_images(
-    candidates: Callable[[], IndexedCandidates], seed: int
-) -> None:
-    errors = drive(DRIVE[:15] + ELSEWHERE, candidates(), seed).errors
+@pytest.mark.parametrize("candidates", [SOME, WHOLE], ids=["some", "whole"])
+def test_a_robot_that_is_put_elsewhere_is_found_within_ten_images(candidates: IndexedCandidates, seed: int) -> None:
+    errors = drive(DRIVE[:15] + ELSEWHERE, candidates, seed).errors
     assert errors[10:15].max() < 0.5
     assert errors[15] > 10
     assert errors[15 + 10 :].max() < 0.5
