@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from made_view_maps import learned
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
@@ -18,29 +19,33 @@ def context(first: bool = True) -> Context:
 
 
 def two_places() -> ViewMixtures:
-    map = ViewMixtures.empty()
-    for x in (0.0, 10.0):
-        map.add_component(
-            map.add_view(np.array([x], np.float32), "Coefficients"), np.array([x, 0, 0]), np.eye(3) * 0.01, 1.0, 1.0
-        )
-    return map
+    return learned(10.0, 10.0, weights=1.0, map=learned(0.0, 0.0, weights=1.0))
 
 
-def test_a_map_begins_at_the_first_true_pose_where_the_log_has_one() -> None:
-    truth = Pose(3.0, 4.0, 1.0)
-    particles = ParticlesInMap().step(context(), ViewMixtures.empty(), truth).belief
-    mixture = MixtureInMap().step(context(), ViewMixtures.empty(), truth).belief
-    assert particles is not None
-    assert mixture is not None
-    assert particles.poses.mean(axis=0) == pytest.approx([3, 4, 1], abs=0.002)
-    assert particles.poses.std(axis=0) == pytest.approx([0.01, 0.01, np.radians(0.5)], rel=0.1)
-    assert mixture.means[0] == pytest.approx([3, 4, 1])
+PRIORS = [ParticlesInMap, MixtureInMap]
 
 
-def test_a_map_begins_at_the_origin_where_there_is_no_truth() -> None:
-    belief = ParticlesInMap().step(context(), ViewMixtures.empty(), None).belief
+def moments_of(
+    stage: ParticlesInMap | MixtureInMap, map: ViewMixtures, truth: Pose | None = None, **ports: Reinitialise
+):
+    """Mean and standard deviations of the first belief, headings around 0."""
+    belief = stage.step(context(first=not ports), map, truth, **ports).belief
     assert belief is not None
-    assert belief.poses.mean(axis=0) == pytest.approx([0, 0, 0], abs=0.002)
+    if isinstance(stage, ParticlesInMap):
+        assert belief.weights == pytest.approx(np.full(stage.number, 1.0 / stage.number))
+        return belief.poses.mean(axis=0), belief.poses.std(axis=0)
+    assert belief.weights.tolist() == [1.0]
+    return belief.means[0], np.sqrt(np.diagonal(belief.covariances[0]))
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize(("truth", "place"), [(Pose(3.0, 4.0, 1.0), [3, 4, 1]), (None, [0, 0, 0])])
+def test_a_map_begins_at_the_first_true_pose_where_the_log_has_one_or_at_the_origin(
+    prior: type, truth: Pose | None, place: list[int]
+) -> None:
+    mean, spread = moments_of(prior(), ViewMixtures.empty(), truth)
+    assert mean == pytest.approx(place, abs=0.002)
+    assert spread == pytest.approx([0.01, 0.01, np.radians(0.5)], rel=0.1)
 
 
 def test_a_later_log_begins_anywhere_in_the_map_whatever_its_truth_says() -> None:
@@ -60,10 +65,9 @@ def test_a_later_log_begins_anywhere_in_the_map_whatever_its_truth_says() -> Non
 
 
 def test_a_known_start_is_believed_in_a_later_log_too() -> None:
-    belief = ParticlesInMap(at=(1.0, 2.0, 0.5, 0.3, 0.2)).step(context(), two_places(), None).belief
-    assert belief is not None
-    assert belief.poses.mean(axis=0) == pytest.approx([1, 2, 0.5], abs=0.05)
-    assert belief.poses.std(axis=0) == pytest.approx([0.3, 0.3, 0.2], rel=0.1)
+    mean, spread = moments_of(ParticlesInMap(at=(1.0, 2.0, 0.5, 0.3, 0.2)), two_places())
+    assert mean == pytest.approx([1, 2, 0.5], abs=0.05)
+    assert spread == pytest.approx([0.3, 0.3, 0.2], rel=0.1)
 
 
 def test_asked_for_truth_a_log_without_it_is_an_error() -> None:
@@ -74,22 +78,6 @@ def test_asked_for_truth_a_log_without_it_is_an_error() -> None:
 def test_there_is_no_belief_to_begin_with_in_the_middle_of_a_log() -> None:
     assert ParticlesInMap().step(context(first=False), two_places(), None).belief is None
     assert MixtureInMap().step(context(first=False), two_places(), None).belief is None
-
-
-def moments_of(
-    stage: ParticlesInMap | MixtureInMap, map: ViewMixtures, truth: Pose | None = None, **ports: Reinitialise
-):
-    """Mean and standard deviations of the first belief, headings around 0."""
-    belief = stage.step(context(first=not ports), map, truth, **ports).belief
-    assert belief is not None
-    if isinstance(stage, ParticlesInMap):
-        assert belief.weights == pytest.approx(np.full(stage.number, 1.0 / stage.number))
-        return belief.poses.mean(axis=0), belief.poses.std(axis=0)
-    assert belief.weights.tolist() == [1.0]
-    return belief.means[0], np.sqrt(np.diagonal(belief.covariances[0]))
-
-
-PRIORS = [ParticlesInMap, MixtureInMap]
 
 
 @pytest.mark.parametrize("prior", PRIORS)
@@ -145,10 +133,7 @@ def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_
 
 def test_positions_are_as_spread_as_the_map_whatever_headings_they_go_with() -> None:
     # Places 2 m apart along x, with headings that hardly differ and go with x.
-    map = ViewMixtures.empty()
-    for x in (-1.0, 1.0):
-        row = map.add_view(np.zeros(1, np.float32), "Coefficients")
-        map.add_component(row, np.array([x, 0.0, 0.002 * x]), np.eye(3) * 1e-6, 0.5, 1.0)
+    map = learned(0.0, (-1.0, 0.0, -0.002), (1.0, 0.0, 0.002), sigma=1e-3)
     belief = MixtureInMap().step(context(), map, None).belief
     assert belief is not None
     assert belief.covariances[0] == pytest.approx(np.diag([1.0 + 1e-6, 1e-4, np.pi**2 / 3.0]), abs=1e-12)

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from made_beliefs import even, scattered_around
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
@@ -17,8 +18,7 @@ SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
 
 
 def belief(mean: np.ndarray, spread: float = 0.2, number: int = 500) -> Particles:
-    rng = np.random.default_rng(0)
-    return Particles(mean + rng.normal(0.0, spread, (number, 3)) * [1.0, 1.0, 0.3], np.full(number, 1.0 / number))
+    return scattered_around(mean, spread * np.array([1.0, 1.0, 0.3]), number)
 
 
 def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> LandmarkFix:
@@ -57,14 +57,11 @@ def test_a_belief_of_decimetres_takes_in_millimetres() -> None:
 
 
 def test_a_sharp_belief_and_a_fix_as_sharp_meet_half_way() -> None:
-    sharp = Particles(
-        HERE + np.random.default_rng(0).normal(size=(5000, 3)) * np.sqrt(np.diag(SURE)), np.full(5000, 1 / 5000)
-    )
+    sharp = scattered_around(HERE, np.sqrt(np.diag(SURE)), 5000)
     found = updated(sharp, fix_at(HERE + np.array([0.01, 0.0, 0.0]))).estimate()
     assert found.pose.x == pytest.approx(HERE[0] + 0.005, abs=0.001)
-    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(
-        0.005, rel=0.2
-    )  # not 1 / sqrt(2) of it: their errors are shared
+    # Not 1 / sqrt(2) of it: their errors are shared.
+    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(0.005, rel=0.2)
 
 
 def test_a_robot_that_stands_is_no_surer_after_fifty_images_than_after_one() -> None:
@@ -144,7 +141,7 @@ def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:
     now = belief(HERE, 0.02)
     assert share_at(updated(now, *misled, motion=standing), HERE) > 0.9
     along = [fix_at(compose(THERE, np.array([2.0 * n, 0.0, 0.0])), probabilities=(0.6,)) for n in range(8)]
-    stage, ctx, last = LandmarkUpdate(), Context("update", np.random.default_rng(0), Tick(1, 0)), LandmarkUpdateState()
+    stage, ctx, last = LandmarkUpdate(), Context("update", np.random.default_rng(0)), LandmarkUpdateState()
     for n, fix in enumerate(along):
         now = stage.step(ctx, last, now, fix, driving if n else standing).belief
         now = Particles(compose(now.poses, np.array([2.0, 0.0, 0.0])), now.weights)
@@ -178,11 +175,10 @@ def test_chance_comes_from_the_seed_alone() -> None:
 
 def test_after_a_restart_a_standing_robot_is_found_by_the_landmarks_it_saw_before() -> None:
     rng = np.random.default_rng(3)
-    anywhere = Particles(rng.uniform([-10.0, -10.0, -3.0], [10.0, 10.0, 3.0], (5000, 3)), np.full(5000, 1 / 5000))
-    stage, ctx, last = LandmarkUpdate(), Context("update", rng, Tick(1, 0)), LandmarkUpdateState()
-    still = Motion(0.0, 0.0, 0.0)
-    stage.step(ctx, last, anywhere, fix_at(HERE), still)
-    told = [
-        stage.step(ctx, last, anywhere, fix_at(HERE), still, restart=again).belief for again in (None, Reinitialise())
-    ]
-    assert share_at(told[1], HERE) > 0.5 > 5.0 * share_at(told[0], HERE)  # without, it is the same image once more
+    anywhere = even(rng.uniform([-10.0, -10.0, -3.0], [10.0, 10.0, 3.0], (5000, 3)))
+    stage, ctx, last = LandmarkUpdate(), Context("update", rng), LandmarkUpdateState()
+    _, same, again = (
+        stage.step(ctx, last, anywhere, fix_at(HERE), Motion(0.0, 0.0, 0.0), restart=asked).belief
+        for asked in (None, None, Reinitialise())
+    )
+    assert share_at(again, HERE) > 0.5 > 5.0 * share_at(same, HERE)  # without, it is the same image once more

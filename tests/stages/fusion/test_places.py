@@ -35,12 +35,6 @@ def test_who_was_carried_to_an_island_is_found_by_chance_only():
     assert transitions(apart, 1.0, 0.1)[0, 4] == pytest.approx(0.1 / 5)
 
 
-def test_without_a_spread_it_is_that_of_the_map():
-    apart = links_between(CHAIN, 4)  # 4 times 0, 6 times 1, 4 times 2, twice 3: mean 1.25, variance 15 / 16
-    given, measured = transitions(apart, math.sqrt(15 / 16), 0.0), transitions(apart, None, 0.0)
-    np.testing.assert_allclose(measured, given)
-
-
 def test_a_map_of_one_place_stays_there():
     assert transitions(links_between(np.zeros((0, 2), np.int64), 1), None, 0.01) == pytest.approx(np.ones((1, 1)))
 
