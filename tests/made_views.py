@@ -7,6 +7,7 @@ import numpy as np
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import PoseSource
+from omninav.stages.values.topological_map import LoopHypotheses
 
 NO_FEATURES = LocalFeatures(
     np.empty((0, 3)),
@@ -42,6 +43,26 @@ def made_views(
         distances=np.asarray(distances, np.float64),
         shares=np.ones((number, number)) if shares is None else shares,
         options=(0.8, 0.8, 0.5, 8, 0.01, "euclidean"),
+    )
+
+
+def made_hypotheses(
+    views: ComparedViews, place: Sequence[int], pairs: Sequence[tuple[int, int]] = (), accepted: int = 0
+) -> LoopHypotheses:
+    """The places of views, each its own cluster and part, and hypotheses of which the first `accepted` are accepted."""
+    own, number = np.array(place, np.int64), len(pairs)
+    return LoopHypotheses(
+        poses=views.poses,
+        cluster=own,
+        subcluster=own,
+        place=own,
+        tour=views.tours,
+        pairs=np.array(pairs, np.int64).reshape(-1, 2),
+        distances=np.zeros(number),
+        initial=np.zeros((number, 3)),
+        masses=np.zeros((number, 3)),
+        accepted=np.arange(number) < accepted,
+        pose_source=views.pose_source,
     )
 
 

@@ -5,7 +5,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from made_views import NO_FEATURES, between_looks, made_views
+from made_beliefs import along_x
+from made_references import references
+from made_view_maps import view
+from made_views import NO_FEATURES, between_looks, made_hypotheses, made_views
+from made_words import features_of
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
@@ -24,17 +28,15 @@ from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueSt
 from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.plots.thumbnails import ReferenceSnapshot, ThumbnailsState, TourSnapshot
 from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
-from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
+from omninav.stages.values.local_features import GlobalDescriptor, VerticalSegments
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose, UncertainMotion
 from omninav.stages.values.sessions import Sessions
-from omninav.stages.values.topological_map import LoopHypotheses
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, NoveltyThreshold
+from omninav.stages.values.views import NoveltyThreshold
 
 CTX = Context("mapping")
 
@@ -43,16 +45,6 @@ def context(tick: int = 0, first: bool = False) -> Context:
     ctx = Context("mapping")
     ctx.tick = Tick(tick, tick * 10**9, 0, tick, first)
     return ctx
-
-
-def view(look: float) -> Coefficients:
-    values = np.array([look, 0.0], np.float32)
-    return Coefficients(values, values[None])
-
-
-def at(*places: float, sigma: float = 0.1, weights: tuple[float, ...] = (1.0,)) -> GaussianMixture:
-    means = np.array([[x, 0.0, 0.0] for x in places])
-    return GaussianMixture(means, np.repeat(np.eye(3)[None] * sigma**2, len(places), axis=0), np.array(weights))
 
 
 def test_a_threshold_is_half_the_median_of_the_first_hundred_views_twenty_apart() -> None:
@@ -84,11 +76,11 @@ def test_a_view_is_learned_after_four_metres_and_at_most_500_wait() -> None:
     stage, queue, given = DelayedByDistance(), DelayedByDistanceState(), []
     for tick in range(12):
         model = UncertainMotion((0.0, 0.5, 0.0), (0.0, 0.0, 0.0)) if tick else None
-        given.append([u.index for u in stage.step(context(tick), view(0.0), at(0.0), model, queue).updates.items])
+        given.append([u.index for u in stage.step(context(tick), view(0.0), along_x(0.0), model, queue).updates.items])
     assert given == [[]] * 8 + [[0], [1], [2], [3]]
     standing = DelayedByDistanceState()
     for tick in range(502):
-        stage.step(context(tick), view(0.0), at(0.0), None, standing)
+        stage.step(context(tick), view(0.0), along_x(0.0), None, standing)
     assert len(standing.waiting) == 500
 
 
@@ -96,7 +88,7 @@ def test_a_queue_of_unimodal_states_is_twenty_ticks_long() -> None:
     # Gross, Koenig & Mueller 2005, section 2.1.
     stage, pending, given = UnimodalQueue(), UnimodalQueueState(), []
     for tick in range(23):
-        given.append([u.index for u in stage.step(context(tick), view(0.0), at(0.0), None, pending).updates.items])
+        given.append([u.index for u in stage.step(context(tick), view(0.0), along_x(0.0), None, pending).updates.items])
     assert given == [[]] * 20 + [[0], [1], [2]]
 
 
@@ -104,7 +96,7 @@ def test_a_queue_of_unimodal_states_is_twenty_ticks_long() -> None:
 def test_a_state_is_unimodal_where_more_than_half_is_at_its_heaviest_component(
     squared: float, share: float, one: bool
 ) -> None:
-    state = at(0.0, (2 * squared) ** 0.5 * 0.1, weights=(share, 1.0 - share))
+    state = along_x(0.0, (2 * squared) ** 0.5 * 0.1, weights=(share, 1.0 - share))
     pending = UnimodalQueueState()
     UnimodalQueue().step(context(), view(0.0), state, None, pending)
     assert (pending.last is not None) == one
@@ -115,16 +107,15 @@ def test_odometry_explains_a_state_up_to_999_of_1000_drives(missed: float, expla
     # A metre ahead from 0.1 m to 0.1 m, with 0.1 m of its own: three variances of 0.01.
     stage, pending = UnimodalQueue(length=0), UnimodalQueueState()
     still = UncertainMotion((0.0, 0.5, 0.0), (1e-9, 0.1 * 0.5**0.5, 1e-9))
-    end = at(1.0 + (missed * 0.03) ** 0.5)
-    for tick, state in enumerate((at(0.0), at(0.0, 9.0, weights=(0.5, 0.5)), end)):
-        ctx = context(tick)
-        out = stage.step(ctx, view(0.0), state, still if tick else None, pending)
+    end = along_x(1.0 + (missed * 0.03) ** 0.5)
+    for tick, state in enumerate((along_x(0.0), along_x(0.0, 9.0), end)):
+        out = stage.step(context(tick), view(0.0), state, still if tick else None, pending)
     assert [update.index for update in out.updates.items] == ([1, 2] if explained else [2])
 
 
 def fused(*lessons: tuple[float, float]) -> ViewMixtures:
     map, pending = ViewMixtures.empty(), FusedMixturesState()
-    items = tuple(MapUpdate(view(look), at(place), n) for n, (look, place) in enumerate(lessons))
+    items = tuple(MapUpdate(view(look), along_x(place), n) for n, (look, place) in enumerate(lessons))
     FusedMixtures().step(CTX, MapUpdates(items), NoveltyThreshold(1.0), map, pending)
     return map
 
@@ -139,7 +130,7 @@ def test_components_of_a_fused_view_are_one_up_to_95_per_cent_with_the_spread_of
 def test_a_fused_map_keeps_what_weighs_a_hundredth_and_any_number_of_views() -> None:
     for weight, number in ((0.0099, 1), (0.0101, 2)):
         map = ViewMixtures.empty()
-        update = MapUpdate(view(0.0), at(0.0, 9.0, weights=(1.0 - weight, weight)), 0)
+        update = MapUpdate(view(0.0), along_x(0.0, 9.0, weights=(1.0 - weight, weight)), 0)
         FusedMixtures().step(CTX, MapUpdates((update,)), NoveltyThreshold(1.0), map, FusedMixturesState())
         assert len(map.weights) == number
     assert len(fused(*[(9.0 * n, 0.0) for n in range(5)])) == 5
@@ -183,7 +174,7 @@ def test_views_of_a_drive_are_kept_a_centimetre_apart(step: float, kept: int) ->
     sessions: Sessions | None = None
     for tick in range(2):
         motion = Motion(step, 0.0, 0.0) if tick else None
-        sessions = KeyframeHistory().step(context(tick, not tick), view(0.0), motion, at(0.0), sessions).sessions
+        sessions = KeyframeHistory().step(context(tick, not tick), view(0.0), motion, along_x(0.0), sessions).sessions
     assert sessions is not None
     assert len(sessions) == kept
 
@@ -196,17 +187,13 @@ def test_a_supervised_view_is_seen_from_a_quarter_of_a_metre_and_ten_degrees_aro
 
 def test_a_straightened_drive_is_learned_within_a_tenth_of_a_metre_and_three_degrees() -> None:
     # Round a square of 4 m twice, 0.5 m from view to view, with views that tell where they are.
-    def seen(x: float, y: float) -> Coefficients:
-        values = np.array([x, y], np.float32)
-        return Coefficients(values, values[None])
-
-    sessions, pose = Sessions.empty(seen(0.0, 0.0)), np.zeros(3)
+    sessions, pose = Sessions.empty(view(0.0, 0.0)), np.zeros(3)
     for row in range(34):
         if row:
             turn = np.pi / 2 if row % 2 == 0 else 0.0
             pose = pose + np.array([0.5 * np.cos(pose[2]), 0.5 * np.sin(pose[2]), turn])
             sessions.move(np.array([0.5, 0.0, turn]))
-        sessions.keep(seen(*pose[:2]), pose, row == 0, row)
+        sessions.keep(view(*pose[:2]), pose, row == 0, row)
     out = StraightenSessions().step(context(99, True), sessions, None, NoveltyThreshold(0.5, True, 0.3))
     assert out.updates is not None
     assert out.updates.relearn
@@ -219,9 +206,7 @@ def test_a_map_of_less_than_ten_references_has_a_length_scale_of_half_a_metre() 
         looks = np.zeros((number, 3, 40), np.float32)
         for n in range(number):
             looks[n, :, 2 * n : 2 * n + 6] = 1 / 6
-        poses = np.column_stack([np.arange(number), np.zeros(number), np.zeros(number)])
-        edges = np.zeros((0, 2), np.int64)
-        map = ReferenceGraph(poses, looks, "histograms", edges, "truth")
+        map = references(along_x(*range(number)).means, looks)
         return AppearanceLengthScale().step(CTX, map).length_scale.metres
 
     assert scale(9) == 0.5
@@ -244,25 +229,17 @@ def test_thumbnails_are_160_or_240_columns_wide_and_of_a_quality_of_75() -> None
 
 def test_a_vocabulary_has_at_most_2048_words() -> None:
     looks = np.random.default_rng(0).integers(0, 256, (2100, 128)).astype(np.uint8)
-    rest = np.zeros((2100, 3)), np.zeros((2100, 2)), looks, np.zeros((2100, 3), np.float32), np.ones(2100, np.float32)
-    words = LearnVisualWords().step(CTX, [LocalFeatures(*rest)], [ReferenceEvent(0, "first")]).words
+    words = LearnVisualWords().step(CTX, [features_of(looks)], [ReferenceEvent(0, "first")]).words
     assert len(words.centres) == 2048
 
 
 def compared(seconds: list[float], colours: list[float]) -> list[list[bool]]:
     """Of images at these times with one colour each: which have anything in common."""
     ticks = [Tick(n, round(s * 1e9), 0, n, not n) for n, s in enumerate(seconds)]
-    looks = np.random.default_rng(0).integers(0, 256, (8, 128)).astype(np.uint8)
-    rest = (
-        np.tile([1.0, 0.0, 0.0], (8, 1)),
-        np.zeros((8, 2)),
-        looks,
-        np.zeros((8, 3), np.float32),
-        np.ones(8, np.float32),
-    )
+    looks = features_of(np.random.default_rng(0).integers(0, 256, (8, 128)).astype(np.uint8))
     grey = [GlobalDescriptor(np.array([c, 0.0, 0.0], np.float32)) for c in colours]
-    some = [LocalFeatures(*rest)] * len(seconds)
-    return np.isfinite(ViewComparison().step(CTX, ticks, some, grey, odometry=[]).views.distances).tolist()
+    found = ViewComparison().step(CTX, ticks, [looks] * len(seconds), grey, odometry=[]).views
+    return np.isfinite(found.distances).tolist()
 
 
 def test_views_are_a_second_apart_and_compared_up_to_half_in_colours_by_eight_matches() -> None:
@@ -292,11 +269,8 @@ def test_places_are_half_a_turn_wide_and_hypotheses_a_quarter_ignorant_up_to_twe
 
 
 def test_no_view_is_passed_over_within_a_part_and_more_than_half_of_the_support_accepts() -> None:
-    assert LoopClosure().step(CTX, made_views(between_looks([0.0, 9.0, 0.1]))).hypotheses.subcluster.tolist() == [
-        0,
-        1,
-        2,
-    ]
+    parts = LoopClosure().step(CTX, made_views(between_looks([0.0, 9.0, 0.1]))).hypotheses.subcluster
+    assert parts.tolist() == [0, 1, 2]
     # The spread is 1 where parts are of one view: of the nearer two pairs the similarity is above a half, of the last
     # exp(-1.25^2 / 2) = 0.46; all are supported by more than half, unless the first two match too little to be alike.
     looks = between_looks([0.0, 10.0, 20.0, 0.1, 10.2, 21.25])
@@ -314,12 +288,7 @@ def test_of_a_view_sixty_segments_are_kept() -> None:
         np.ones(number, np.float32), np.zeros((number, 2, 2)),
     )  # fmt: skip
     one = replace(made_views(between_looks([0.0])), features=(replace(NO_FEATURES, columns=columns),))
-    none = np.zeros(1, np.int64)
-    hypotheses = LoopHypotheses(
-        one.poses, none, none, none, one.tours, np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)),
-        np.empty((0, 3)), np.empty(0, np.bool_), "odometry",
-    )  # fmt: skip
-    made = TopologicalMapping().step(CTX, one, hypotheses).map
+    made = TopologicalMapping().step(CTX, one, made_hypotheses(one, [0])).map
     kept = made.views.features(0).columns
     assert kept is not None
     assert len(kept) == 60

@@ -1,12 +1,14 @@
 """Ways between places, names, loops and spread of small topological maps, worked by hand."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from made_places import made_map
-from made_views import between_looks, made_views
+from made_views import between_looks, made_hypotheses, made_views
 
 from omninav.pipeline import Context
 from omninav.stages.mapping.topological import (
@@ -17,9 +19,12 @@ from omninav.stages.mapping.topological import (
     with_loops,
     with_names,
 )
+from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.rooms import Rooms
-from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, stored
+from omninav.stages.values.topological_map import DRIVEN, LOOP, TopologicalMap, stored
+
+WINDOW = "omninav.stages.mapping.topological.WINDOW"
 
 
 def ways(looks: list[float], place: list[int], medoids: list[int], tour: list[int] | None = None) -> dict:
@@ -105,6 +110,24 @@ def test_a_place_keeps_its_own_name_before_that_of_its_room() -> None:
     assert with_names(map, rooms).names == ("desk", "hall", "")
 
 
+def mapped(
+    views: ComparedViews,
+    place: Sequence[int],
+    known: TopologicalMap | None = None,
+    rooms: Rooms | None = None,
+    pairs: Sequence[tuple[int, int]] = (),
+    **parameters: int,
+) -> TopologicalMap:
+    found = made_hypotheses(views, place, pairs)
+    return TopologicalMapping(**parameters).step(Context("mapping"), views, found, known, rooms).map
+
+
+def seeing(looks: Sequence[float], *seen: LocalFeatures, **said: Any) -> ComparedViews:
+    """Views of these looks, which show these features each, or all the same."""
+    features = seen * len(looks) if len(seen) == 1 else seen
+    return replace(made_views(between_looks(looks), **said), features=features)
+
+
 RNG = np.random.default_rng(0)
 LOOKS, BEARINGS = RNG.integers(0, 255, (40, 128)).astype(np.uint8), RNG.uniform(-math.pi, math.pi, 40)
 
@@ -125,28 +148,22 @@ def patches(rows: list[int] | range, turned: float = 0.0) -> LocalFeatures:
 def test_the_patches_that_a_view_keeps_are_those_found_again_around_it(monkeypatch: pytest.MonkeyPatch) -> None:
     # View 2 has 40 patches; its neighbours on both sides show 10 to 29 and 20 to 34: the ten in both come first.
     seen = [range(40), range(10, 30), range(40), range(20, 35), range(40)]
-    views = replace(made_views(between_looks([0.0, 9.0, 20.0, 31.0, 43.0])), features=tuple(map(patches, seen)))
-    place = np.arange(5)
-    hypotheses = LoopHypotheses(
-        views.poses, place, place, place, views.tours, np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)),
-        np.empty((0, 3)), np.empty(0, np.bool_), "odometry",
-    )  # fmt: skip
-    monkeypatch.setattr("omninav.stages.mapping.topological.WINDOW", 1)
-    stage = TopologicalMapping(max_patches=12, min_path_matches=1)
-    made = stage.step(Context("mapping"), views, hypotheses).map
+    views = seeing([0.0, 9.0, 20.0, 31.0, 43.0], *map(patches, seen))
+    monkeypatch.setattr(WINDOW, 1)
+    made = mapped(views, range(5), max_patches=12, min_path_matches=1)
     kept = made.views.features(2).descriptors
     assert [next(n for n in range(40) if (LOOKS[n] == row).all()) for row in kept] == [10, 11, *range(20, 30)]
     assert len(made.views.features(1).descriptors) == 12
     # A view of another tour is no neighbour: of equals the strongest stay.
     apart = replace(views, tours=np.array([1, 1, 2, 3, 3]))
-    kept = stage.step(Context("mapping"), apart, hypotheses).map.views.features(2).descriptors
+    kept = mapped(apart, range(5), max_patches=12, min_path_matches=1).views.features(2).descriptors
     np.testing.assert_array_equal(kept, LOOKS[:12])
 
 
 def test_the_spread_is_the_root_mean_square_over_all_views_but_the_medoids() -> None:
     map = made_map([(0.0, 0.0), (5.0, 0.0)], {})
     looks = [patches(range(20)), patches(range(20), 0.3), patches(range(20)), patches([*range(15), *range(25, 30)])]
-    views = replace(made_views(between_looks([0.0] * 4)), features=tuple(looks))
+    views = seeing([0.0] * 4, *looks)
     # The map keeps views 0 and 2 as they are; 1 has the same patches, turned: nothing between them but min_angle;
     # of 3 only 15 match: 20 / 15 times as far.
     stored_views = stored([looks[0], looks[2]], [views.descriptors[0]] * 2)
@@ -164,15 +181,8 @@ def test_only_the_heaviest_segments_of_a_view_are_kept() -> None:
     columns = VerticalSegments(
         np.arange(3.0), np.zeros((3, 2)), np.zeros((3, 10), np.float32), weights, np.zeros((3, 2, 2))
     )
-    views = replace(
-        made_views(between_looks([0.0, 9.0])), features=(replace(patches(range(5)), columns=columns), patches(range(5)))
-    )
-    place = np.arange(2)
-    hypotheses = LoopHypotheses(
-        views.poses, place, place, place, views.tours, np.array([[0, 1]]), np.empty(0), np.empty((0, 3)),
-        np.empty((0, 3)), np.array([False]), "odometry",
-    )  # fmt: skip
-    made = TopologicalMapping(max_segments=2).step(Context("mapping"), views, hypotheses).map
+    views = seeing([0.0, 9.0], replace(patches(range(5)), columns=columns), patches(range(5)))
+    made = mapped(views, [0, 1], pairs=[(0, 1)], max_segments=2)
     heaviest, none = made.views.features(0).columns, made.views.features(1).columns
     assert heaviest is not None
     assert heaviest.weights.tolist() == [9.0, 5.0]
@@ -186,16 +196,9 @@ def test_between_medoids_are_path_images_unless_none_are_asked_for(
     monkeypatch: pytest.MonkeyPatch, least: int, images: int
 ) -> None:
     # From medoid to medoid it is three views of the drive, of which at most two may lie between path images.
-    looks = [0.0, 0.1, 0.2, 9.0, 9.1, 9.2]
-    views = replace(made_views(between_looks(looks)), features=(patches(range(5)),) * 6)
-    place, none = np.array([0, 0, 0, 1, 1, 1]), np.empty((0, 3))
-    pairs = np.empty((0, 2), np.int64)
-    hypotheses = LoopHypotheses(
-        views.poses, place, place, place, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
-    )
+    views = seeing([0.0, 0.1, 0.2, 9.0, 9.1, 9.2], patches(range(5)))
     monkeypatch.setattr("omninav.stages.mapping.topological.MAX_PATH_STEP", 2)
-    stage = TopologicalMapping(min_path_matches=least)
-    made = stage.step(Context("mapping"), views, hypotheses).map
+    made = mapped(views, [0, 0, 0, 1, 1, 1], min_path_matches=least)
     assert made.links.tolist() == [[0, 1]]
     assert made.frames[made.places].tolist() == [10, 40]
     assert len(made.path_of(0)) == images
@@ -210,27 +213,18 @@ def test_a_known_map_keeps_its_links_and_names(
     # Known: from 1 to 0, and 1 is the desk. The tour drives from what looks as 0 to what looks as 1: the same link. Or
     # both known places have become one, with the name of either, and the tour leads on to a new place.
     known = made_map([(0.0, 0.0), (1.0, 0.0)], {(1, 0): 0}, names=["", "desk"])
-    views = made_views(between_looks([0.0, 10.0, 0.1, 10.1]), tours=[0, 0, 1, 1], owners=[0, 1, -1, -1])
-    views = replace(views, features=(patches(range(5)),) * 4)
-    own, none, pairs = np.array(place), np.empty((0, 3)), np.empty((0, 2), np.int64)
-    hypotheses = LoopHypotheses(
-        views.poses, own, own, own, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
-    )
-    made = TopologicalMapping(min_path_matches=6).step(Context("mapping"), views, hypotheses, known).map
+    looks = [0.0, 10.0, 0.1, 10.1]
+    views = seeing(looks, patches(range(5)), tours=[0, 0, 1, 1], owners=[0, 1, -1, -1])
+    made = mapped(views, place, known, min_path_matches=6)
     assert made.names == names
     assert made.links.tolist() == links
 
 
 def test_the_first_view_has_none_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
     # Of the first view those patches come first that the second shows, not those that the last does.
-    seen = [range(40), range(10, 30), range(25, 40)]
-    views = replace(made_views(between_looks([0.0, 9.0, 20.0])), features=tuple(map(patches, seen)))
-    own, none, pairs = np.arange(3), np.empty((0, 3)), np.empty((0, 2), np.int64)
-    hypotheses = LoopHypotheses(
-        views.poses, own, own, own, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
-    )
-    monkeypatch.setattr("omninav.stages.mapping.topological.WINDOW", 1)
-    made = TopologicalMapping(max_patches=12).step(Context("mapping"), views, hypotheses).map
+    views = seeing([0.0, 9.0, 20.0], *map(patches, [range(40), range(10, 30), range(25, 40)]))
+    monkeypatch.setattr(WINDOW, 1)
+    made = mapped(views, range(3), max_patches=12)
     np.testing.assert_array_equal(made.views.features(0).descriptors, LOOKS[10:22])
 
 
@@ -239,17 +233,9 @@ def test_places_are_called_after_rooms_where_poses_are_true_and_a_spread_is_alwa
     source: str, name: str
 ) -> None:
     # One view is its place's medoid: nothing is measured against it, and the spread within parts is 1 without any.
-    place, none, pairs = np.zeros(1, np.int64), np.empty((0, 3)), np.empty((0, 2), np.int64)
     views = made_views(between_looks([0.0]), pose_source=source)  # type: ignore[arg-type]
-    hypotheses = LoopHypotheses(
-        views.poses, place, place, place, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "truth"
-    )
-    rooms = Rooms(("hall",), np.array([[-1.0, -1.0, 1.0, 1.0]]))
-    made = TopologicalMapping().step(Context("mapping"), views, hypotheses, rooms=rooms).map
+    made = mapped(views, [0], rooms=Rooms(("hall",), np.array([[-1.0, -1.0, 1.0, 1.0]])))
     assert (made.names, made.spread) == ((name,), 1.0)
-    assert TopologicalMapping().step(Context("mapping"), views, hypotheses).map.names == ("",)
-    three = replace(made_views(between_looks([0.0, 0.1, 0.3])), features=(patches(range(20)),) * 3)
-    parts = np.zeros(3, np.int64)
-    together = replace(hypotheses, poses=three.poses, cluster=parts, subcluster=parts, place=parts, tour=three.tours)
-    made = TopologicalMapping().step(Context("mapping"), three, together).map
-    assert made.spread == pytest.approx(0.01 / (2 * math.pi), rel=1e-3)
+    assert mapped(views, [0]).names == ("",)
+    three = seeing([0.0, 0.1, 0.3], patches(range(20)))
+    assert mapped(three, [0, 0, 0]).spread == pytest.approx(0.01 / (2 * math.pi), rel=1e-3)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from made_tour import Landmarks, Mapped, along, mapped, scattered
-from made_views import between_looks, made_views
+from made_views import between_looks, made_hypotheses, made_views
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
@@ -118,15 +118,10 @@ def merged_by_hand(
     **parameters: object,
 ) -> list[int]:
     """Places after merging: views match where they look less than 0.1 apart."""
-    number, at = len(looks), between_looks(looks)
+    at = between_looks(looks)
     known = {name: parameters.pop(name, None) for name in ("tours", "owners")}
     views = made_views(at, (at < 0.1).astype(float), orders=orders, **known)  # type: ignore[arg-type]
-    nothing = np.zeros((len(accepted) + 1, 3))
-    pairs = np.array([*accepted, (0, number - 1)], np.int64)  # the last one was refused
-    found = LoopHypotheses(
-        views.poses, np.zeros(number, np.int64), np.zeros(number, np.int64), np.array(place), views.tours, pairs,
-        np.zeros(len(pairs)), nothing, nothing, np.arange(len(pairs)) < len(accepted), "odometry",
-    )  # fmt: skip
+    found = made_hypotheses(views, place, [*accepted, (0, len(looks) - 1)], len(accepted))  # the last one was refused
     stage = MergePlaces(**parameters)  # type: ignore[arg-type]
     return stage.step(Context("places"), views, found).hypotheses.place.tolist()
 
@@ -144,20 +139,8 @@ def test_near_an_accepted_hypothesis_views_that_match_join_the_places_of_two_pas
     assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [], FAR_ALONG) == SIDE_BY_SIDE
     # Views 2 and 8 are two along on both passes, 4 together; the pairs further on are not within 5.
     monkeypatch.setattr("omninav.stages.mapping.merged_places.NEIGHBOUR_VIEWS", 5.0)
-    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG) == [
-        0,
-        0,
-        1,
-        1,
-        2,
-        2,
-        0,
-        0,
-        1,
-        1,
-        3,
-        3,
-    ]
+    near = merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG)
+    assert near == [0, 0, 1, 1, 2, 2, 0, 0, 1, 1, 3, 3]
     assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG, min_spacing=0.005) == SIDE_BY_SIDE
 
 
