@@ -4,25 +4,20 @@ import math
 
 import numpy as np
 import pytest
+from made_view_maps import learned, view
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.mapping.pending_updates import PendingUpdates
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, NoveltyThreshold, Spectrum
+from omninav.stages.values.views import NoveltyThreshold, Spectrum
 
 FORGET_GAIN = "omninav.stages.mapping.adaptive_views.FORGET_GAIN"
 LIMIT = NoveltyThreshold(1.0)
 FREE = {"min_sigma_m": 0.0, "min_sigma_deg": 0.0}
-
-
-def view(*values):
-    row = np.array(values, np.float32)
-    return Coefficients(row, row[None])
 
 
 def state(*means, sigma=0.1, weights=None):
@@ -59,9 +54,7 @@ def test_one_observation_is_shared_among_the_similar_views():
 
 
 def test_merged_places_are_the_counts_mean_and_not_their_sum():
-    map = ViewMixtures.empty()
-    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-    map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
+    map = learned(0.0, (10.0, 5.0, 0.0), sigma=2.0, count=5.0)
     # Erratum 7: eta 5 and 0.4 must not move (10, 5) to (54, 27). Here eta 5 and 1 at (10, 5) and (13, 5).
     learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), state_covariance="every_update")
     assert len(map.weights) == 1
@@ -73,9 +66,7 @@ def test_merged_places_are_the_counts_mean_and_not_their_sum():
 
 
 def test_a_confirmed_component_adds_the_spread_of_the_means_and_not_the_covariance_again():
-    map = ViewMixtures.empty()
-    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-    map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
+    map = learned(0.0, (10.0, 5.0, 0.0), sigma=2.0, count=5.0)
     learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), min_sigma_m=0.1)
     # As above, but what comes has 0.1 m instead of 2 m: (5 (4 + 0.5^2) + 1 (0.1^2 + 2.5^2)) / 6 along x.
     np.testing.assert_allclose(np.diag(map.covariances[0]), [(5 * 4.25 + 6.26) / 6, 20.01 / 6, 20 / 6])
@@ -130,12 +121,8 @@ def test_a_place_that_is_seen_with_another_heading_is_confirmed_by_each_of_two_m
 
 
 def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
-    map = ViewMixtures.empty()
-    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-    for x in (0.0, 8.0):
-        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
-    passive = {"forgetting": "passive"}
-    event = learn(map, view(0.2, 0), state([0, 0, 0]), **passive)
+    map = learned(0.0, 0.0, 8.0)
+    event = learn(map, view(0.2, 0), state([0, 0, 0]), forgetting="passive")
     # S = 0.8: w = 0.08 + 0.92 * 0.5 (16), and 0.92 * 0.5 (17).
     np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.54, 0.46])
     assert event.changed.tolist() == [0]
@@ -143,33 +130,23 @@ def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
     np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.08 + 0.92 * 0.54, 0.46])
 
 
-def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty(monkeypatch):
-    def made():
-        map = ViewMixtures.empty()
-        for name, x in enumerate((0.0, 0.3, 0.6)):
-            map.add_view(np.array([10.0 + 2 * name, 0.0], np.float32), "Coefficients")
-            map.add_component(name, np.array([x, 0.0, 2.0]), np.eye(3) * 0.01, 0.5, 3.0)
-        return map
-
-    monkeypatch.setattr(FORGET_GAIN, 0.25)
-    active = {"forgetting": "active", "threshold": NoveltyThreshold(1.0, True, 0.4), "beta_forget": 0.2}
-    map = made()
-    learn(map, view(0, 0), state([0, 0, 0], sigma=0.1), **active)
+@pytest.mark.parametrize(
+    ("forgetting", "sigma", "kept"),
+    [("active", 0.1, [0.9, 0.975, 1.0]), ("active", 0.2, [0.95, 0.9875, 1.0]), ("passive", 0.2, [1.0, 1.0, 1.0])],
+)
+def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty(monkeypatch, forgetting, sigma, kept):
     # b = 0.2 (1 - d / 0.4) 0.1 / (0.1 + 0.1): 0.1 at 0 m, 0.025 at 0.3 m, nothing at 0.6 m; headings do not matter.
-    np.testing.assert_allclose(map.weights[:3], [0.5 * 0.9, 0.5 * 0.975, 0.5])
-    map = made()
-    learn(map, view(0, 0), state([0, 0, 0], sigma=0.2), **active)
-    np.testing.assert_allclose(map.weights[:3], [0.5 * 0.95, 0.5 * 0.9875, 0.5])
-    map = made()
-    learn(map, view(0, 0), state([0, 0, 0], sigma=0.2), **{**active, "forgetting": "passive"})
-    np.testing.assert_allclose(map.weights[:3], 0.5)
+    monkeypatch.setattr(FORGET_GAIN, 0.25)
+    map = ViewMixtures.empty()
+    for look, x in ((10.0, 0.0), (12.0, 0.3), (14.0, 0.6)):
+        learned(look, (x, 0.0, 2.0), map=map)
+    learn(map, view(0, 0), state([0, 0, 0], sigma=sigma), NoveltyThreshold(1.0, True, 0.4), forgetting=forgetting)
+    np.testing.assert_allclose(map.weights[:3], 0.5 * np.array(kept))
 
 
 def test_a_very_certain_state_removes_at_most_the_whole_weight(monkeypatch):
     monkeypatch.setattr(FORGET_GAIN, 2.0 / 0.3)
-    map = ViewMixtures.empty()
-    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
-    map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
+    map = learned(10.0, 0.0)
     # b = 0.2 * 2 / 0.002 = 200: without a limit the weight would be negative (erratum 11).
     event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active")
     assert event.removed.tolist() == [0]
@@ -216,55 +193,6 @@ def test_the_cap_on_views_holds_when_many_updates_come_at_once():
     assert event.inserted.tolist() == map.ids.tolist()
 
 
-def test_before_there_is_a_threshold_only_the_first_update_is_applied():
-    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), PendingUpdates()
-    for n in range(3):
-        lessons = MapUpdates((MapUpdate(view(2 * n, 0), state([n, 0, 0]), n),))
-        stage.step(Context("mapping"), lessons, None, map, waiting)
-        assert len(map) == 1
-    event = stage.step(Context("mapping"), None, LIMIT, map, waiting).events
-    assert map.means[:, 0].tolist() == [0.0, 1.0, 2.0]
-    assert (event.inserted.tolist(), event.seen.tolist()) == ([1, 2], [1, 2])
-    assert not waiting.waiting
-
-
-def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing():
-    map = ViewMixtures.empty()
-    assert AdaptiveViews().step(Context("m"), MapUpdates(()), LIMIT, map, PendingUpdates()).events is None
-    lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
-    out = Frozen().step(Context("m"), map=map, updates=lessons, threshold=LIMIT)
-    assert out.map is map
-    assert (len(map), map.steps) == (0, 0)
-
-
-def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row(monkeypatch):
-    monkeypatch.setattr(FORGET_GAIN, 5.0 / 0.3)
-    rng = np.random.default_rng(0)
-    map, waiting = ViewMixtures.empty(), PendingUpdates()
-
-    def random_lesson(least):
-        parts = int(rng.integers(1, 4))
-        roots = rng.normal(0, 0.2, (parts, 3, 3))
-        covariances = roots @ roots.transpose(0, 2, 1) + np.eye(3) * least
-        where = GaussianMixture(rng.normal(0, 1, (parts, 3)), covariances, rng.random(parts) + 1e-3)
-        return MapUpdate(view(*rng.normal(0, 2.0, 2)), where, 0)
-
-    for _ in range(1000):
-        forgetting, beta = str(rng.choice(["active", "passive", "none"])), rng.uniform(0.1, 1.0)
-        stage = AdaptiveViews(forgetting=forgetting, beta=beta, max_views=12, **FREE)
-        least = 10.0 ** rng.uniform(-6, -1)
-        stage.step(Context("m"), MapUpdates(tuple(random_lesson(least) for _ in range(10))), LIMIT, map, waiting)
-        assert (map.weights >= 0).all()
-        assert (map.weights <= 1).all()
-        assert (map.counts > 0).all()
-        assert (np.bincount(map.owner, minlength=len(map)) > 0).all(), "no view without a place"
-        np.testing.assert_array_equal(map.covariances, map.covariances.transpose(0, 2, 1))
-        assert (np.linalg.eigvalsh(map.covariances) > 0).all()
-        assert (np.abs(map.means[:, 2]) <= math.pi).all()
-        assert len(map) <= 12
-    assert map.steps == 10_000
-
-
 def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
     # b = 0.2 (1 - d / s) 2 s / (0.1 + 0.1), at most 1: at d = 0.4 m with s = 0.5 m 0.2, with 0.3 m (unknown) nothing.
     for threshold, weight in (
@@ -272,11 +200,8 @@ def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
         (NoveltyThreshold(1.0, False, 0.5), 0.5),
         (NoveltyThreshold(1.0, True, 0.0), 0.5),
     ):
-        map = ViewMixtures.empty()
-        map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
-        map.add_component(0, np.array([0.4, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
-        lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
-        AdaptiveViews(**FREE).step(Context("mapping"), lessons, threshold, map, PendingUpdates())
+        map = learned(10.0, 0.4)
+        learn(map, view(0, 0), state([0, 0, 0]), threshold)
         assert map.weights[0] == pytest.approx(weight)
         assert map.threshold == (threshold if threshold.settled else None)
 
@@ -285,9 +210,7 @@ def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
 def test_forgetting_ends_where_it_has_faded(monkeypatch, scale_m, weight):
     # At 0.3 m (0.18, 0.24), a limit itself excluded: b = 0.2 (1 - 0.3 / 0.4) 0.2 / 0.2.
     monkeypatch.setattr(FORGET_GAIN, 0.2 / scale_m)
-    map = ViewMixtures.empty()
-    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
-    map.add_component(0, np.array([0.18, 0.24, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+    map = learned(10.0, (0.18, 0.24, 0.0))
     learn(map, view(0, 0), state([0, 0, 0]), NoveltyThreshold(1.0, True, scale_m))
     assert map.weights[0] == pytest.approx(weight)
 
@@ -295,9 +218,7 @@ def test_forgetting_ends_where_it_has_faded(monkeypatch, scale_m, weight):
 def test_forgetting_goes_by_both_sigmas_of_each_mode_and_its_weight(monkeypatch):
     monkeypatch.setattr(FORGET_GAIN, 0.4 / 0.3)
     # b = 0.2 * 0.4 / (0.1 + 0.3) = 0.2 of a mode of half the weight.
-    map = ViewMixtures.empty()
-    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
-    map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
+    map = learned(10.0, 0.0)
     covariances = np.stack([np.diag([0.01, 0.09, 0.01])] * 2)
     split = GaussianMixture(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]), covariances, np.array([3.0, 3.0]))
     learn(map, view(0, 0), split)
@@ -309,9 +230,7 @@ def test_a_component_at_the_limit_still_fits_and_headings_count(monkeypatch: pyt
     monkeypatch.setattr("omninav.stages.mapping.adaptive_views.MERGE_BELOW", 0.0)
     # Squared distances with both covariances: 0.4^2 / 0.02 = 8; and 3.0 against -3.0 rad is 0.283 rad apart: 4.01.
     for where, fits, grows in (([0.4, 0, 3.0], 8.0, True), ([0.4, 0, 3.0], 7.9, False), ([0, 0, -3.0], 4.1, True)):
-        map = ViewMixtures.empty()
-        row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-        map.add_component(row, np.array([0.0, 0.0, 3.0]), np.eye(3) * 0.01, 0.5, 3.0)
+        map = learned(0.0, (0.0, 0.0, 3.0))
         monkeypatch.setattr("omninav.stages.mapping.adaptive_views.FITS_BELOW", fits + 1e-9)
         learn(map, view(0, 0), state(where))
         assert map.weights[0] == pytest.approx(0.1 + 0.9 * 0.5 if grows else 0.9 * 0.5)
@@ -319,10 +238,7 @@ def test_a_component_at_the_limit_still_fits_and_headings_count(monkeypatch: pyt
 
 def test_weights_of_merged_components_are_added_and_capped_at_one():
     # Erratum 8: 0.7 and 0.6 become 1, which the state then confirms: 0.1 + 0.9 * 1.
-    map = ViewMixtures.empty()
-    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-    for x, weight in ((0.0, 0.7), (0.1, 0.6)):
-        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, weight, 2.0)
+    map = learned(0.0, 0.0, 0.1, weights=(0.7, 0.6), count=2.0)
     learn(map, view(0, 0), state([0.05, 0, 0]))
     assert map.weights == pytest.approx([1.0])
     assert map.counts == pytest.approx([5.0])
@@ -330,10 +246,7 @@ def test_weights_of_merged_components_are_added_and_capped_at_one():
 
 
 def test_each_mode_confirms_the_component_that_is_nearest_to_it_and_a_far_one_is_new():
-    map = ViewMixtures.empty()
-    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
-    for x in (0.0, 0.5, 5.0):
-        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+    map = learned(0.0, 0.0, 0.5, 5.0)
     modes = state([9.0, 0, 0], [0.4, 0, 0], [5.1, 0, 0], sigma=0.2, weights=[0.25, 0.5, 0.25])
     learn(map, view(0, 0), modes, min_sigma_m=0.1, min_sigma_deg=np.degrees(0.1))
     order = np.argsort(map.means[:, 0])

@@ -1,27 +1,18 @@
-"""Updates before there is a threshold, and those with which a map is learned again."""
+"""Updates with which a map is learned again."""
 
 import numpy as np
 import pytest
 
-from omninav.stages.mapping.pending_updates import PendingUpdates, ready_updates, start_over
+from omninav.stages.mapping.pending_updates import PendingUpdates, start_over
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, NoveltyThreshold
+from omninav.stages.values.views import Coefficients
 
 VIEW = Coefficients(np.zeros(2, np.float32), np.zeros((1, 2), np.float32))
 STATE = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
 UPDATES = tuple(MapUpdate(VIEW, STATE, n) for n in range(3))
-
-
-def test_without_a_threshold_only_a_map_s_first_update_is_applied() -> None:
-    map, before = ViewMixtures.empty(), PendingUpdates()
-    assert ready_updates(UPDATES[:2], None, map, before) == [UPDATES[0]]
-    map.add_view(VIEW.values, "Coefficients")
-    assert ready_updates(UPDATES[2:], None, map, before) == []
-    assert ready_updates((), NoveltyThreshold(1.0), map, before) == list(UPDATES[1:])
-    assert before.waiting == []
 
 
 @pytest.mark.parametrize("relearn", [True, False])
