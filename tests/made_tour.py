@@ -43,6 +43,16 @@ def scattered(width: float, depth: float, number: int = 900) -> np.ndarray:
     return rng.uniform((0.0, 0.0, 0.0), (width, depth, 2.5), (number, 3))
 
 
+def furnished_alike() -> Landmarks:
+    """Landmarks of a floor of 40 m by 40 m, which around (20, 32) are those around (20, 8)."""
+    where, look = scattered(40.0, 40.0), np.arange(900)
+    here, there = (np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - y) < 3.0) for y in (8.0, 32.0))
+    number = min(len(here), len(there))
+    where[there[:number]] = where[here[:number]] + (0.0, 24.0, 0.0)
+    look[there[:number]] = look[here[:number]]
+    return Landmarks(where, look)
+
+
 def along(corners: list[tuple[float, float]], step: float) -> list[Pose]:
     """Poses every `step` metres along straight lines, looking ahead."""
     poses = []

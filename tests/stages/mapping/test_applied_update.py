@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from made_beliefs import along_x
+from made_view_maps import learned
 
 from omninav.stages.mapping.applied_update import AppliedUpdate, record_update
-from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-STATE = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
 TURNS, ALIKE = np.array([0.1, 0.2, 0.3]), np.array([0.9, 0.8, 0.7])
 
 
@@ -15,15 +15,15 @@ def made_map() -> ViewMixtures:
     """Views 0 to 3 with one, two, one and three components at x = 10 view + component."""
     map = ViewMixtures.empty()
     for view, parts in enumerate((1, 2, 1, 3)):
-        row = map.add_view(np.array([view, 0.0], np.float32), "Coefficients")
-        for part in range(parts):
-            map.add_component(row, np.array([10.0 * view + part, 0.0, 0.0]), np.eye(3), 1.0 / parts, 2.0 + part)
+        learned(
+            view, *(10.0 * view + part for part in range(parts)), weights=tuple(np.arange(1, parts + 1) / 8), map=map
+        )
     return map
 
 
 def recorded(map: ViewMixtures, ids: list[int]) -> AppliedUpdate:
     number = len(ids)
-    return record_update(STATE, 7, np.array(ids), TURNS[:number], ALIKE[:number], map)
+    return record_update(along_x(0.0), 7, np.array(ids), TURNS[:number], ALIKE[:number], map)
 
 
 def places(applied: AppliedUpdate) -> list[list[float]]:
@@ -34,7 +34,7 @@ def test_the_components_of_its_views_are_recorded_each_with_its_own() -> None:
     applied = recorded(made_map(), [1, 2, 3])
     assert places(applied) == [[10.0, 11.0], [20.0], [30.0, 31.0, 32.0]]
     _, _, weights, counts = next(applied.places())
-    assert (weights.tolist(), counts.tolist()) == ([0.5, 0.5], [2.0, 3.0])
+    assert (weights.tolist(), counts.tolist()) == ([0.125, 0.25], [3.0, 3.0])
 
 
 @pytest.mark.parametrize("dropped", [None, 0])

@@ -16,12 +16,10 @@ from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, Cal
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.mapping.fixed_threshold import FixedThreshold
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
-from omninav.stages.mapping.image_database import ImageDatabase, ImageDatabaseState
 from omninav.stages.mapping.keyframe_history import KeyframeHistory
 from omninav.stages.mapping.learned_words import LearnVisualWords
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
-from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.mapping.supervised_views import SupervisedViews
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueState
@@ -160,15 +158,6 @@ def test_all_references_within_half_a_metre_are_compared() -> None:
         assert len(map) == number
 
 
-def test_every_image_is_kept_in_a_database() -> None:
-    # Wolf, Burgard & Burkhardt 2005, section VI.
-    map, last = ReferenceGraph.empty(), ImageDatabaseState()
-    for tick in range(3):
-        seen = SegmentHistograms(np.ones((2, 2), np.float32) / 2)
-        ImageDatabase().step(context(tick, not tick), seen, None, Pose(0.0, 0.0, 0.0), map, last)
-    assert len(map) == 3
-
-
 @pytest.mark.parametrize(("step", "kept"), [(0.0099, 1), (0.0101, 2)])
 def test_views_of_a_drive_are_kept_a_centimetre_apart(step: float, kept: int) -> None:
     sessions: Sessions | None = None
@@ -183,22 +172,6 @@ def test_a_supervised_view_is_seen_from_a_quarter_of_a_metre_and_ten_degrees_aro
     map = SupervisedViews().step(CTX, [view(0.0)], [Pose(1.0, 2.0, 0.5)]).map
     assert np.sqrt(np.diagonal(map.covariances[0])) == pytest.approx([0.25, 0.25, np.radians(10.0)])
     assert (map.weights.tolist(), map.counts.tolist(), map.steps) == ([1.0], [1.0], 1)
-
-
-def test_a_straightened_drive_is_learned_within_a_tenth_of_a_metre_and_three_degrees() -> None:
-    # Round a square of 4 m twice, 0.5 m from view to view, with views that tell where they are.
-    sessions, pose = Sessions.empty(view(0.0, 0.0)), np.zeros(3)
-    for row in range(34):
-        if row:
-            turn = np.pi / 2 if row % 2 == 0 else 0.0
-            pose = pose + np.array([0.5 * np.cos(pose[2]), 0.5 * np.sin(pose[2]), turn])
-            sessions.move(np.array([0.5, 0.0, turn]))
-        sessions.keep(view(*pose[:2]), pose, row == 0, row)
-    out = StraightenSessions().step(context(99, True), sessions, None, NoveltyThreshold(0.5, True, 0.3))
-    assert out.updates is not None
-    assert out.updates.relearn
-    spread = np.sqrt(np.diagonal(out.updates.items[0].state.covariances[0]))
-    assert spread == pytest.approx([0.1, 0.1, np.radians(3.0)])
 
 
 def test_a_map_of_less_than_ten_references_has_a_length_scale_of_half_a_metre() -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from made_view_maps import learned, view
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.keyframe_history import KeyframeHistory
@@ -9,14 +10,8 @@ from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients
 
 AHEAD = Motion(0.3, 0.0, 0.0)
-
-
-def view(number: float) -> Coefficients:
-    values = np.array([number, 0.0], np.float32)
-    return Coefficients(values, values[None])
 
 
 def believed(*places: float, sigma_rad: float = 0.1, weights: tuple[float, ...] = (1.0,)) -> GaussianMixture:
@@ -98,8 +93,7 @@ def test_drives_of_a_known_map_come_first_and_are_of_no_tick() -> None:
 
 
 def test_a_known_map_without_drives_keeps_none_so_that_it_is_not_forgotten() -> None:
-    known = ViewMixtures.empty()
-    known.add_view(view(1).values, "Coefficients")
+    known = learned(1.0)
     ctx = Context("sessions")
     ctx.tick = Tick(2, 2, first_of_log=True)
     out = KeyframeHistory().step(ctx, view(2), None, believed(1.0), None, known)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from made_tour import Landmarks, Mapped, along, mapped, scattered
+from made_tour import Landmarks, Mapped, along, furnished_alike, mapped, scattered
 from made_views import between_looks, made_hypotheses, made_views
 
 from omninav.pipeline import Context
@@ -63,12 +63,7 @@ def test_only_places_at_the_same_spot_are_merged(twice: Mapped) -> None:
 
 
 def test_what_looks_alike_by_chance_stays_apart() -> None:
-    where, own = scattered(40.0, 40.0), np.arange(900)
-    copied, far = (np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - y) < 3.0) for y in (8.0, 32.0))
-    number = min(len(copied), len(far))
-    where[far[:number]] = where[copied[:number]] + (0.0, 24.0, 0.0)
-    own[far[:number]] = own[copied[:number]]
-    out = mapped(Landmarks(where, own), [along(SQUARE, 1.2)])
+    out = mapped(furnished_alike(), [along(SQUARE, 1.2)])
     found = merged(out)
     map = map_of(out, found)
     assert np.hypot(*(found.poses - map.poses[map.places[found.place]])[:, :2].T).max() < 6.0

@@ -1,18 +1,16 @@
 """Updates with which a map is learned again."""
 
-import numpy as np
 import pytest
+from made_beliefs import along_x
+from made_view_maps import view
 
 from omninav.stages.mapping.pending_updates import PendingUpdates, start_over
-from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients
 
-VIEW = Coefficients(np.zeros(2, np.float32), np.zeros((1, 2), np.float32))
-STATE = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
-UPDATES = tuple(MapUpdate(VIEW, STATE, n) for n in range(3))
+VIEW = view(0.0)
+UPDATES = tuple(MapUpdate(VIEW, along_x(0.0), n) for n in range(3))
 
 
 @pytest.mark.parametrize("relearn", [True, False])

@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import AssumedPose, Pose
+from omninav.stages.values.pose import Pose
 
 
 def view(bin_: int, segments: int = 8) -> SegmentHistograms:
@@ -62,18 +61,6 @@ def test_poses_come_from_where_the_map_says(supervised: str, truth: bool, source
     assert map.poses[0, 0] == x
 
 
-def test_a_map_says_that_its_poses_were_guessed() -> None:
-    ctx, map = Context("mapping"), ReferenceGraph.empty()
-    ctx.tick = Tick(index=0, stamp=0, log=0, first_of_log=True)
-    LearnReferenceGraph().step(ctx, view(1), AssumedPose(0.0, 0.0, 0.0), None, map, LearnReferenceGraphState())
-    assert map.pose_source == "guess"
-
-
-def test_supervision_without_truth_is_refused() -> None:
-    with pytest.raises(BadInput, match="no ground truth"):
-        drive(LearnReferenceGraph(supervised="truth"), [(0.0, 0.0, 1)], truth=False)
-
-
 def test_a_growing_map_keeps_what_it_had() -> None:
     map, rng = ReferenceGraph.empty(), np.random.default_rng(0)
     features = rng.random((300, 6, 3)).astype(np.float32)
@@ -85,14 +72,6 @@ def test_a_growing_map_keeps_what_it_had() -> None:
     assert np.array_equal(map.features, features)
     assert np.array_equal(map.poses[:, 0], np.arange(300))
     assert len(map.edges) == 299
-
-
-def test_a_map_that_was_loaded_grows_on() -> None:
-    one = np.ones((1, 6, 3), np.float32)
-    map = ReferenceGraph(np.zeros((1, 3)), one, "colours", np.zeros((0, 2), np.int64), "truth")
-    map.insert(Pose(1.0, 0.0, 0.0), one[0], "colours")
-    assert len(map) == 2
-    assert map.features.shape == (2, 6, 3)
 
 
 def test_views_of_another_kind_do_not_enter_a_map() -> None:
@@ -108,25 +87,10 @@ def test_a_reference_with_the_default_features_takes_less_than_4_kb() -> None:
     assert map.poses.nbytes + map.features.nbytes + 2 * 16 < 4000
 
 
-def test_two_logs_without_truth_make_no_map() -> None:
-    stage, ctx, along = LearnReferenceGraph(), Context("mapping"), LearnReferenceGraphState()
-    view = SegmentHistograms(np.full((4, 2), 0.5, np.float32))
-    map = ReferenceGraph.empty()
-    ctx.tick = Tick(0, 0, log=0, first_of_log=True)
-    stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
-    ctx.tick = Tick(1, 1, log=1, first_of_log=True)
-    with pytest.raises(BadInput, match="frame of its own"):
-        stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
-
-
 def test_a_view_at_the_limits_adds_nothing() -> None:
     # As far as the distance, and as alike as asked: half of the bins are the same.
-    stage, ctx, along = (
-        LearnReferenceGraph(distance_m=0.25, similarity=0.5),
-        Context("mapping"),
-        LearnReferenceGraphState(),
-    )
-    map, reasons = ReferenceGraph.empty(), []
+    stage, ctx = LearnReferenceGraph(distance_m=0.25, similarity=0.5), Context("mapping")
+    along, map, reasons = LearnReferenceGraphState(), ReferenceGraph.empty(), []
     mixed = SegmentHistograms((view(3).values + view(7).values) / 2)
     unlike = SegmentHistograms((view(3).values + 2 * view(7).values) / 3)
     for tick, (seen, x) in enumerate(((view(3), 0.0), (mixed, 0.25), (unlike, 0.25), (view(7), 0.51))):
@@ -157,12 +121,8 @@ def test_references_beyond_the_vicinity_do_not_count() -> None:
 
 
 def test_the_closest_reference_is_where_an_edge_leads_and_none_leads_across_a_gap() -> None:
-    stage, ctx, along = (
-        LearnReferenceGraph(distance_m=0.4, similarity=0.0),
-        Context("mapping"),
-        LearnReferenceGraphState(),
-    )
-    map = ReferenceGraph.empty()
+    stage, ctx = LearnReferenceGraph(distance_m=0.4, similarity=0.0), Context("mapping")
+    along, map = LearnReferenceGraphState(), ReferenceGraph.empty()
     for tick, x in enumerate((0.0, 1.0, 2.0, 3.0, None, 3.1, None, 0.9, 0.1)):
         ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
         stage.step(ctx, view(3), None, None if x is None else Pose(x, 0.0, 0.0), map, along)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from made_tour import Landmarks, along, mapped, scattered
+from made_tour import Landmarks, Mapped, along, furnished_alike, mapped, scattered
 from made_views import made_views
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
@@ -23,7 +23,8 @@ from omninav.stages.geometry.appearance.place_clusters import (
 )
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.probability.dempster_shafer import support
-from omninav.stages.mapping.topological import with_names
+from omninav.stages.mapping.loop_closure import LoopClosure
+from omninav.stages.mapping.topological import TopologicalMapping, with_names
 from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
@@ -41,15 +42,13 @@ def gaps(found: LoopHypotheses) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def once() -> tuple[TopologicalMap, LoopHypotheses]:
-    out = mapped(WORLD, [along(SQUARE, 1.2)])
-    return out.map, out.hypotheses
+def once() -> Mapped:
+    return mapped(WORLD, [along(SQUARE, 1.2)])
 
 
 @pytest.fixture(scope="module")
-def twice() -> tuple[TopologicalMap, LoopHypotheses]:
-    out = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)])
-    return out.map, out.hypotheses
+def twice() -> Mapped:
+    return mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)])
 
 
 def test_in_a_cluster_no_two_views_are_further_apart_than_its_size() -> None:
@@ -102,8 +101,8 @@ def test_path_images_are_few_and_each_sees_enough_of_the_one_before() -> None:
     assert waypoint_views(matches, at, -100, 4).tolist() == [4, 8]
 
 
-def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    made, found = once
+def test_a_ring_driven_once_is_a_ring_of_places(once: Mapped) -> None:
+    made, found = once.map, once.hypotheses
     assert 10 < len(made) < 0.5 * len(found.poses)
     assert made.kinds.tolist() == [0] * len(made.links)
     neighbours = np.bincount(made.links.ravel(), minlength=len(made))
@@ -113,13 +112,13 @@ def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, Loop
     for link, (one, other) in enumerate(made.links):
         way = [int(view) for view in (made.places[one], *made.path_of(link), made.places[other])]
         for here, there in itertools.pairwise(way):
-            seen = [WORLD.seen(Pose(*(float(number) for number in made.poses[view]))) for view in (here, there)]
+            seen = [WORLD.seen(Pose(*made.poses[view].tolist())) for view in (here, there)]
             found = len(match_patches(*(view.patches() for view in seen), ComparisonOptions()).first)
             assert found >= 20 or abs(made.frames[here] - made.frames[there]) == 1
 
 
-def test_a_second_round_is_found_to_be_the_first(twice: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    _, found = twice
+def test_a_second_round_is_found_to_be_the_first(twice: Mapped) -> None:
+    found = twice.hypotheses
     half = len(found.poses) // 2
     assert (gaps(found)[found.accepted] < 2.5).all()
     right = gaps(found) < 1.5
@@ -130,27 +129,18 @@ def test_a_second_round_is_found_to_be_the_first(twice: tuple[TopologicalMap, Lo
 
 
 def test_what_looks_alike_by_chance_is_left_apart() -> None:
-    where, own = scattered(40.0, 40.0), np.arange(900)
-    copied = np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - 8.0) < 3.0)
-    elsewhere = where.copy()
-    far = np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - 32.0) < 3.0)
-    number = min(len(copied), len(far))
-    elsewhere[far[:number]] = where[copied[:number]] + (0.0, 24.0, 0.0)  # a corner that is furnished alike
-    own[far[:number]] = own[copied[:number]]
-    out = mapped(Landmarks(elsewhere, own), [along(SQUARE, 1.2)])
+    out = mapped(furnished_alike(), [along(SQUARE, 1.2)])
     assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()
 
 
-def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    made, found = once
+def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: Mapped) -> None:
+    made, found = once.map, once.hypotheses
     match, context = VisualDistance(), Context("match")
     match.setup(context)
     apart = []
     for row, pose in enumerate(found.poses):
-        seen = WORLD.seen(Pose(*(float(number) for number in pose)))
-        distances = match.step(
-            context, features=seen, descriptor=GlobalDescriptor(np.zeros(3, np.float32)), map=made
-        ).distances
+        seen, grey = WORLD.seen(Pose(*pose.tolist())), GlobalDescriptor(np.zeros(3, np.float32))
+        distances = match.step(context, features=seen, descriptor=grey, map=made).distances
         if row != made.frames[made.places[found.place[row]]]:
             apart.append(distances.distances[found.place[row]])
     assert made.spread == pytest.approx(np.sqrt(np.mean(np.square(apart))), rel=0.01)
@@ -168,12 +158,11 @@ def test_two_maps_of_one_tour_are_the_same_bytes() -> None:
     assert encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map) == encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map)
 
 
-def test_a_view_is_kept_small_and_can_still_be_matched(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    made, _ = once
+def test_a_view_is_kept_small_and_can_still_be_matched(once: Mapped) -> None:
+    made = once.map
     for place in (0, len(made) // 2):
         view = int(made.places[place])
-        pose = Pose(*(float(number) for number in made.poses[view]))
-        kept, seen = made.views.features(view), WORLD.seen(pose)
+        kept, seen = made.views.features(view), WORLD.seen(Pose(*made.poses[view].tolist()))
         pairs = match_patches(kept.patches(), seen.patches(), ComparisonOptions())
         assert len(pairs.first) == len(kept) <= 80
         apart = np.arccos(np.clip((kept.bearings[pairs.first] * seen.bearings[pairs.second]).sum(axis=1), -1.0, 1.0))
@@ -182,8 +171,8 @@ def test_a_view_is_kept_small_and_can_still_be_matched(once: tuple[TopologicalMa
     assert isinstance(decode(encode(made)), TopologicalMap)
 
 
-def test_a_map_grows_from_a_second_tour(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    known, _ = once
+def test_a_map_grows_from_a_second_tour(once: Mapped) -> None:
+    known = once.map
     shortcut = along([(8.0, 8.0), (20.0, 8.0), (20.0, 32.0), (8.0, 32.0)], 1.2)
     out = mapped(WORLD, [shortcut], known=known)
     grown = out.map
@@ -206,9 +195,10 @@ def test_two_tours_at_once_make_one_map_with_no_link_from_end_to_start() -> None
     assert np.hypot(*np.diff(jump, axis=1)[:, 0].T).max() < 10.0
 
 
-def test_accepted_places_can_stay_two_with_a_link(twice: tuple[TopologicalMap, LoopHypotheses]) -> None:
-    linked = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)], accepted="link").map
-    assert len(linked) > len(twice[0])
+def test_accepted_places_can_stay_two_with_a_link(twice: Mapped) -> None:
+    found = LoopClosure(accepted="link").step(Context("loops"), twice.views).hypotheses
+    linked = TopologicalMapping().step(Context("mapping"), twice.views, found).map
+    assert len(linked) > len(twice.map)
     assert (linked.kinds == LOOP).sum() > 5
     loop = int(np.flatnonzero(linked.kinds == LOOP)[0])
     assert len(linked.path_of(loop)) == 0
@@ -227,16 +217,18 @@ def test_a_second_tour_is_recognised_by_the_few_features_that_a_map_keeps() -> N
     assert found.accepted[across].mean() > 0.8
 
 
-def test_the_reach_of_evidence_is_counted_in_pictures_that_take_part() -> None:
-    every = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)]).hypotheses
+def test_the_reach_of_evidence_is_counted_in_pictures_that_take_part(twice: Mapped) -> None:
+    every = twice.hypotheses
     second = mapped(WORLD, [along(SQUARE + SQUARE[1:], 0.6)], every_s=2.0).hypotheses
     assert len(every.masses) > 5
     assert second.masses == pytest.approx(every.masses)
 
 
-def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are(
+    monkeypatch: pytest.MonkeyPatch, twice: Mapped
+) -> None:
     monkeypatch.setattr("omninav.stages.mapping.loop_closure.NEIGHBOUR_DISTANCE", 0.1)
-    found = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)]).hypotheses
+    found = LoopClosure().step(Context("loops"), twice.views).hypotheses
     assert (support(found.masses) > 0.5).any()
     assert not found.accepted.any()
 

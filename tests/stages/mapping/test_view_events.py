@@ -1,6 +1,7 @@
 """Events of a map of views, and its hard limit."""
 
 import numpy as np
+from made_view_maps import learned
 
 from omninav.stages.mapping.view_cap import within_cap
 from omninav.stages.mapping.view_events import view_event
@@ -8,13 +9,11 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 
 
 def made_map(weights, counts=None):
+    """Views 0, 1 and so on, each learned in a step of its own; their parts are at (view, part)."""
     map = ViewMixtures.empty()
-    for name, parts in enumerate(weights):
-        row = map.add_view(np.array([name, 0.0], np.float32), "Coefficients")
-        for part, weight in enumerate(parts):
-            count = 1.0 if counts is None else counts[name]
-            map.add_component(row, np.array([name, part, 0.0]), np.eye(3), weight, count)
-        map.step()
+    for name, shares in enumerate(weights):
+        places = [(name, part, 0.0) for part in range(len(shares))]
+        learned(name, *places, weights=tuple(shares), count=1.0 if counts is None else counts[name], map=map).step()
     return map
 
 
@@ -22,7 +21,7 @@ def test_an_event_names_what_came_and_what_went():
     map = made_map([[0.5], [0.2], [0.9]])
     before = map.ids
     map.keep_views(np.array([True, False, True]))
-    map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
+    learned(7.0, map=map)
     event = view_event(map, before, np.array([2, 2, 1]), {3: 17}, "forgotten")
     assert (event.views, event.components) == (3, 2)
     assert event.inserted.tolist() == [3]
@@ -54,5 +53,5 @@ def test_of_equally_heavy_views_those_seldom_seen_go_first_and_then_the_oldest()
 
 def test_a_view_of_this_very_step_stays_though_it_has_no_weight_yet():
     map = made_map([[0.5], [0.2]])
-    map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
+    learned(7.0, map=map)
     assert within_cap(map, 2).tolist() == [True, False, True]
