@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.length_scale import excess_by_distance
@@ -25,7 +26,7 @@ def along_a_wall(directions: int, segments: int) -> ReferenceGraph:
     poses[..., 0] = STEP * np.arange(PLACES)
     poses[..., 2] = (np.arange(directions) * 2 * np.pi / directions)[:, None] + 1.0
     features = np.repeat(shows.reshape(directions * PLACES, 1, -1), segments, axis=1)
-    return ReferenceGraph(poses.reshape(-1, 3), features, "histograms", np.zeros((0, 2), np.int64), "truth")
+    return references(poses.reshape(-1, 3), features)
 
 
 @pytest.mark.parametrize(("directions", "segments"), [(1, 1), (4, 1), (1, 3)])

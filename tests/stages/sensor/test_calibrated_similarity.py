@@ -5,20 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_beliefs import even
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.sensor.calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from omninav.stages.sensor.near_references import NearReferences
-from omninav.stages.values.belief import Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
-from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.similarity import Similarities
 
 CALIBRATION = SimilarityCalibration(slope=4.0, middle=1.0, images=100, right_distance_m=0.5, correlation_m=2.0)
 PLACES = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
-WALK = ReferenceGraph(PLACES, np.zeros((20, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+WALK = references(PLACES)
 
 
 def similarities() -> Similarities:
@@ -33,12 +33,10 @@ def weighed(
     calibration: SimilarityCalibration = CALIBRATION,
     last_view: float | None = None,
 ):
-    particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
-    stage = NearReferences(independence_distance=1.0)
-    ctx = Context("sensor")
+    stage, ctx = NearReferences(independence_distance=1.0), Context("sensor")
     stage.setup(ctx)
     seen = replace(similarities(), last_view=last_view)
-    return stage.step(ctx, seen, particles, WALK, motion, LengthScale(0.5), calibration)
+    return stage.step(ctx, seen, even(poses), WALK, motion, LengthScale(0.5), calibration)
 
 
 def test_at_a_reference_the_weight_is_its_ratio_over_the_largest():

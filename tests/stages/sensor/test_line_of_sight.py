@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_references import references
 from scipy import ndimage
 
 from omninav.pipeline import Context
@@ -31,8 +32,7 @@ def drawn(*rows: str, resolution: float = 1.0) -> OccupancyGrid:
 
 
 def a_map(*poses: tuple[float, float, float], segments: int = 1) -> ReferenceGraph:
-    features = np.zeros((len(poses), segments, 4), np.float32)
-    return ReferenceGraph(np.array(poses, float), features, "histograms", np.zeros((0, 2), np.int64), "truth")
+    return references(poses, np.zeros((len(poses), segments, 4), np.float32))
 
 
 ROOM = drawn(
@@ -186,12 +186,10 @@ def test_it_says_what_it_covers_and_how_much_it_takes():
     ctx = Context("areas")
     free = FreeSpace(ROOM.centres(np.array([1, 1]), np.array([1, 2])), 1.0)
     out = LineOfSight().step(ctx, a_map((4.5, 1.5, math.pi / 2), (-3.0, 1.5, 0.0)), ROOM, free)
-    figures = out.metrics.values["visibility"]
-    assert figures["references"] == 2
-    assert figures["areas"] == 1
-    assert figures["covered_rate"] == 1.0
-    assert figures["area_median_m2"] == 14.0
-    assert figures["size_bytes"] == out.areas.nbytes
+    expected = {
+        "references": 2, "areas": 1, "covered_rate": 1.0, "area_median_m2": 14.0, "size_bytes": out.areas.nbytes
+    }  # fmt: skip
+    assert expected.items() <= out.metrics.values["visibility"].items()
     assert ctx.counts["view_without_area"] == 1
 
 

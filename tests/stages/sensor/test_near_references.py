@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from made_beliefs import even
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
@@ -12,7 +14,6 @@ from omninav.stages.sensor.near_references import (
     similarity_field,
     weighted_quantile,
 )
-from omninav.stages.values.belief import Particles
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -21,12 +22,6 @@ from omninav.stages.values.similarity import Similarities
 RNG = np.random.default_rng(0)
 REFERENCES = np.column_stack([RNG.uniform(0, 4, (40, 2)), RNG.uniform(-3, 3, 40)])
 FIELD = RNG.random((40, 36)).astype(np.float32)
-
-
-def a_map() -> ReferenceGraph:
-    return ReferenceGraph(
-        REFERENCES, np.zeros((40, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
-    )
 
 
 def by_words(pose: np.ndarray, fade: float, ordinary: float, cell: float, neighbours: int, radius: float) -> float:
@@ -56,13 +51,8 @@ def test_the_kernel_agrees_with_a_plain_implementation(fade: float) -> None:
     words = [by_words(pose, fade, 0.3, cells.cell, 4, 3 * fade) for pose in poses]
     assert np.allclose(found, words, atol=1e-6)
     assert (found > 0.3).any()
-
-
-def test_references_that_were_not_compared_do_not_count() -> None:
-    poses = REFERENCES[:5].copy()
-    cells = NearestCells(REFERENCES, 4, 0.1, 1.5)
-    found = expected_similarity(poses, REFERENCES, cells.of(poses), np.full(40, -1), FIELD, 0.5, 0.3)
-    assert np.allclose(found, 0.3)
+    not_compared = np.full(40, -1)
+    assert np.allclose(expected_similarity(poses, REFERENCES, cells.of(poses), not_compared, FIELD, fade, 0.3), 0.3)
 
 
 def step(
@@ -74,8 +64,7 @@ def step(
 ) -> NearReferences.Out:
     ctx = Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
-    particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
-    return stage.step(ctx, Similarities(field), particles, a_map(), motion, length_scale)
+    return stage.step(ctx, Similarities(field), even(poses), references(REFERENCES), motion, length_scale)
 
 
 def one_good_match() -> np.ndarray:
@@ -140,24 +129,16 @@ def test_without_a_power_it_follows_from_how_much_similarity_varies_between_plac
 
 def test_distances_are_in_length_scales() -> None:
     poses = REFERENCES + np.array([0.3, 0.0, np.pi / 2])
-    ctx, stage = Context("sensor"), NearReferences()
-    belief = Particles(poses, np.full(40, 1 / 40))
-
-    def at(reach: float) -> np.ndarray:
-        stage.setup(ctx)
-        return stage.step(
-            ctx, Similarities(one_good_match()), belief, a_map(), None, LengthScale(reach)
-        ).likelihood.values
-
-    assert at(1.0)[3] > 100 * np.median(at(1.0))  # 0.3 m is near where views change slowly
-    assert at(0.05)[3] < 1.01 * np.median(at(0.05))  # and far where they change quickly
+    slow, quick = (
+        step(NearReferences(), poses, one_good_match(), None, LengthScale(reach)).likelihood.values
+        for reach in (1.0, 0.05)
+    )
+    assert slow[3] > 100 * np.median(slow)  # 0.3 m is near where views change slowly
+    assert quick[3] < 1.01 * np.median(quick)  # and far where they change quickly
 
 
 def test_the_next_image_of_a_standing_robot_is_little_evidence() -> None:
-    poses, stage = (
-        REFERENCES + np.array([0.0, 0.0, np.pi / 2]),
-        NearReferences(independence_distance=0.4),
-    )
+    poses, stage = REFERENCES + np.array([0.0, 0.0, np.pi / 2]), NearReferences(independence_distance=0.4)
     moving = step(stage, poses, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood.values
     standing = step(stage, poses, one_good_match(), Motion(0.0, 0.0, 1.0)).likelihood.values
     half = step(stage, poses, one_good_match(), Motion(0.06, 0.08, 0.0)).likelihood.values
@@ -177,7 +158,6 @@ def test_the_mean_likelihood_takes_the_whole_evidence_of_an_image() -> None:
 def test_an_empty_comparison_weights_all_particles_alike() -> None:
     ctx, stage = Context("sensor"), NearReferences()
     stage.setup(ctx)
-    empty = ReferenceGraph.empty()
-    belief = Particles(np.zeros((7, 3)), np.full(7, 1 / 7))
-    out = stage.step(ctx, Similarities(np.zeros((0, 36), np.float32)), belief, empty)
+    alike = Similarities(np.zeros((0, 36), np.float32))
+    out = stage.step(ctx, alike, even(np.zeros((7, 3))), ReferenceGraph.empty())
     assert np.array_equal(out.likelihood.values, np.ones(7))

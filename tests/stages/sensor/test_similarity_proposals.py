@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.sensor.near_references import similarity_field
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals, draw_cells
-from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
 RNG = np.random.default_rng(0)
 REFERENCES = np.column_stack([RNG.uniform(0, 4, (40, 2)), RNG.uniform(-3, 3, 40)])
-MAP = ReferenceGraph(REFERENCES, np.zeros((40, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+MAP = references(REFERENCES)
 
 
 def test_cells_are_drawn_by_weight_and_sampling_weight() -> None:
