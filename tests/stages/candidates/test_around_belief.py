@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from made_beliefs import even, scattered_around
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.candidates.around_belief import AroundBelief
@@ -12,14 +14,11 @@ from omninav.stages.values.maps import ReferenceGraph
 def a_map(number: int = 400, spacing: float = 0.1) -> ReferenceGraph:
     rng = np.random.default_rng(0)
     poses = np.column_stack([spacing * np.arange(number), np.zeros(number), rng.uniform(-3, 3, number)])
-    return ReferenceGraph(
-        poses, np.zeros((number, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
-    )
+    return references(poses)
 
 
-def particles_at(x: float, y: float = 0.0, number: int = 50) -> Particles:
-    poses = np.random.default_rng(1).normal((x, y, 0.0), (0.05, 0.05, 0.1), (number, 3))
-    return Particles(poses, np.full(number, 1 / number))
+def particles_at(x: float) -> Particles:
+    return scattered_around((x, 0.0, 0.0), (0.05, 0.05, 0.1), 50)
 
 
 def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
@@ -59,7 +58,7 @@ def test_references_scattered_over_the_plane_are_found_by_their_distance(seed: i
     rng = np.random.default_rng(seed)
     map = a_map(3000)
     map.poses[:, :2] = rng.normal(0, 30, (3000, 2))
-    belief = Particles(np.concatenate([rng.normal(0, 20, (40, 2)), np.zeros((40, 1))], axis=1), np.full(40, 1 / 40))
+    belief = even(rng.normal(0, (20, 20, 0), (40, 3)))
     references, _ = chosen(near(map, belief, 2.0, background=0))
     gap = gaps_to(map, belief)
     assert set(np.flatnonzero(gap <= 2.0)) <= set(references)
@@ -69,7 +68,7 @@ def test_references_scattered_over_the_plane_are_found_by_their_distance(seed: i
 def test_around_recovery_particles_only_the_nearest_references_are_compared() -> None:
     map, tracked, hypotheses = a_map(), particles_at(8.0), particles_at(30.0)
     poses = np.concatenate([tracked.poses, hypotheses.poses])
-    belief = Particles(poses, np.full(len(poses), 1 / len(poses)), recovery_particles=len(hypotheses.poses))
+    belief = Particles(poses, np.full(100, 0.01), recovery_particles=50)
     references, weight = chosen(near(map, belief, 3.0, 0.5, background=0))
     inside = (gaps_to(map, tracked) <= 3.0) | (gaps_to(map, hypotheses) <= 0.5)
     assert set(np.flatnonzero(inside)) <= set(references)

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_beliefs import scattered_around
+from made_references import references
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
@@ -43,7 +45,7 @@ def views(number: int, seed: int = 0) -> np.ndarray:
 
 def a_map(number: int = 4000) -> ReferenceGraph:
     poses = np.column_stack([SPACING * np.arange(number), np.zeros((number, 2))])
-    return ReferenceGraph(poses, views(number), "histograms", np.zeros((0, 2), np.int64), "truth")
+    return references(poses, views(number))
 
 
 MAP = a_map()
@@ -104,8 +106,7 @@ def chosen(candidates: Candidates) -> np.ndarray:
 
 
 def particles_at(x: float, spread: float = 0.05) -> Particles:
-    poses = np.random.default_rng(1).normal((x, 0, 0), (spread, 0.05, 0.1), (200, 3))
-    return Particles(poses, np.full(200, 1 / 200))
+    return scattered_around((x, 0, 0), (spread, 0.05, 0.1), 200)
 
 
 def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> None:
@@ -237,5 +238,4 @@ def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("shape", [(1, 5), (1, 1), (36, 3)])
 def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int], form: int) -> None:
     features = np.random.default_rng(0).random((1500, *shape)).astype(np.float32) * 255
-    map = ReferenceGraph(np.zeros((1500, 3)), features, "colours", np.zeros((0, 2), np.int64), "truth")
-    assert len(index_of(map, form)) == 1500
+    assert len(index_of(references(np.zeros((1500, 3)), features, "colours"), form)) == 1500

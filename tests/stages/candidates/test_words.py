@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from made_beliefs import scattered_around
+from made_references import references
 from made_words import NOTHING, features_of, seen_along
 
 from omninav.pipeline import Context, Tick
@@ -21,18 +23,16 @@ def few_references(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("omninav.stages.candidates.around_belief.BACKGROUND_REFERENCES", 50)
 
 
-def a_map(references: int = 300) -> ReferenceGraph:
-    poses = np.column_stack([0.25 * np.arange(references), np.zeros((references, 2))])
-    return ReferenceGraph(
-        poses, np.ones((references, 4, 4), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
-    )
+def a_map(number: int = 300) -> ReferenceGraph:
+    poses = np.column_stack([0.25 * np.arange(number), np.zeros((number, 2))])
+    return references(poses, np.ones((number, 4, 4), np.float32))
 
 
-def output(view=VIEWS[100], near: Particles | None = None, references: int = 300, **kw):
+def output(view=VIEWS[100], near: Particles | None = None, number: int = 300, **kw):
     stage, ctx = WordCandidates(**{"compare_all_up_to": 0, **kw}), Context("candidates")
     ctx.tick = Tick(index=1, stamp=0)
     stage.setup(ctx)
-    return stage.step(ctx, view, a_map(references), WORDS, near)
+    return stage.step(ctx, view, a_map(number), WORDS, near)
 
 
 def chosen(candidates: Candidates) -> set[int]:
@@ -42,8 +42,7 @@ def chosen(candidates: Candidates) -> set[int]:
 
 
 def particles_at(x: float) -> Particles:
-    poses = np.random.default_rng(1).normal((x, 0, 0), (0.05, 0.05, 0.1), (50, 3))
-    return Particles(poses, np.full(50, 1 / 50))
+    return scattered_around((x, 0, 0), (0.05, 0.05, 0.1), 50)
 
 
 def test_references_that_share_words_are_found_without_a_belief() -> None:
@@ -79,11 +78,11 @@ def test_an_image_without_features_is_looked_for_near_the_belief() -> None:
 
 
 def test_references_learned_since_are_compared_in_any_case() -> None:
-    assert {300, 301, 302} <= chosen(output(references=303).candidates)
+    assert {300, 301, 302} <= chosen(output(number=303).candidates)
 
 
 def test_words_of_another_map_are_refused() -> None:
     with pytest.raises(BadInput, match="words of 300 references with a map of 250"):
-        output(references=250)
+        output(number=250)
     with pytest.raises(BadInput, match="descriptors of 128 numbers, the view's are of 64"):
         output(features_of(np.ones((3, 64), np.uint8)))

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_beliefs import along_x
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong
@@ -24,8 +26,7 @@ def a_walk(number: int = 80, step: float = 0.1) -> ReferenceGraph:
     phases, rates = rng.uniform(0, 2 * np.pi, (SEGMENTS, 12)), rng.uniform(0.5, 2.0, (SEGMENTS, 12))
     values = (1.05 + np.cos(far[:, None, None] * rates + phases)).astype(np.float32) ** 4
     values /= values.sum(axis=-1, keepdims=True)
-    poses = np.column_stack([far, np.zeros(number), np.zeros(number)])
-    return ReferenceGraph(poses, values, "histograms", np.empty((0, 2), np.int64), "truth")
+    return references(along_x(*far).means, values)
 
 
 def test_right_cells_are_near_and_of_the_nearest_heading_and_wrong_ones_well_away():
@@ -40,8 +41,7 @@ def test_right_cells_are_near_and_of_the_nearest_heading_and_wrong_ones_well_awa
 
 
 def test_a_large_map_is_sampled_and_the_sample_stands_for_all():
-    poses = np.column_stack([np.arange(5000.0), np.zeros(5000), np.zeros(5000)])
-    chosen, each = compared_with(poses, 2500, 10.0)
+    chosen, each = compared_with(along_x(*range(5000)).means, 2500, 10.0)
     assert 2500 not in chosen
     assert (np.diff(chosen) > 0).all()
     assert set(range(2490, 2500)) <= set(chosen.tolist())

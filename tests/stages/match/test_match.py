@@ -1,30 +1,27 @@
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.fusion.best_match import BestMatch
 from omninav.stages.match.histogram_intersection import HistogramIntersection
 from omninav.stages.match.l2 import L2Match
+from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visual_words import WordSimilarities
 
 SEGMENTS = 12
 
 
-def a_map(number: int = 30, spacing: float = 0.5, seed: int = 0) -> ReferenceGraph:
-    rng = np.random.default_rng(seed)
-    features = rng.random((number, SEGMENTS, 20)).astype(np.float32) ** 3
-    features /= features.sum(axis=2, keepdims=True)
-    poses = np.column_stack([spacing * np.arange(number), np.zeros(number), rng.uniform(-3, 3, number)])
-    return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+def a_map(number: int = 30) -> ReferenceGraph:
+    features = np.random.default_rng(0).random((number, SEGMENTS, 20)).astype(np.float32) ** 3
+    return references(np.zeros((number, 3)), features / features.sum(axis=2, keepdims=True))
 
 
-MATCHES = [SelectiveMatch(headings=SEGMENTS), HistogramIntersection(headings=SEGMENTS), L2Match(headings=SEGMENTS)]
+MATCHES = [stage(headings=SEGMENTS) for stage in (SelectiveMatch, HistogramIntersection, L2Match, Retrieval)]
 
 
 @pytest.mark.parametrize("match", MATCHES)
@@ -33,11 +30,6 @@ def test_the_place_and_the_turn_are_found(match: SelectiveMatch) -> None:
     seen = SegmentHistograms(np.roll(map.features[7], turn, axis=0))
     similarities = match.step(Context("match"), seen, map).similarities
     assert np.unravel_index(int(np.argmax(similarities.values)), similarities.values.shape) == (7, turn)
-    best = BestMatch().step(Context("fusion"), similarities, map).belief
-    assert best is not None
-    expected = map.poses[7, 2] + 2 * np.pi * turn / SEGMENTS
-    assert best.pose.x == map.poses[7, 0]
-    assert np.exp(1j * best.pose.heading) == pytest.approx(np.exp(1j * expected))
 
 
 @pytest.mark.parametrize("match", MATCHES)
@@ -68,18 +60,9 @@ def test_a_map_of_other_features_is_refused_in_one_line() -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_the_best_match_counts_in_the_map_s_own_indices() -> None:
-    map = a_map()
-    similarities = Similarities(np.array([[0.1, 0.2], [0.9, 0.3]], np.float32), np.array([4, 11]))
-    best = BestMatch().step(Context("fusion"), similarities, map).belief
-    assert best is not None
-    assert best.pose.x == map.poses[11, 0]
-    assert BestMatch().step(Context("f"), Similarities(np.zeros((0, 36), np.float32)), map).belief is None
-
-
 def test_visual_words_are_a_factor_of_each_reference() -> None:
     features = np.random.default_rng(0).dirichlet(np.ones(20), (3, 12)).astype(np.float32)
-    map = ReferenceGraph(np.zeros((3, 3)), features, "histograms", np.zeros((0, 2), np.int64), "truth")
+    map = references(np.zeros((3, 3)), features)
     words = WordSimilarities(np.array([1.0, 0.25, 0.04], np.float32))
     given = Context("match"), SegmentHistograms(features[1]), map, Candidates(np.array([0, 2]), np.ones(2))
     plain = HistogramIntersection().step(*given).similarities.values

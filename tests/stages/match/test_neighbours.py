@@ -4,23 +4,19 @@ import math
 
 import numpy as np
 import pytest
+from made_view_maps import learned, view
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.neighbours import Shape, ViewNeighbours, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, Neighbours, NoveltyThreshold
+from omninav.stages.values.views import Neighbours, NoveltyThreshold
 
 
-def view(*values: float) -> Coefficients:
-    row = np.array(values, np.float32)
-    return Coefficients(row, row[None])
-
-
-def map_of(*places: float) -> ViewMixtures:
+def map_of(*looks: float) -> ViewMixtures:
     kept = ViewMixtures.empty()
-    for place in places:
-        kept.add_view(np.array([place, 0.0], np.float32), "Coefficients")
+    for look in looks:
+        learned(look, map=kept)
     return kept
 
 

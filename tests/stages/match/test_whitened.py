@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_references import references
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
@@ -28,8 +29,7 @@ def views(number: int, seed: int = 0) -> np.ndarray:
 
 
 def a_map(number: int = 30) -> ReferenceGraph:
-    edges = np.zeros((0, 2), np.int64)
-    return ReferenceGraph(np.zeros((number, 3)), views(number), "descriptors", edges, "truth")
+    return references(np.zeros((number, 3)), views(number), "descriptors")
 
 
 def matched(stage: CosineMatch | WhitenedMatch, view: np.ndarray, map: ReferenceGraph, **more: Any) -> Similarities:
