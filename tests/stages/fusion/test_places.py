@@ -22,23 +22,6 @@ def test_links_are_counted_along_the_shortest_way_in_either_direction():
     assert apart[4, 4] == 0
 
 
-def test_from_each_place_the_chances_sum_to_one_though_places_have_more_or_fewer_neighbours():
-    chances = transitions(links_between(CHAIN, 4), 1.0, 0.0)
-    near, far, farther = math.exp(-1), math.exp(-4), math.exp(-9)
-    assert chances[0] == pytest.approx(np.array([1, near, far, farther]) / (1 + near + far + farther))
-    assert chances[1] == pytest.approx(np.array([near, 1, near, far]) / (1 + 2 * near + far))
-
-
-def test_who_was_carried_to_an_island_is_found_by_chance_only():
-    apart = links_between(CHAIN, 5)
-    assert transitions(apart, 1.0, 0.0)[0, 4] == 0.0
-    assert transitions(apart, 1.0, 0.1)[0, 4] == pytest.approx(0.1 / 5)
-
-
-def test_a_map_of_one_place_stays_there():
-    assert transitions(links_between(np.zeros((0, 2), np.int64), 1), None, 0.01) == pytest.approx(np.ones((1, 1)))
-
-
 def test_likelihood_is_a_gaussian_of_visual_distance_that_never_falls_to_nothing():
     values = place_likelihoods(np.array([0.0, 0.5, math.inf]), 0.5, 0.01, "gaussian")
     assert values == pytest.approx([1.0, 0.01 + 0.99 * math.exp(-1), 0.01])

@@ -14,7 +14,6 @@ from made_words import features_of
 from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
-from omninav.stages.mapping.fixed_threshold import FixedThreshold
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.mapping.keyframe_history import KeyframeHistory
 from omninav.stages.mapping.learned_words import LearnVisualWords
@@ -64,10 +63,6 @@ def test_a_threshold_is_half_the_median_of_the_first_hundred_views_twenty_apart(
     for _ in range(3):
         CalibratedThreshold().step(CTX, view(1.0), Motion(0.0049, 0.0, 0.0), standing)
     assert len(standing.views) == 1
-
-
-def test_a_fixed_threshold_is_a_hundred() -> None:
-    assert FixedThreshold().step(CTX).threshold.distance == 100.0
 
 
 def test_a_view_is_learned_after_four_metres_and_at_most_500_wait() -> None:
@@ -134,28 +129,29 @@ def test_a_fused_map_keeps_what_weighs_a_hundredth_and_any_number_of_views() -> 
     assert len(fused(*[(9.0 * n, 0.0) for n in range(5)])) == 5
 
 
-def test_references_are_two_centimetres_apart_or_less_than_six_tenths_alike() -> None:
-    # Gross & Koenig 2004, section 2. Similarity at one heading: the share of what is the same.
-    def seen(share: float) -> SegmentHistograms:
-        return SegmentHistograms(np.tile(np.array([share, 1.0 - share], np.float32), (4, 1)))
-
-    for x, share, number in ((0.019, 1.0, 1), (0.021, 1.0, 2), (0.0, 0.61, 1), (0.0, 0.59, 2)):
-        map, state = ReferenceGraph.empty(), LearnReferenceGraphState()
-        for tick, (place, looks) in enumerate(((0.0, 1.0), (x, share))):
-            LearnReferenceGraph().step(context(tick, not tick), seen(looks), None, Pose(place, 0.0, 0.0), map, state)
-        assert len(map) == number
+def ring(share: float) -> SegmentHistograms:
+    """Similarity at one heading is the share of what is the same."""
+    return SegmentHistograms(np.tile(np.array([share, 1.0 - share], np.float32), (4, 1)))
 
 
-def test_all_references_within_half_a_metre_are_compared() -> None:
-    ring, other = np.zeros((4, 2), np.float32), np.zeros((4, 2), np.float32)
-    ring[:, 0] = other[:, 1] = 1.0
-    for x, number in ((0.495, 2), (0.505, 3)):
-        map, state = ReferenceGraph.empty(), LearnReferenceGraphState()
-        places = ((0.0, ring), (x, other), (x, ring))  # the last is unlike the nearest, and like the first
-        for tick, (place, looks) in enumerate(places):
-            seen = SegmentHistograms(looks)
-            LearnReferenceGraph().step(context(tick, not tick), seen, None, Pose(place, 0.0, 0.0), map, state)
-        assert len(map) == number
+@pytest.mark.parametrize(
+    ("drive", "kept"),
+    [
+        # Two centimetres apart or less than six tenths alike (Gross & Koenig 2004, section 2).
+        ([(0.0, 1.0), (0.019, 1.0)], 1),
+        ([(0.0, 1.0), (0.021, 1.0)], 2),
+        ([(0.0, 1.0), (0.0, 0.61)], 1),
+        ([(0.0, 1.0), (0.0, 0.59)], 2),
+        # All within half a metre are compared: the last is unlike the nearest, and like the first.
+        ([(0.0, 1.0), (0.495, 0.0), (0.495, 1.0)], 2),
+        ([(0.0, 1.0), (0.505, 0.0), (0.505, 1.0)], 3),
+    ],
+)
+def test_references_are_apart_or_unlike_those_around_them(drive: list[tuple[float, float]], kept: int) -> None:
+    map, state = ReferenceGraph.empty(), LearnReferenceGraphState()
+    for tick, (x, share) in enumerate(drive):
+        LearnReferenceGraph().step(context(tick, not tick), ring(share), None, Pose(x, 0.0, 0.0), map, state)
+    assert len(map) == kept
 
 
 @pytest.mark.parametrize(("step", "kept"), [(0.0099, 1), (0.0101, 2)])

@@ -104,10 +104,12 @@ def test_links_of_loops_are_new_ones_each_once_and_none_to_itself() -> None:
     assert with_loops(map, np.empty((0, 2), np.int64)).links.tolist() == map.links.tolist()
 
 
-def test_a_place_keeps_its_own_name_before_that_of_its_room() -> None:
-    map = made_map([(1.0, 1.0), (9.0, 1.0), (99.0, 1.0)], {}, names=["desk", "", ""])
-    rooms = Rooms(("hall",), np.array([[0.0, 0.0, 10.0, 10.0]]))
-    assert with_names(map, rooms).names == ("desk", "hall", "")
+def test_a_place_is_called_after_the_smallest_room_that_it_is_in_unless_it_has_a_name() -> None:
+    rooms = Rooms(("corridor", "kitchen"), np.array([[0.0, 0.0, 40.0, 10.0], [20.0, 6.0, 26.0, 10.0]]))
+    spots = [(1.0, 1.0), (21.0, 7.0), (50.0, 7.0), (2.0, 1.0)]
+    named = with_names(made_map(spots, {}, names=["", "", "", "desk"]), rooms)
+    assert named.names == ("corridor", "kitchen", "", "desk")
+    assert named.named("kitchen").tolist() == [1]
 
 
 def mapped(

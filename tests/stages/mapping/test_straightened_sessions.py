@@ -43,10 +43,15 @@ def drive(sessions, poses, drift=0.01, believed=True):
     return sessions
 
 
-def straightened(sessions, **options):
+def at_log(sessions, updates=None, threshold=THRESHOLD, first=True, ticks=None, **options):
     ctx = Context("straightened", np.random.default_rng(0))
-    ctx.tick = Tick(index=len(sessions), stamp=0.0)
-    return StraightenSessions(**options).step(ctx, sessions, None, THRESHOLD, []), ctx
+    ctx.tick = Tick(index=500, stamp=0, first_of_log=first)
+    return StraightenSessions(**options).step(ctx, sessions, updates, threshold, ticks), ctx
+
+
+def straightened(sessions):
+    """After the last log."""
+    return at_log(sessions, first=False, ticks=[])
 
 
 def learned(out):
@@ -65,13 +70,6 @@ def test_a_drive_that_comes_back_is_straightened_and_learned_again():
     assert error(learned(out), TWICE) < 0.4 * error(sessions.by_odometry, TWICE)
     assert "closures" in ctx.facts["map_straightened"]
     assert out.metrics.values["straightened"]["moved_max_m"] >= 0.0
-
-
-def test_a_drive_without_a_crossing_is_left_as_it_is_and_said_to_be():
-    out, ctx = straightened(drive(None, TWICE[:25]))
-    assert not out.updates.relearn
-    assert len(out.updates.sessions) == 25
-    assert ctx.facts["map_straightened"].startswith("no: ")
 
 
 def test_drives_without_a_common_frame_are_joined_where_they_look_alike():
@@ -151,12 +149,6 @@ def test_drives_with_other_views_are_not_gone_on_with():
     assert len(known.sessions) == 3
 
 
-def at_log(sessions, updates=None, threshold=THRESHOLD, first=True, ticks=None, **options):
-    ctx = Context("straightened", np.random.default_rng(0))
-    ctx.tick = Tick(index=500, stamp=0.0, first_of_log=first)
-    return StraightenSessions(**options).step(ctx, sessions, updates, threshold, ticks), ctx
-
-
 def test_as_a_log_begins_the_map_is_learned_again_from_the_drives_before_it():
     sessions = drive(None, TWICE)
     out, ctx = at_log(sessions)
@@ -201,11 +193,12 @@ def test_else_the_updates_go_on_as_they_came(left):
 
 def test_without_a_crossing_the_last_updates_go_on_with_the_drives_to_be_kept():
     once = drive(None, TWICE[:25])
-    out, _ = at_log(once, WAITING, first=False, ticks=[])
+    out, ctx = at_log(once, WAITING, first=False, ticks=[])
+    assert ctx.facts["map_straightened"].startswith("no: ")
     assert (out.updates.items, out.updates.open_from, out.updates.relearn) == (WAITING.items, 2, False)
     assert out.updates.sessions is once
     assert at_log(once, WAITING)[0].updates is WAITING
-    assert at_log(once, None, ticks=[])[0].updates.items == ()
+    assert straightened(once)[0].updates.items == ()
 
 
 def test_it_says_how_many_drives_and_closures_there_were_and_by_how_much_views_were_moved():

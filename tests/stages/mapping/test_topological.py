@@ -24,11 +24,10 @@ from omninav.stages.geometry.appearance.place_clusters import (
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.mapping.loop_closure import LoopClosure
-from omninav.stages.mapping.topological import TopologicalMapping, with_names
+from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
 SQUARE = [(8.0, 8.0), (32.0, 8.0), (32.0, 32.0), (8.0, 32.0), (8.0, 8.0)]
@@ -247,20 +246,6 @@ def test_poses_are_the_tours_truth_or_its_odometry_and_say_which() -> None:
         mapped(WORLD, [tour], known=known)
     with pytest.raises(BadInput, match=r"nodes\.views\.supervised=auto"):
         mapped(WORLD, [tour], truth=False, supervised="truth")
-
-
-def test_places_are_called_after_the_smallest_room_that_their_medoid_is_in() -> None:
-    corners = np.array([[0.0, 0.0, 40.0, 10.0], [20.0, 6.0, 26.0, 10.0]])
-    rooms = Rooms(("corridor", "kitchen"), corners)
-    assert rooms.at(21.0, 7.0) == "kitchen"
-    assert rooms.at(50.0, 7.0) == ""
-    made = mapped(WORLD, [along(SQUARE[:3], 1.6)]).map
-    named = with_names(made, rooms)
-    for place, name in enumerate(named.names):
-        assert name == rooms.at(*made.poses[made.places[place]][:2])
-    assert {"corridor", "kitchen", ""} == set(named.names)
-    assert named.named("kitchen").tolist() == [p for p, name in enumerate(named.names) if name == "kitchen"]
-    assert with_names(named, Rooms(("hall",), np.array([[0.0, 0.0, 40.0, 40.0]]))).named("kitchen").size
 
 
 def test_a_tour_that_shows_nothing_makes_no_map() -> None:

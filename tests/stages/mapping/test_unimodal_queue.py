@@ -18,12 +18,13 @@ def belief(tick, shares=(1.0,), covariance=NARROW):
 
 
 class Drive:
-    """Steps a queue through a drive around a ring; at `split` ticks the state has two modes."""
+    """Steps a queue through a drive around a ring; at `split` ticks the state has two modes, in `gaps` no odometry."""
 
-    def __init__(self, split=(), starts=(0,), shift=0.0, **options):
+    def __init__(self, split=(), starts=(0,), shift=0.0, gaps=(), **options):
         self.stage, self.pending, self.ctx = UnimodalQueue(**options), UnimodalQueueState(), Context("map_update")
-        self.split, self.starts, self.shift = split, starts, shift
+        self.split, self.starts, self.shift, self.gaps = split, starts, shift, gaps
         self.came: dict[int, list] = {}
+        self.waiting: list[list[int]] = []
 
     def to(self, ticks):
         for n in range(ticks):
@@ -33,10 +34,10 @@ class Drive:
             if n > max(self.split, default=0):
                 state = GaussianMixture(state.means + np.array([self.shift, 0, 0]), state.covariances, state.weights)
             view = Coefficients(look(n), look(n)[None])
-            out = self.stage.step(
-                self.ctx, view=view, state=state, model=None if first else way(n), pending=self.pending
-            )
+            model = None if first or n in self.gaps else way(n)
+            out = self.stage.step(self.ctx, view, state, model, self.pending)
             self.came[n] = list(out.updates.items)
+            self.waiting.append([update.index for update in out.waiting.items])
         return self
 
     def order(self):
@@ -106,23 +107,6 @@ def test_a_state_is_unimodal_by_the_share_near_its_heaviest_component():
     assert not given(UnimodalQueue(length=0, unimodal="single"), near)
 
 
-def test_a_single_component_as_wide_as_the_map_is_not_unimodal():
-    anywhere = np.diag([9.0, 9.0, np.pi**2 / 3])
-    assert not given(UnimodalQueue(length=0), belief(0, covariance=anywhere))
-    adrift = np.diag([9.0, 9.0, 0.1])
-    assert given(UnimodalQueue(length=0), belief(0, covariance=adrift))
-
-
-def test_a_state_whose_heading_is_certain_enough_is_unimodal():
-    def spread(x: float, y: float, degrees: float) -> GaussianMixture:
-        return belief(0, covariance=np.diag([x, y, np.radians(degrees)]) ** 2)
-
-    stage = UnimodalQueue(length=0, max_sigma_deg=10.0)
-    assert given(stage, spread(30.0, 30.0, 9.0))
-    assert not given(stage, spread(0.5, 0.5, 11.0))
-    assert given(UnimodalQueue(length=0), spread(30.0, 30.0, 44.0))
-
-
 def test_a_component_without_company_is_taken_as_it_is_and_given_with_its_tick():
     (update,) = given(UnimodalQueue(length=0, unimodal="single"), belief(0))
     np.testing.assert_allclose(update.state.means[0], place(0))
@@ -131,15 +115,27 @@ def test_a_component_without_company_is_taken_as_it_is_and_given_with_its_tick()
 
 
 def test_what_waits_is_said_and_each_waits_the_same():
-    drive = Drive(split=range(2, 4), length=2)
-    waiting = []
-    for n in range(6):
-        drive.ctx.tick = Tick(n, n, 0, n, n == 0)
-        state = belief(n, (0.5, 0.5) if n in drive.split else (1.0,))
-        view = Coefficients(look(n), look(n)[None])
-        out = drive.stage.step(drive.ctx, view, state, None if n == 0 else way(n), drive.pending)
-        waiting.append([update.index for update in out.waiting.items])
-    assert waiting == [[0], [0, 1], [1], [], [3, 4], [4, 5]]
+    assert Drive(split=range(2, 4), length=2).to(6).waiting == [[0], [0, 1], [1], [], [3, 4], [4, 5]]
+
+
+def test_views_in_a_gap_of_the_odometry_are_dropped():
+    drive = Drive(split=range(2, 6), gaps=[4], length=0).to(8)
+    assert [index for index, _ in drive.order()] == [0, 1, 6, 7]
+    assert drive.ctx.counts == {"view_not_learned": 4}
+
+
+@pytest.mark.parametrize(
+    ("options", "metres", "degrees", "certain"),
+    [
+        ({}, 3.0, 180.0 / 3**0.5, False),  # as wide as the map
+        ({}, 30.0, 44.0, True),
+        ({"max_sigma_deg": 10.0}, 30.0, 9.0, True),
+        ({"max_sigma_deg": 10.0}, 0.5, 11.0, False),
+    ],
+)
+def test_a_state_whose_heading_is_certain_enough_is_unimodal(options, metres, degrees, certain):
+    wide = belief(0, covariance=np.diag([metres, metres, np.radians(degrees)]) ** 2)
+    assert bool(given(UnimodalQueue(length=0, **options), wide)) == certain
 
 
 def test_as_many_views_as_may_wait_are_reconstructed(monkeypatch: pytest.MonkeyPatch):
@@ -154,15 +150,3 @@ def test_a_path_is_reconstructed_from_the_last_certain_state_only():
     drive = Drive(split=[0, 1, 4, 5], length=0).to(8)
     assert [index for index, _ in drive.order()] == [2, 3, 4, 5, 6, 7]
     assert drive.ctx.counts == {"view_not_learned": 2, "view_reconstructed": 2}
-
-
-def test_views_in_a_gap_of_the_odometry_are_dropped():
-    drive = Drive(split=range(2, 6), length=0)
-    for n in range(8):
-        drive.ctx.tick = Tick(n, n, 0, n, n == 0)
-        state = belief(n, (0.5, 0.5) if n in drive.split else (1.0,))
-        view = Coefficients(look(n), look(n)[None])
-        model = None if n in (0, 4) else way(n)
-        drive.came[n] = list(drive.stage.step(drive.ctx, view, state, model, drive.pending).updates.items)
-    assert [index for index, _ in drive.order()] == [0, 1, 6, 7]
-    assert drive.ctx.counts == {"view_not_learned": 4}
