@@ -4,6 +4,7 @@ from made_beliefs import along_x, even, scattered_around
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
+from omninav.stages.fusion.uniform_recovery import UniformRecovery
 from omninav.stages.values.belief import Likelihood, Particles
 
 THERE = even(np.full((50, 3), 77.0))
@@ -37,11 +38,12 @@ def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:
     assert np.allclose(out.weights, values / values.sum())
 
 
-def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
+@pytest.mark.parametrize("stage", [ImportanceResampling(), UniformRecovery()])
+def test_few_particles_with_weight_are_resampled_to_the_same_mean(stage: ImportanceResampling) -> None:
     # A Gaussian times a Gaussian likelihood: the posterior mean is worked by hand, (0 + 0.5 / 0.1^2) / (1 + 1 / 0.1^2).
     particles = belief(50_000)
     values = np.exp(-0.5 * ((particles.poses[:, 0] - 0.5) / 0.1) ** 2)
-    out = fuse(ImportanceResampling(number=5000), particles, values)
+    out = fuse(stage, particles, values)
     assert len(out.poses) == 5000
     assert np.allclose(out.weights, 1 / 5000)
     assert out.poses[:, 0].mean() == pytest.approx(50 / 101, abs=0.01)
@@ -49,9 +51,13 @@ def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
 
 
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
-def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> None:
+@pytest.mark.parametrize("stage", [ImportanceResampling(number=1000), UniformRecovery(number=1000)])
+def test_a_view_that_nothing_explains_changes_nothing_and_is_told_of(
+    stage: ImportanceResampling, values: np.ndarray
+) -> None:
     ctx, particles = Context("fusion", np.random.default_rng(0)), belief()
-    out = ImportanceResampling(number=1000).step(ctx, particles, Likelihood(values), None).belief
+    out = stage.step(ctx, particles, Likelihood(values), None).belief
+    assert np.allclose(np.sort(out.poses[:, 0]), np.sort(particles.poses[:, 0]))
     assert np.allclose(out.weights, particles.weights)
     assert ctx.counts["belief_without_support"] == 1
 

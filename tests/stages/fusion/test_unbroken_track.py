@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from landmark_world import NOISE
 from made_beliefs import even
+from made_words import NOTHING, features_of
 
 from omninav.pipeline import Context
-from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import Particles
@@ -33,16 +33,7 @@ def seen_from(poses: np.ndarray) -> list:
         turned = np.column_stack([cos * rays[:, 0] + sin * rays[:, 1], cos * rays[:, 1] - sin * rays[:, 0], rays[:, 2]])
         turned += NOISE * np.linalg.norm(turned, axis=1)[:, None] * rng.standard_normal(turned.shape)
         looks = np.clip(own[shown] * rng.normal(1.0, 0.1, (200, 128)), 0, 255).astype(np.uint8)
-        out.append(
-            replace(
-                none_found(),
-                bearings=turned / np.linalg.norm(turned, axis=1)[:, None],
-                points=np.zeros((200, 2)),
-                descriptors=looks,
-                colours=np.zeros((200, 3), np.float32),
-                sizes=np.ones(200, np.float32),
-            )
-        )
+        out.append(replace(features_of(looks), bearings=turned / np.linalg.norm(turned, axis=1)[:, None]))
     return out
 
 
@@ -72,7 +63,7 @@ def driven(
         poses[turned_at:, 2] += math.pi
     images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
     if dark_at is not None:
-        images[dark_at] = none_found()
+        images[dark_at] = NOTHING
     for n in range(IMAGES):
         motion = Motion(*between(believed[n - 1], believed[n]).tolist()) if n else None
         spread = np.random.default_rng(n).normal(0.0, 0.05, (100, 3))

@@ -4,13 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from landmark_world import NOISE, house
+from made_words import features_of
 
 from omninav.pipeline import Context
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.self_calibration import adjustable
-from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.landmarks.adjustment import adjusted
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.mapping.camera_check import CameraCheck
@@ -22,14 +22,7 @@ BESIDE = replace(TRUE, centre_x=321.8, centre_y=237.6)  # by 3 pixels
 
 def check_of(camera, pixels):
     rays = adjustable(camera, pixels).bearings(np.zeros(2)) if camera.ring else camera.unproject(pixels)[0]
-    features = replace(
-        none_found(),
-        bearings=rays,
-        points=pixels,
-        descriptors=np.zeros((len(pixels), 128), np.uint8),
-        colours=np.zeros((len(pixels), 3), np.float32),
-        sizes=np.ones(len(pixels), np.float32),
-    )
+    features = replace(features_of(np.zeros((len(pixels), 128), np.uint8)), bearings=rays, points=pixels)
     return CameraCheck.of(camera, [None, features], rays, poses_given=True)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_places import made_map
 from made_views import between_looks, made_hypotheses, made_views
+from made_words import features_of
 
 from omninav.pipeline import Context
 from omninav.stages.mapping.topological import (
@@ -137,14 +138,7 @@ LOOKS, BEARINGS = RNG.integers(0, 255, (40, 128)).astype(np.uint8), RNG.uniform(
 def patches(rows: list[int] | range, turned: float = 0.0) -> LocalFeatures:
     """These of forty patches all around, as a robot sees them that is turned; of the odd ones only half as far."""
     at = BEARINGS[list(rows)] - turned
-    number = len(at)
-    return LocalFeatures(
-        np.column_stack([np.cos(at), np.sin(at), 0.0 * at]),
-        np.zeros((number, 2)),
-        LOOKS[list(rows)],
-        np.zeros((number, 3), np.float32),
-        np.ones(number, np.float32),
-    )
+    return replace(features_of(LOOKS[list(rows)]), bearings=np.column_stack([np.cos(at), np.sin(at), 0.0 * at]))
 
 
 def test_the_patches_that_a_view_keeps_are_those_found_again_around_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_beliefs import along_x
+from made_view_maps import learned, view
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.odometry_motion import move_gaussians
@@ -12,9 +14,9 @@ from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, Neighbours
+from omninav.stages.values.views import Neighbours
 
-VIEW = Coefficients(np.zeros(2, np.float32), np.zeros((1, 2), np.float32))
+VIEW = view(0.0)
 
 
 def around_a_square(
@@ -23,13 +25,11 @@ def around_a_square(
     """The corrections on a square of four metres, five images a side, by odometry alone up to the last image; there a
     view of the map gives the pose `end`."""
     stage, path, ctx = FixedLagSmoother(**options), FixedLagSmootherState(), Context("fixed_lag_smoother")
-    map = ViewMixtures.empty()
-    map.add_view(VIEW.values, "Coefficients")
+    map = learned(0.0)
     none = Neighbours(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0), np.inf)
     seen = Neighbours(np.zeros(1, np.int64), np.zeros(1), np.ones(1), np.zeros(1), 0.0)
     certain = np.diag([0.02, 0.02, 0.02])[None] ** 2
-    means, covariances = np.zeros((1, 3)), certain
-    states, out = {}, []
+    means, covariances, states, out = np.zeros((1, 3)), certain, {}, []
     for n in range(21):
         ctx.tick = Tick(n, n, 0, n, n == 0)
         model = None if n == 0 else UncertainMotion((np.pi / 2 if n % 5 == 1 and n > 1 else 0.0, 0.8, 0.0), (0.05,) * 3)
@@ -67,9 +67,7 @@ def test_states_stay(end: tuple[float, float, float], options: dict[str, bool]) 
     assert not any(tick.items for tick in corrections)
 
 
-SURE = np.diag([0.02, 0.02, 0.02]) ** 2
-SPLIT = GaussianMixture(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]), np.stack([SURE] * 2), np.array([0.5, 0.5]))
-UNKNOWN = GaussianMixture(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))
+SPLIT, UNKNOWN = along_x(0.0, 50.0, sigma=0.02), along_x()
 BORN = (1, 1, 2, 7, 8, 9)
 """The steps at which the views of a map were inserted, a view each."""
 
@@ -82,15 +80,11 @@ class Straight:
     """Drives ahead, a metre from image to image by odometry; says what is believed, and by which views of the map."""
 
     def __init__(self, **options: Any) -> None:
-        self.stage, self.path, self.ctx = (
-            FixedLagSmoother(**options),
-            FixedLagSmootherState(),
-            Context("fixed_lag_smoother"),
-        )
-        self.map = ViewMixtures.empty()
+        self.stage, self.path = FixedLagSmoother(**options), FixedLagSmootherState()
+        self.ctx, self.map = Context("fixed_lag_smoother"), ViewMixtures.empty()
         for born in BORN:
             self.map.put(steps=born)
-            self.map.add_view(VIEW.values, "Coefficients")
+            learned(0.0, map=self.map)
         self.tick = 0
 
     def to(self, state: GaussianMixture, by: tuple[int, ...] = (), moved: bool = True) -> MapUpdates:
@@ -151,10 +145,8 @@ def test_states_in_between_that_agree_with_the_path_stay_and_unknown_ones_are_no
     assert drive.ctx.counts["view_reconstructed"] == 5
     assert drive.path.past[5].state.means[0] == pytest.approx([5.0, 0.0, 0.0], abs=1e-3)
     drive = Straight(back_propagate=False)
-    assert set(drive.led_away(at(3.0, 5.0), at(4.0, 3.9, 1.2), at(5.0, 5.0))) == {
-        3,
-        5,
-    }  # 3.9 m of 1.2 m may be the path
+    corrected = drive.led_away(at(3.0, 5.0), at(4.0, 3.9, 1.2), at(5.0, 5.0))
+    assert set(corrected) == {3, 5}  # 3.9 m of 1.2 m may be the path
     assert drive.ctx.counts == {"belief_jumped": 2, "view_reconstructed": 2}
 
 

@@ -103,10 +103,7 @@ def test_a_view_of_a_known_map_has_as_many_features_as_are_kept_of_it(monkeypatc
     known = made_map([(0.0, 0.0), (4.0, 1.0)], {})
     few_matches = functools.partial(ComparisonOptions, min_matches=2)
     monkeypatch.setattr("omninav.stages.mapping.view_comparison.ComparisonOptions", few_matches)
-    few = known.views.features(1)
-    some = LocalFeatures(
-        *(np.repeat(part, 5, axis=0) for part in (few.bearings, few.points, few.descriptors, few.colours, few.sizes))
-    )
+    some = known.views.features(1).chosen(np.zeros(5, np.int64))
     some.descriptors[1:] = 255 - some.descriptors[1:]
     views = compared([0.0], features=[some], known=known, truth=POSES[:1], stage=ViewComparison())
     assert views.shares[1, 2] == 1.0  # not 1 of 3, the mean of 1 and 5
