@@ -1,18 +1,20 @@
 """Beliefs for tests: particles that weigh alike, and Gaussians along the x axis."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from omninav.stages.values.belief import GaussianMixture, Particles
 
 
-def even(poses: np.ndarray) -> Particles:
+def even(poses: ArrayLike) -> Particles:
     """Particles at poses (N, 3) that weigh alike."""
-    return Particles(np.asarray(poses, np.float64), np.full(len(poses), 1.0 / len(poses)))
+    at = np.asarray(poses, np.float64)
+    return Particles(at, np.full(len(at), 1.0 / len(at)))
 
 
-def scattered_around(pose: object, spread: object, number: int, seed: int = 0) -> Particles:
+def scattered_around(pose: ArrayLike, spread: ArrayLike, number: int) -> Particles:
     """As many particles, normally distributed around a pose."""
-    return even(np.random.default_rng(seed).normal(pose, spread, (number, 3)))  # type: ignore[arg-type]
+    return even(np.random.default_rng(0).normal(np.asarray(pose), np.asarray(spread), (number, 3)))
 
 
 def along_x(*places: float, sigma: float = 0.1, weights: tuple[float, ...] | None = None) -> GaussianMixture:

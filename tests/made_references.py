@@ -1,6 +1,7 @@
 """Maps of references for tests: poses and what is seen there, without edges."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from omninav.stages.geometry.appearance.segments import FeatureKind
 from omninav.stages.values.maps import ReferenceGraph
@@ -8,7 +9,7 @@ from omninav.stages.values.pose import PoseSource
 
 
 def references(
-    poses: object, features: np.ndarray | None = None, kind: FeatureKind = "histograms", source: PoseSource = "truth"
+    poses: ArrayLike, features: np.ndarray | None = None, kind: FeatureKind = "histograms", source: PoseSource = "truth"
 ) -> ReferenceGraph:
     """A map of references at poses (N, 3), which look like nothing where no features are given."""
     at = np.asarray(poses, np.float64)

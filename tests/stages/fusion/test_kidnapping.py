@@ -78,6 +78,7 @@ def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) 
     noise, errors, said, compared = np.random.default_rng(9), [], [], []
     ctx.tick = Tick(0, 0, first_of_log=True)
     belief = ParticlePrior().step(ctx, MAP, None, LENGTH_SCALE).belief
+    assert belief is not None
     for k, pose in enumerate(path):
         ctx.tick = Tick(k, k, first_of_log=k == 0)
         moved = STEP if k else None
