@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_mixtures import drawn_mixture
+from made_view_maps import learned
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import wrap
@@ -17,21 +18,14 @@ from omninav.stages.values.views import Neighbours, NoveltyThreshold
 CTX = Context("sensor")
 
 
-def learned(owners: list[int], means: list[list[float]], weights: list[float], spread: float = 0.1) -> ViewMixtures:
-    map = ViewMixtures.empty()
-    for _ in range(max(owners) + 1):
-        map.add_view(np.zeros(4, np.float32), "Coefficients")
-    for owner, mean, weight in zip(owners, means, weights, strict=True):
-        map.add_component(owner, np.array(mean), spread**2 * np.eye(3), weight, 1.0)
-    return map
-
-
 def near(rows: list[int], alike: list[float], turns: list[float] | None = None) -> Neighbours:
     turned = np.zeros(len(rows)) if turns is None else np.array(turns)
     return Neighbours(np.array(rows, np.int64), 1 - np.array(alike), np.array(alike), turned, 0.0)
 
 
-TWO = learned([0, 1, 1, 2], [[0, 0, 0], [1, 0, 0], [5, 5, 1], [9, 9, 2]], [0.8, 0.5, 0.2, 1.0])
+TWO = learned(0.0, 0.0, weights=0.8)
+learned(0.0, 1.0, (5.0, 5.0, 1.0), weights=(0.5, 0.2), map=TWO)
+learned(0.0, (9.0, 9.0, 2.0), weights=1.0, map=TWO)
 
 
 def said(stage: Superposition, neighbours: Neighbours, map: ViewMixtures = TWO) -> GaussianMixture:
@@ -55,7 +49,7 @@ def test_the_nearest_view_alone_is_the_crisp_mapping() -> None:
 @given(st.floats(-math.pi, 3.14), st.floats(-math.pi, 3.14))
 def test_headings_turn_by_what_was_taken_off_when_they_were_learned(heading: float, turn: float) -> None:
     # Erratum 12: stored as heading minus turn, used as stored plus turn; covariances as they are. Seam included.
-    map = learned([0], [[1.0, 2.0, float(wrap(heading - turn))]], [1.0])
+    map = learned(0.0, (1.0, 2.0, float(wrap(heading - turn))), weights=1.0)
     found = said(Superposition(), near([0], [1.0], [turn]), map)
     assert abs(np.angle(np.exp(1j * (found.means[0, 2] - heading)))) < 1e-9
     assert -math.pi <= found.means[0, 2] < math.pi
@@ -64,9 +58,9 @@ def test_headings_turn_by_what_was_taken_off_when_they_were_learned(heading: flo
 
 
 def test_places_without_weight_yet_say_nothing() -> None:
-    map = learned([0, 0], [[1, 0, 0], [2, 0, 0]], [0.0, 0.3])
+    map = learned(0.0, 1.0, 2.0, weights=(0.0, 0.3))
     assert said(Superposition(), near([0], [1.0]), map).means[:, 0].tolist() == [2.0]
-    assert Superposition().step(CTX, near([0], [1.0]), learned([0], [[1, 0, 0]], [0.0])).hypothesis is None
+    assert Superposition().step(CTX, near([0], [1.0]), learned(0.0, 1.0, weights=0.0)).hypothesis is None
 
 
 def test_where_nothing_is_near_there_is_no_hypothesis() -> None:
@@ -85,7 +79,9 @@ def test_it_is_the_sum_over_views_and_components_written_as_two_loops() -> None:
     rng = np.random.default_rng(0)
     means, covariances, weights = drawn_mixture(rng, 40)
     owners = rng.integers(0, 12, 40)
-    map = learned([11], [[0, 0, 0]], [0.0])
+    map = ViewMixtures.empty()
+    for _ in range(12):
+        learned(0.0, map=map)
     for k in range(40):
         map.add_component(int(owners[k]), means[k], covariances[k], float(weights[k]), 1.0)
     rows, alike, turns = rng.permutation(12)[:7], np.sort(rng.random(7))[::-1], rng.uniform(-3, 3, 7)
