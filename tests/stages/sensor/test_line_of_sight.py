@@ -46,13 +46,15 @@ ROOM = drawn(
 )
 
 
+AREAS = visibility_areas(np.array([[4.5, 1.5, math.pi / 2]]), ROOM, axes_of(1))
+
+
 def test_a_view_sees_the_face_of_the_closest_occupied_cell_ahead_of_it():
     cells, faces = first_occupied(ROOM.cells, np.array([[1.5, 4.5]] * 4), np.radians([90.0, 0.0, -90.0, 180.0]))
     assert cells.tolist() == [[3, 4], [1, 8], [0, 4], [1, 0]]
     # the faces below, to the left, above and to the right of these cells
     assert faces.tolist() == [3, 1, 2, 0]
-    areas = visibility_areas(np.array([[4.5, 1.5, math.pi / 2]]), ROOM, axes_of(1))
-    assert areas.points[0] == pytest.approx([4.5, 3.0], abs=0.01)
+    assert AREAS.points[0] == pytest.approx([4.5, 3.0], abs=0.01)
 
 
 def test_what_is_unknown_or_outside_blocks_and_shows_nothing():
@@ -66,8 +68,7 @@ def test_what_is_unknown_or_outside_blocks_and_shows_nothing():
 def test_an_area_is_what_sees_its_point_and_not_the_other_side_of_a_thin_wall():
     # The point lies below the middle of the block. From above it nothing is seen; to its sides one looks past it only
     # from what lies below the block's lower face, y = 3.
-    areas = visibility_areas(np.array([[4.5, 1.5, math.pi / 2]]), ROOM, axes_of(1))
-    mask = areas.mask(0)
+    mask = AREAS.mask(0)
     assert mask[1:3, 1:8].all()
     assert mask.sum() == 14
 
@@ -174,12 +175,11 @@ def test_views_that_meet_the_same_face_share_an_area():
 
 
 def test_the_share_of_places_and_of_headings_that_areas_cover():
-    areas = visibility_areas(np.array([[4.5, 1.5, math.pi / 2]]), ROOM, axes_of(1))
     centres = ROOM.centres(*np.nonzero(ROOM.cells == FREE))
-    place, state = covered(areas, centres, math.radians(5.0))
+    place, state = covered(AREAS, centres, math.radians(5.0))
     assert place == pytest.approx(14 / 32)
     assert state == pytest.approx(14 / 32 * 11 / 360)  # 11 whole degrees of 360, 5 to each side of one
-    assert covered(areas, centres, math.pi) == (place, place)
+    assert covered(AREAS, centres, math.pi) == (place, place)
 
 
 def test_it_says_what_it_covers_and_how_much_it_takes():
