@@ -1,10 +1,7 @@
-"""Small stages for the tests of the framework: numbers instead of robots."""
+"""Small stages for the tests of the framework, and graphs of them: numbers instead of robots."""
 
-import os
-import signal
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -295,22 +292,6 @@ class Ledgers(Stage):
         return self.Out(number=Number(float(len(ledgers))))
 
 
-class Kill(Stage):
-    """Kills its own process, as `kill -9` does, at a tick, unless a file exists."""
-
-    at: int = 5
-    unless: str = ""
-
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number) -> Out:
-        if ctx.tick.index == self.at and not Path(self.unless).exists():
-            Path(self.unless).touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return self.Out(number=number)
-
-
 class NotAStage:
     """Something that must never be called from a configuration."""
 
@@ -390,3 +371,10 @@ class Tickless(Source):
 
     def step(self, ctx: Context) -> Out | None:
         return None
+
+
+def graph_of_toys(nodes: Mapping[str, Any], wires: object = None, **settings: object) -> dict[str, Any]:
+    """A configuration whose nodes are named after toys: `Scale`, or `{"_target_": "Scale", "factor": 2.0}`."""
+    spelled = {name: {"_target_": toy} if isinstance(toy, str) else toy for name, toy in nodes.items()}
+    toys = {name: {**node, "_target_": f"toys.{node['_target_']}"} for name, node in spelled.items()}
+    return {"nodes": toys, "wires": wires or {}, **settings}

@@ -12,14 +12,11 @@ from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix, prefix_no
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
+from toys import graph_of_toys
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
-    spelled = {
-        k: {"_target_": f"toys.{v}"} if isinstance(v, str) else {**v, "_target_": f"toys.{v['_target_']}"}
-        for k, v in nodes.items()
-    }
-    return build({"nodes": spelled, "wires": wires})
+    return build(graph_of_toys(nodes, wires))
 
 
 COLLECT = {"from": "sum.number", "collect": True}
@@ -52,15 +49,21 @@ def test_a_delayed_wire_whose_first_value_is_null_is_absent_at_the_first_tick(tm
     assert numbers(graph_of({k: v for k, v in SUM.items() if k != "start"}, wires), tmp_path)[:4] == [0, 1, 3, 6]
 
 
-def test_a_value_updated_in_place_is_not_lost_where_its_writer_is_skipped(tmp_path: Path):
-    delayed = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
-    nodes = {"source": {"_target_": "Count", "gap": 3}, "new": "NewLedger", "enter": "Enter", "look": "Look"}
+LEDGER = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
+
+
+@pytest.mark.parametrize(("gap", "seen"), [(0, [*range(10)]), (3, [0, 1, 2, 2, 3, 4, 4, 5, 6, 6])])
+def test_a_value_updated_in_place_is_seen_before_its_writer_and_kept_where_that_is_skipped(
+    gap: int, seen: list, tmp_path: Path
+):
+    source = {"_target_": "Count", "gap": gap}
+    nodes = {"source": source, "new": "NewLedger", "enter": "Enter", "look": "Look", "all": "Collected"}
     wires = {
-        "enter": {"number": "source.number", "ledger": delayed},
-        "look": {"ledger": delayed},
+        "enter": {"number": "source.number", "ledger": LEDGER},
+        "look": {"ledger": LEDGER},
         "all": {"numbers": {"from": "look.number", "collect": True}},
     }
-    assert numbers(graph_of({**nodes, "all": "Collected"}, wires), tmp_path) == [0, 1, 2, 2, 3, 4, 4, 5, 6, 6]
+    assert numbers(graph_of(nodes, wires), tmp_path) == seen
 
 
 def test_a_stage_that_lacks_a_required_input_is_skipped_and_counted(tmp_path: Path):
@@ -87,24 +90,6 @@ def test_an_initial_value_that_comes_every_tick_replaces_the_delayed_one_when_it
     wires = {**SUM_WIRES, "start": {"number": "source.number"}}
     # first log from 100, second from 101: 100+0, +1, +2, then 101+3, +4, +5
     assert numbers(graph_of(nodes, wires), tmp_path) == [100, 101, 103, 104, 108, 113]
-
-
-def test_a_value_updated_in_place_is_seen_delayed_before_the_writer_and_whole_at_the_end(tmp_path: Path):
-    delayed = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
-    nodes = {
-        "source": "Count",
-        "new": "NewLedger",
-        "enter": "Enter",
-        "look": "Look",
-        "final": "Look",
-        "all": "Collected",
-    }
-    wires = {
-        "enter": {"number": "source.number", "ledger": delayed},
-        "look": {"ledger": delayed},
-        "all": {"numbers": {"from": "look.number", "collect": True}},
-    }
-    assert numbers(graph_of({k: v for k, v in nodes.items() if k != "final"}, wires), tmp_path) == list(range(10))
 
 
 def test_a_stage_knows_which_of_its_outputs_are_read_by_wires_first_values_and_whoever_wants_them():
@@ -134,21 +119,18 @@ def test_randomness_comes_from_seed_and_node_name_alone(tmp_path: Path):
     assert noisy({}, 1, "c") != noisy({}, 2, "d")
 
 
-def test_a_failing_stage_is_named_with_the_tick(tmp_path: Path):
-    graph = graph_of({**SUM, "sum": "Fail"}, {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]})
-    with pytest.raises(
-        StageFailed,
-        match=r"stage 'sum' \(toys.Fail\) failed at tick 3 \(log 0, frame 3\): RuntimeError: the wheel fell off",
-    ):
-        numbers(graph, tmp_path)
-
-
-def test_a_stage_that_cannot_be_set_up_is_named(tmp_path: Path):
-    nodes = {**SUM, "sum": {"_target_": "Fail", "early": True}}
-    graph = graph_of(nodes, {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]})
-    said = r"stage 'sum' \(toys.Fail\) failed in setup: RuntimeError: there is no wheel"
-    with pytest.raises(StageFailed, match=said):
-        numbers(graph, tmp_path)
+@pytest.mark.parametrize(
+    ("early", "said"),
+    [
+        (False, r"at tick 3 \(log 0, frame 3\): RuntimeError: the wheel fell off"),
+        (True, "in setup: RuntimeError: there is no wheel"),
+    ],
+)
+def test_a_failing_stage_is_named_with_the_place(early: bool, said: str):
+    nodes = {"source": "Count", "breaks": {"_target_": "Fail", "early": early}}
+    engine = Engine(graph_of(nodes, {"breaks": {"number": "source.number"}}))
+    with pytest.raises(StageFailed, match=rf"stage 'breaks' \(toys.Fail\) failed {said}"):
+        engine.run()
 
 
 def test_a_stage_that_gives_something_else_than_its_outputs_is_named():
@@ -180,11 +162,8 @@ FULL_WIRES = {
         "number": {"from": "seen.number", "hold": True},
         "other": {"from": "sum.number", "delay": 2, "initial": "start.number"},
     },
-    "enter": {
-        "number": "noise.number",
-        "ledger": {"from": "enter.ledger", "delay": 1, "initial": "new.ledger", "hold": False},
-    },
-    "look": {"ledger": {"from": "enter.ledger", "delay": 1, "initial": "new.ledger", "hold": False}},
+    "enter": {"number": "noise.number", "ledger": LEDGER},
+    "look": {"ledger": LEDGER},
     "all": {"numbers": {"from": "sum.number", "collect": True}},
     "ledger": {"numbers": {"from": "noise.number", "collect": True}},
 }

@@ -5,9 +5,10 @@ import pytest
 import toys
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.ground_truth import steering, truth_readers
-from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.graph.problems import Problem, ProblemsFound
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.report.mermaid import mermaid
+from toys import graph_of_toys
 
 NODES = {"source": "Steered", "stop": "Constant", "driving": "Scale", "scored": "Scale", "all": "Collected"}
 WIRES = {
@@ -18,65 +19,63 @@ WIRES = {
 }
 
 
-def config(nodes: dict, wires: dict) -> dict:
-    return {"nodes": {name: {"_target_": f"toys.{kind}"} for name, kind in nodes.items()}, "wires": wires}
-
-
-def refused(nodes: dict, wires: dict) -> list:
+def refused_at(where: str, nodes: dict = NODES, **wires: object) -> Problem:
+    """What is said of the only thing that is wrong with other nodes or wires."""
     with pytest.raises(ProblemsFound) as found:
-        build(config(nodes, wires))
-    return list(found.value.problems)
+        build(graph_of_toys(nodes, WIRES | wires))
+    (problem,) = found.value.problems
+    assert problem.where == where
+    return problem
 
 
 def test_metrics_behind_a_closed_loop_may_read_truth():
-    graph = build(config(NODES, WIRES))
+    graph = build(graph_of_toys(NODES, WIRES))
     assert steering(graph) == {"source", "driving", "stop"}
     assert truth_readers(graph) == ["all", "scored"]
 
 
 def test_a_driver_that_reads_truth_is_refused_with_what_to_type():
-    (problem,) = refused(NODES, WIRES | {"driving": {"number": "source.truth"}})
-    assert problem.where == "wires.driving.number"
+    problem = refused_at("wires.driving.number", driving={"number": "source.truth"})
     said = "source.truth is ground truth, and 'driving' steers the source: nothing measures it in the field"
     assert problem.what == said
     assert problem.hint == "take the wire out: wires.driving.number=null"
 
 
-def test_truth_is_found_where_it_comes_by_a_detour_or_by_another_name():
-    detour = WIRES | {"driving": {"number": "scored.number"}}
-    assert [problem.where for problem in refused(NODES, detour)] == ["wires.scored.number"]
-    marked = WIRES | {"driving": {"number": "source.hidden"}}
-    assert [problem.where for problem in refused(NODES, marked)] == ["wires.driving.number"]
+def test_truth_is_found_where_it_comes_by_a_detour():
+    refused_at("wires.scored.number", driving={"number": "scored.number"})
 
 
-def test_truth_is_found_on_delayed_wires_first_values_and_held_ones():
-    delayed = {"number": {"from": "source.truth", "delay": 1, "initial": "stop.number"}}
-    assert [problem.where for problem in refused(NODES, WIRES | {"driving": delayed})] == ["wires.driving.number"]
-    first = {"number": {"from": "source.felt", "delay": 1, "initial": "source.truth"}}
-    assert [problem.where for problem in refused(NODES, WIRES | {"driving": first})] == ["wires.driving.number"]
-    held = {"number": {"from": "source.truth", "hold": True}}
-    assert [problem.where for problem in refused(NODES, WIRES | {"driving": held})] == ["wires.driving.number"]
+@pytest.mark.parametrize(
+    "wire",
+    [
+        "source.hidden",
+        {"from": "source.truth", "delay": 1, "initial": "stop.number"},
+        {"from": "source.felt", "delay": 1, "initial": "source.truth"},
+        {"from": "source.truth", "hold": True},
+    ],
+    ids=["marked", "delayed", "first value", "held"],
+)
+def test_truth_is_found_by_another_name_and_on_every_kind_of_wire(wire: object):
+    refused_at("wires.driving.number", driving={"number": wire})
 
 
 def test_a_command_cannot_be_truth_itself():
-    told = WIRES | {"source": {"command": {"from": "source.truth", "delay": 1, "initial": "stop.number"}}}
-    assert [problem.where for problem in refused(NODES, told)] == ["wires.source.command"]
+    told = {"from": "source.truth", "delay": 1, "initial": "stop.number"}
+    refused_at("wires.source.command", source={"command": told})
 
 
 def test_a_value_whose_type_is_truth_is_refused_wherever_it_comes_from():
     with_plan = {**NODES, "plan": "Surveyor"}
-    assert [p.where for p in refused(with_plan, WIRES | {"driving": {"number": "plan.plan"}})] == [
-        "wires.driving.number"
-    ]
-    assert build(config(with_plan, WIRES | {"scored": {"number": "plan.plan"}}))
+    refused_at("wires.driving.number", with_plan, driving={"number": "plan.plan"})
+    assert build(graph_of_toys(with_plan, WIRES | {"scored": {"number": "plan.plan"}}))
 
 
 def test_a_graph_without_a_loop_may_read_truth_everywhere():
-    assert steering(build(config(NODES, {k: v for k, v in WIRES.items() if k != "source"}))) == frozenset()
+    assert steering(build(graph_of_toys(NODES, {k: v for k, v in WIRES.items() if k != "source"}))) == frozenset()
 
 
 def test_every_reader_of_marked_truth_is_marked_in_the_picture():
-    drawn = mermaid(build(config(NODES, WIRES | {"scored": {"number": "source.hidden"}})))
+    drawn = mermaid(build(graph_of_toys(NODES, WIRES | {"scored": {"number": "source.hidden"}})))
     assert "class n_all,n_scored truth" in drawn
     assert signature(toys.Steered).outputs["hidden"].truth
     assert signature(toys.Steered).outputs["hidden"].type is toys.Number

@@ -4,24 +4,18 @@ from pathlib import Path
 
 import pytest
 
+from omninav.pipeline import Value
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.prefix import following
 from omninav.pipeline.experiment.repetition import run_repetition
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.run.results import results_of
-from toys import Ledger
+from toys import Ledger, graph_of_toys
 
 SEEDS = (0, 1, 2)
-STAGES = {
-    "source": "Count",
-    "start": "Constant",
-    "dice": "Dice",
-    "twice": "Scale",
-    "scale": "Scale",
-    "sum": "Add",
-    "all": "Collected",
-}
+BEFORE = {"start": "Constant", "dice": "Dice", "twice": "Scale"}
+STAGES = {"source": "Count", **BEFORE, "scale": "Scale", "sum": "Add", "all": "Collected"}
 ADDED = {"direct": "dice.number", "through a node before the loop": "twice.number", "none": "start.number"}
 
 
@@ -33,18 +27,19 @@ def graph(added: str) -> Graph:
         "sum": {"number": "scale.number", "other": ADDED[added]},
         "all": {"numbers": {"from": "sum.number", "collect": True}},
     }
-    whole = build({"nodes": {name: {"_target_": f"toys.{stage}"} for name, stage in STAGES.items()}, "wires": wires})
-    return whole.leading_to(["all.metrics"])
+    return build(graph_of_toys(STAGES, wires)).leading_to(["all.metrics"])
 
 
-def repetitions(graph: Graph, place: Path, cache: Cache | None, sharing: bool) -> tuple[list, list[int]]:
+def repetitions(
+    graph: Graph, place: Path, cache: Cache | None, sharing: bool, **artifacts: Value
+) -> tuple[list, list[int]]:
     """What each seed gave, and how often each one computed `scale`."""
     shared, given, computed = None, [], []
     for seed in SEEDS:
         folder = place / f"seed_{seed}"
         folder.mkdir(parents=True)
         engine, recorded = run_repetition(
-            graph, {}, seed, folder, cache, shared, sharing and shared is None, lambda words: None
+            graph, artifacts, seed, folder, cache, shared, sharing and shared is None, lambda words: None
         )
         shared = recorded or shared
         given.append(results_of(engine)[0].values["numbers"]["all"])
@@ -81,36 +76,18 @@ def test_what_follows_from_a_node_is_found_through_nodes_before_the_loop_and_in_
     assert following(graph("through a node before the loop"), ["dice"]) == {"dice", "twice", "sum", "all"}
 
 
-def test_what_grows_in_place_starts_anew_for_each_seed(tmp_path: Path):
-    """A ledger from before the loop, and one that is an artifact, into which each of twenty frames enters a number."""
-    for number, start in enumerate(("new.ledger", "artifacts.ledger")):
-        wire = {"from": "enter.ledger", "delay": 1, "initial": start}
-        nodes = {
-            "source": "Count",
-            "new": "NewLedger",
-            "noise": "Noise",
-            "enter": "Enter",
-            "look": "Look",
-            "all": "Collected",
-        }
-        config = {
-            "nodes": {name: {"_target_": f"toys.{stage}"} for name, stage in nodes.items()},
-            "wires": {
-                "noise": {"number": "source.number"},
-                "enter": {"number": "noise.number", "ledger": wire},
-                "look": {"ledger": wire},
-                "all": {"numbers": {"from": "look.number", "collect": True}},
-            },
-        }
-        ledger = Ledger([])
-        grown = build(config, {"ledger": Ledger}).leading_to(["all.metrics"])
-        shared, sizes = None, []
-        for seed in SEEDS:
-            folder = tmp_path / f"{number}_{seed}"
-            folder.mkdir()
-            engine, recorded = run_repetition(
-                grown, {"ledger": ledger}, seed, folder, None, shared, shared is None, lambda words: None
-            )
-            shared = recorded or shared
-            sizes.append(results_of(engine)[0].values["numbers"]["all"])
-        assert sizes == [sizes[0]] * len(SEEDS), start
+@pytest.mark.parametrize("start", ["new.ledger", "artifacts.ledger"])
+def test_what_grows_in_place_starts_anew_for_each_seed(tmp_path: Path, start: str):
+    wire = {"from": "enter.ledger", "delay": 1, "initial": start}
+    nodes = {"source": "Count", "new": "NewLedger", "scale": "Scale", "noise": "Noise", "enter": "Enter"}
+    wires = {
+        "scale": {"number": "source.number"},
+        "noise": {"number": "scale.number"},
+        "enter": {"number": "noise.number", "ledger": wire},
+        "look": {"ledger": wire},
+        "all": {"numbers": {"from": "look.number", "collect": True}},
+    }
+    config = graph_of_toys({**nodes, "look": "Look", "all": "Collected"}, wires)
+    grown = build(config, {"ledger": Ledger}).leading_to(["all.metrics"])
+    sizes, _ = repetitions(grown, tmp_path, None, True, ledger=Ledger([]))
+    assert sizes == [[*range(10)]] * len(SEEDS)

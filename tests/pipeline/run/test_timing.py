@@ -8,20 +8,16 @@ import pytest
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.run.timing import stage_times
+from toys import graph_of_toys
 
 
 @pytest.fixture
 def engine() -> Engine:
     """Three stages in a row behind a source; times in milliseconds: one is slow where the other is quick."""
     nodes = {"source": "Count", "move": "Scale", "weigh": "Scale", "look": "Scale"}
-    wires = {"move": "source", "weigh": "move", "look": "weigh"}
-    graph = build(
-        {
-            "nodes": {name: {"_target_": f"toys.{stage}"} for name, stage in nodes.items()},
-            "wires": {name: {"number": f"{origin}.number"} for name, origin in wires.items()},
-        }
-    )
-    engine = Engine(graph)
+    before = {"move": "source", "weigh": "move", "look": "weigh"}
+    wires = {name: {"number": f"{origin}.number"} for name, origin in before.items()}
+    engine = Engine(build(graph_of_toys(nodes, wires)))
     for name, took in {
         "source": [100.0] * 5,
         "move": [1.0, 9.0, 1.0, 9.0],
