@@ -8,8 +8,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
+from toy_runs import begun, ended
 
 from omninav.pipeline.engine import damage
 from omninav.pipeline.files import read_json
@@ -17,21 +19,19 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import RunFolder, start
+from omninav.pipeline.run.run_folder import RunFolder
+from toys import graph_of_toys
 
-CONFIG = {
-    "variant": "toy",
-    "checkpoint_s": 0.0,
-    "nodes": {
-        name: {"_target_": f"toys.{stage}"}
-        for name, stage in {"source": "Count", "noise": "Noise", "sum": "Add", "all": "Collected"}.items()
-    },
-    "wires": {
-        "noise": {"number": "source.number"},
-        "sum": {"number": "noise.number", "other": {"from": "sum.number", "delay": 1, "initial": None}},
-        "all": {"numbers": {"from": "sum.number", "collect": True}},
-    },
+NODES = {"source": "Count", "noise": "Noise", "sum": "Add", "all": "Collected"}
+WIRES = {
+    "noise": {"number": "source.number"},
+    "sum": {"number": "noise.number", "other": {"from": "sum.number", "delay": 1, "initial": None}},
+    "all": {"numbers": {"from": "sum.number", "collect": True}},
 }
+
+
+def config(place: Path) -> dict[str, Any]:
+    return graph_of_toys(NODES, WIRES, variant="toy", checkpoint_s=0.0, runs=str(place))
 
 
 class Stop:
@@ -48,23 +48,24 @@ def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(damage, "_shown", set())
 
 
-def begun(place: Path) -> RunFolder:
-    return start(plan({**CONFIG, "runs": str(place)}), ["omninav", "variant=toy"])
+@pytest.fixture
+def complete(tmp_path: Path) -> RunFolder:
+    """A run that was never stopped."""
+    return ended(config(tmp_path / "whole"))
 
 
 @pytest.fixture
-def whole(tmp_path: Path) -> bytes:
-    """The metrics of a run that was never stopped."""
-    run = begun(tmp_path / "whole")
-    execute(run, plan({**CONFIG, "runs": str(tmp_path / "whole")}))
-    return (run.folder / "metrics.json").read_bytes()
+def whole(complete: RunFolder) -> bytes:
+    """Its metrics."""
+    return (complete.folder / "metrics.json").read_bytes()
 
 
 @pytest.fixture
 def stopped(tmp_path: Path) -> RunFolder:
-    run = begun(tmp_path / "stopped")
+    stopping = config(tmp_path / "stopped")
+    run = begun(stopping)
     with pytest.raises(KeyboardInterrupt):
-        execute(run, plan({**CONFIG, "runs": str(tmp_path / "stopped")}), Stop())
+        execute(run, plan(stopping), Stop())
     return run
 
 
@@ -103,8 +104,7 @@ def test_a_run_of_which_too_much_is_damaged_is_refused_in_one_line(stopped: RunF
     assert "\n" not in str(refused.value)
 
 
-def test_a_complete_run_with_any_damage_is_made_again_or_refused_in_one_line(tmp_path: Path, whole: bytes):
-    (complete,) = (RunFolder(folder) for folder in (tmp_path / "whole").iterdir() if not folder.is_symlink())
+def test_a_complete_run_with_any_damage_is_made_again_or_refused_in_one_line(complete: RunFolder, whole: bytes):
     for name in files_of(complete.folder):
         run = damaged(complete, name, 1)
         with pytest.raises(BadInput) if name in ("config.yaml", "manifest.json") else nullcontext():

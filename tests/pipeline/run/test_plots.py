@@ -4,44 +4,27 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from toy_runs import begun, ended
 
 from omninav.pipeline.files import digest_file, read_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
-from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.redraw import redraw
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import RunFolder, start
+from toys import graph_of_toys
 
-CONFIG: dict[str, Any] = {
-    "variant": "toy",
-    "nodes": {
-        "source": {"_target_": "toys.Count"},
-        "add": {"_target_": "toys.Add"},
-        "scaled": {"_target_": "toys.Scale"},
-        "total": {"_target_": "toys.Total"},
-        "quick": {"_target_": "toys.Draw"},
-        "slow": {"_target_": "toys.DrawSlowly"},
-    },
-    "wires": {
-        "add": {"number": "source.number"},
-        "scaled": {"number": "source.number"},
-        "total": {"numbers": {"from": "add.number", "collect": True}},
-        "quick": {"numbers": {"from": "add.number", "collect": True}},
-        "slow": {"numbers": {"from": "scaled.number", "collect": True}},
-    },
-}
+COUNTED = {"number": "source.number"}
+ADDED = {"numbers": {"from": "add.number", "collect": True}}
+SCALED = {"numbers": {"from": "scaled.number", "collect": True}}
+CONFIG = graph_of_toys(
+    {"source": "Count", "add": "Add", "scaled": "Scale", "total": "Total", "quick": "Draw", "slow": "DrawSlowly"},
+    {"add": COUNTED, "scaled": COUNTED, "total": ADDED, "quick": ADDED, "slow": SCALED},
+    variant="toy",
+)
 
 
 def nodes(**settings: Any) -> set[str]:
     return set(plan(CONFIG | settings).graph.nodes)
-
-
-def ended(place: Path) -> RunFolder:
-    planned = plan(CONFIG | {"runs": str(place)})
-    run = start(planned, ["omninav", "variant=toy"])
-    execute(run, planned)
-    return run
 
 
 def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_for() -> None:
@@ -55,7 +38,7 @@ def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_fo
 
 
 def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(tmp_path: Path) -> None:
-    run = ended(tmp_path)
+    run = ended(CONFIG | {"runs": str(tmp_path)})
     before = {file.name: digest_file(file) for file in run.folder.iterdir() if file.is_file()}
     assert (run.folder / "report.html").read_text().count("<figure id=") == 1
     redraw(run.folder, "all")
@@ -69,7 +52,7 @@ def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(tmp_path: Path
 
 
 def test_a_run_that_gives_other_figures_now_is_not_drawn(tmp_path: Path) -> None:
-    run = ended(tmp_path)
+    run = ended(CONFIG | {"runs": str(tmp_path)})
     (run.folder / "metrics.json").write_text('{"other": 1}')
     page = (run.folder / "report.html").read_bytes()
     with pytest.raises(BadInput, match="it gives other figures now"):
@@ -80,6 +63,6 @@ def test_a_run_that_gives_other_figures_now_is_not_drawn(tmp_path: Path) -> None
 
 
 def test_a_run_that_has_not_ended_is_not_drawn(tmp_path: Path) -> None:
-    run = start(plan(CONFIG | {"runs": str(tmp_path)}), ["omninav", "variant=toy"])
+    run = begun(CONFIG | {"runs": str(tmp_path)})
     with pytest.raises(BadInput, match=r"omninav resume .* goes on with it"):
         redraw(run.folder, "all")

@@ -5,27 +5,27 @@ from typing import Any
 
 import pytest
 import yaml
+from toy_runs import begun
 
 from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import digest_text, read_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.run.config_text import config_text
-from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import complete_run, resume
-from omninav.pipeline.run.run_folder import RunFolder, start
-from toys import Number
+from omninav.pipeline.run.run_folder import RunFolder
+from toys import Number, graph_of_toys
 
 
-def begun(place: Path, **changes: Any) -> RunFolder:
-    """A run that has been started and has done nothing yet."""
-    config = {
-        "variant": "toy",
-        "runs": str(place),
-        "nodes": {"source": {"_target_": "toys.Count"}, "reader": {"_target_": "toys.Add"}},
-        "wires": {"reader": {"number": "source.number"}},
-    }
-    return start(plan(config | changes), ["omninav", "variant=toy"])
+@pytest.fixture(autouse=True)
+def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # a run goes on where it was started
+
+
+def started(place: Path, **changes: Any) -> RunFolder:
+    wires = {"reader": {"number": "source.number"}}
+    config = graph_of_toys({"source": "Count", "reader": "Add"}, wires, variant="toy", runs=str(place))
+    return begun(config | changes)
 
 
 def rewrite(run: RunFolder, **nodes: str) -> None:
@@ -37,20 +37,16 @@ def rewrite(run: RunFolder, **nodes: str) -> None:
     run.save()
 
 
-def test_a_run_that_was_stopped_ends_in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    run = begun(tmp_path)
+def test_a_run_that_was_stopped_ends_in_its_own_folder(tmp_path: Path) -> None:
+    run = started(tmp_path)
     assert read_json(run.folder / "manifest.json")["status"] == "running"
     resumed, _ = resume(run.folder)
     assert resumed.folder == run.folder.resolve()
     assert read_json(run.folder / "manifest.json")["status"] == "complete"
 
 
-def test_a_run_goes_on_with_the_text_of_its_configuration_as_it_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    run = begun(tmp_path)
+def test_a_run_goes_on_with_the_text_of_its_configuration_as_it_stands(tmp_path: Path) -> None:
+    run = started(tmp_path)
     rewrite(run)  # as older versions wrote it: each part in full, one value a line
     text = (run.folder / "config.yaml").read_text()
     assert text != config_text(yaml.safe_load(text))
@@ -59,28 +55,25 @@ def test_a_run_goes_on_with_the_text_of_its_configuration_as_it_stands(
     assert complete_run(run.folder)[1] == text
 
 
-def test_a_run_of_an_older_version_says_how_to_start_it_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    run = begun(tmp_path)
+def test_a_run_of_an_older_version_says_how_to_start_it_again(tmp_path: Path) -> None:
+    run = started(tmp_path)
     rewrite(run, reader="omninav.stages.matching.old.OldMatch")
     with pytest.raises(BadInput, match=r"made with an older omninav.*start it again: omninav variant=toy"):
         resume(run.folder)
 
 
-def test_a_checkpoint_of_an_older_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    run = begun(tmp_path)
+def test_a_checkpoint_of_an_older_version_is_refused(tmp_path: Path) -> None:
+    run = started(tmp_path)
     (run.memory / "checkpoint").write_bytes(seal(encode({"format": 1})))
     with pytest.raises(BadInput, match="was written by another version of omninav; start the run again"):
         resume(run.folder)
 
 
-def test_an_input_that_has_changed_or_gone_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_an_input_that_has_changed_or_gone_is_named(tmp_path: Path) -> None:
     file = tmp_path / "known.omap"
     write_artifact(file, Number(3.0))
     wires = {"reader": {"number": "source.number", "other": "artifacts.map"}}
-    run = begun(tmp_path / "runs", wires=wires, artifacts={"map": {"file": str(file)}})
+    run = started(tmp_path / "runs", wires=wires, artifacts={"map": {"file": str(file)}})
     write_artifact(file, Number(4.0))
     with pytest.raises(BadInput, match="map changed since the run was started"):
         resume(run.folder)

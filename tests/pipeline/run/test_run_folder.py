@@ -1,24 +1,19 @@
 """A run's folder: there when all that a resume needs is in it, and never another run's."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
+from toy_runs import begun
 
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run import run_folder
-from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
-
-CONFIG: dict[str, Any] = {
-    "variant": "toy",
-    "nodes": {"source": {"_target_": "toys.Count"}, "reader": {"_target_": "toys.Add"}},
-    "wires": {"reader": {"number": "source.number"}},
-}
+from toys import graph_of_toys
 
 
 def start(root: Path) -> Path:
-    return run_folder.start(plan({**CONFIG, "runs": str(root)}), ["omninav"]).folder
+    wires = {"reader": {"number": "source.number"}}
+    return begun(graph_of_toys({"source": "Count", "reader": "Add"}, wires, variant="toy", runs=str(root))).folder
 
 
 def test_a_folder_that_can_be_seen_can_be_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
