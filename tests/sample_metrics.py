@@ -1,5 +1,8 @@
 """A run's metrics as a stage states them, for the tests of pages and tables."""
 
+from pathlib import Path
+from typing import Any
+
 from omninav.pipeline import Metrics, Quantity
 
 ERRORS = {"mean": 0.5, "median": 0.073, "p90": 0.81, "max": 12.34}
@@ -24,3 +27,13 @@ HEADLINES = ("after_convergence.position_error_m.median", "loss_rate", "converge
 def measured(**changes):
     """The sample metrics with some values changed."""
     return Metrics({**VALUES, **changes}, QUANTITIES, HEADLINES, ("odometry_alone",))
+
+
+def sweep_row(job: int, metrics: Metrics | None, folder: Path = Path(), **manifest: str) -> dict[str, Any]:
+    """What a sweep's tables and page know of one job; of one that failed it has no metrics."""
+    return {"job": str(job), "folder": folder, "manifest": {"status": "complete", **manifest}, "metrics": metrics}
+
+
+def compared(name: str, metrics: Metrics, **config: object) -> dict[str, Any]:
+    """What a comparison knows of one run."""
+    return {"name": name, "metrics": metrics, "config": config, "manifest": {}}

@@ -1,6 +1,6 @@
 import re
 
-from sample_metrics import measured
+from sample_metrics import measured, sweep_row
 
 from omninav.pipeline.report.sweep_page import write_sweep_page
 
@@ -11,13 +11,8 @@ def test_a_failed_job_stands_in_the_sweeps_page_with_its_error_and_log(tmp_path)
         folder.mkdir()
         (folder / file).write_text("x")
     rows = [
-        {"job": "0", "folder": good, "manifest": {"status": "complete", "overrides": "seed=0"}, "metrics": measured()},
-        {
-            "job": "1",
-            "folder": bad,
-            "manifest": {"status": "failed", "overrides": "seed=1", "error": "stage 'x' failed: <no>"},
-            "metrics": None,
-        },
+        sweep_row(0, measured(), good, overrides="seed=0"),
+        sweep_row(1, None, bad, overrides="seed=1", status="failed", error="stage 'x' failed: <no>"),
     ]
     page = write_sweep_page(tmp_path, rows).read_text()
     assert 'href="0/report.html"' in page
@@ -28,33 +23,17 @@ def test_a_failed_job_stands_in_the_sweeps_page_with_its_error_and_log(tmp_path)
     assert "http" not in page
 
 
-def test_what_is_the_same_in_all_jobs_is_said_once(tmp_path):
-    rows = [
-        {"job": str(n), "folder": tmp_path / str(n), "manifest": {"status": "complete"}, "metrics": metrics}
-        for n, metrics in enumerate((measured(loss_rate=0.5), measured()))
-    ]
+def test_what_is_the_same_in_all_jobs_is_said_once_and_the_best_is_marked(tmp_path):
+    rows = [sweep_row(n, metrics) for n, metrics in enumerate((measured(loss_rate=0.5), measured()))]
     page = write_sweep_page(tmp_path, rows).read_text()
     assert "all jobs: Position error, median, after convergence: 0.050 m, Converged: after 12 frames<" in page
     assert set(re.findall("<th>([^<]*)</th>", page)) == {"job", "jobs", "Loss rate (%)"}
-
-
-def test_a_sweeps_best_job_is_marked(tmp_path):
-    rows = [
-        {"job": str(n), "folder": tmp_path / str(n), "manifest": {"status": "complete"}, "metrics": metrics}
-        for n, metrics in enumerate((measured(loss_rate=0.5), measured()))
-    ]
-    page = write_sweep_page(tmp_path, rows).read_text()
     assert re.findall(r'<td class="best">([^<]*)</td>', page) == ["12.5"]
 
 
 def test_a_sweeps_page_shows_what_varies_in_columns_of_its_own(tmp_path):
     rows = [
-        {
-            "job": str(n),
-            "folder": tmp_path / str(n),
-            "manifest": {"status": "complete", "overrides": f"variant=a ++nodes.x.gain={n} seed=3"},
-            "metrics": measured(loss_rate=3.3e-14 * n),
-        }
+        sweep_row(n, measured(loss_rate=3.3e-14 * n), overrides=f"variant=a ++nodes.x.gain={n} seed=3")
         for n in range(2)
     ]
     page = write_sweep_page(tmp_path, rows).read_text()

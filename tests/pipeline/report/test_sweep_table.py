@@ -1,17 +1,14 @@
 import csv
 
 import pytest
-from sample_metrics import measured
+from sample_metrics import measured, sweep_row
 
 from omninav.pipeline.report.sweep_table import conditions, mean_of, write_sweep_tables
 
 
 def rows(*losses):
-    return [
-        {"job": str(n), "folder": ".", "manifest": {"status": "complete", "overrides": f"gain={n // 3} seed={n % 3}"}}
-        | {"metrics": None if loss is None else measured(loss_rate=loss)}
-        for n, loss in enumerate(losses)
-    ]
+    metrics = (None if loss is None else measured(loss_rate=loss) for loss in losses)
+    return [sweep_row(n, each, overrides=f"gain={n // 3} seed={n % 3}") for n, each in enumerate(metrics)]
 
 
 def test_the_interval_of_a_mean_is_students():

@@ -1,7 +1,7 @@
 import io
 
 from rich.console import Console
-from sample_metrics import measured
+from sample_metrics import compared, measured, sweep_row
 
 from omninav.pipeline import Metrics, Quantity
 from omninav.pipeline.report.sweep_table import overview_of
@@ -59,17 +59,11 @@ def test_no_two_rows_of_the_results_have_one_name_and_none_is_empty():
 
 
 def test_a_sweep_shows_what_varies_and_as_many_figures_as_fit():
-    rows = [
-        {
-            "job": str(n),
-            "folder": ".",
-            "manifest": {"overrides": f"variant=a ++nodes.x.gain={n // 2} seed={n % 2}"},
-            "metrics": Metrics(
-                {f"figure_{i}_m": 0.1 * n + i for i in range(9)}, headlines=tuple(f"figure_{i}_m" for i in range(9))
-            ),
-        }
-        for n in range(4)
-    ]
+    figures = tuple(f"figure_{i}_m" for i in range(9))
+    rows = []
+    for n in range(4):
+        metrics = Metrics({figure: 0.1 * n + i for i, figure in enumerate(figures)}, headlines=figures)
+        rows.append(sweep_row(n, metrics, overrides=f"variant=a ++nodes.x.gain={n // 2} seed={n % 2}"))
     sweep = overview_of(rows)
     assert (sweep.settings, sweep.seeds, sweep.constant) == (("nodes.x.gain",), True, ("variant=a",))
     for width in (80, 120):
@@ -83,14 +77,10 @@ def test_a_sweep_shows_what_varies_and_as_many_figures_as_fit():
 
 
 def test_a_comparison_marks_the_best_and_shows_differing_settings():
+    nodes = {"m": {"k": 1}}
     runs = [
-        {"name": "runs/a", "metrics": measured(), "config": {"seed": 0, "nodes": {"m": {"k": 1}}}, "manifest": {}},
-        {
-            "name": "runs/b",
-            "metrics": measured(loss_rate=0.0, frames=10),
-            "config": {"seed": 1, "nodes": {"m": {"k": 1}}},
-            "manifest": {},
-        },
+        compared("runs/a", measured(), seed=0, nodes=nodes),
+        compared("runs/b", measured(loss_rate=0.0, frames=10), seed=1, nodes=nodes),
     ]
     lines = printed(compare_table(runs)).splitlines()
     loss = next(line for line in lines if "Loss rate (%)" in line)
@@ -105,12 +95,7 @@ def test_a_comparison_marks_the_best_and_shows_differing_settings():
 def test_where_more_is_better_the_largest_is_marked():
     described = {"goal.reached_rate": Quantity(better="higher"), "goal.end_error_m": Quantity(better="lower")}
     runs = [
-        {
-            "name": f"runs/{share}",
-            "metrics": Metrics({"goal": {"reached_rate": share, "end_error_m": 2.0 - share}}, described),
-            "config": {},
-            "manifest": {},
-        }
+        compared(f"runs/{share}", Metrics({"goal": {"reached_rate": share, "end_error_m": 2.0 - share}}, described))
         for share in (1.0, 0.0)
     ]
     lines = printed(compare_table(runs)).splitlines()
@@ -120,7 +105,7 @@ def test_where_more_is_better_the_largest_is_marked():
 
 def test_runs_with_long_names_stand_under_letters_that_are_explained():
     names = [f"runs/2026-01-0{day}_10-00-00_omniview_mcl" for day in (1, 2, 3)]
-    said = printed(compare_table([{"name": n, "metrics": measured(), "config": {}, "manifest": {}} for n in names]))
+    said = printed(compare_table([compared(name, measured()) for name in names]))
     assert [said.count(name) for name in names] == [1, 1, 1]
     assert f"B: {names[1]}" in said
 
