@@ -1,33 +1,28 @@
 """The best of several conditions, by the rule of the procedure."""
 
 import pytest
+from made_experiments import experiment, run_with
 
 from omninav.pipeline.experiment.best import best_condition
-from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import key_of
 
-FILE = {
-    "name": "test",
-    "title": "A test",
-    "about": "",
-    "variant": "none",
-    "sweep": {"value": {"1": "x=1", "2": "x=2", "3": "x=3"}},
-    "measures": {"lost": {"title": "Lost (%)", "path": ["lost"]}, "error": {"title": "Error (cm)", "path": ["error"]}},
-    "page": {"rows": [], "columns": "value"},
-    "best": ["lost", "error"],
-}
+SWEPT = experiment(
+    sweep={"value": {"1": "x=1", "2": "x=2", "3": "x=3"}},
+    measures={"lost": {"title": "Lost (%)", "path": ["lost"]}, "error": {"title": "Error (cm)", "path": ["error"]}},
+    page={"rows": [], "columns": "value"},
+    best=["lost", "error"],
+)
 
 
 def best(**figures: list[tuple[float, float | None]]) -> tuple[str, str] | None:
     """Label and words of the best, of runs with these loss rates and errors by label."""
     results = {
         key_of({"value": label[1:]}): {
-            (f"draw {n}", n): {"metrics": {"lost": lost, "error": error}, "timing": {}, "facts": {}}
-            for n, (lost, error) in enumerate(runs)
+            (f"draw {n}", n): run_with(lost=lost, error=error) for n, (lost, error) in enumerate(runs)
         }
         for label, runs in figures.items()
     }
-    found = best_condition(read_experiment(FILE, "full"), results)
+    found = best_condition(SWEPT, results)
     return None if found is None else (found[0].labels["value"], found[1])
 
 

@@ -2,18 +2,11 @@
 
 import numpy as np
 import pytest
+from made_experiments import experiment, run_with
 
 from omninav.pipeline.experiment.intervals import bootstrap_interval
-from omninav.pipeline.experiment.specification import Measure, read_experiment
-from omninav.pipeline.experiment.verdicts import (
-    Case,
-    Verdict,
-    headline,
-    judge,
-    key_of,
-    over_runs,
-)
-from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.experiment.specification import Measure
+from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, judge, key_of, over_runs
 
 
 def held(claim: dict[str, object], seeds: int = 1, **errors: list[float]) -> bool | None:
@@ -23,30 +16,20 @@ def held(claim: dict[str, object], seeds: int = 1, **errors: list[float]) -> boo
 
 def judged(claim: dict[str, object], seeds: int = 1, over_runs: str = "mean", **errors: list[float]) -> Verdict:
     """The verdict on it. An error of NaN is one that a repetition does not have."""
-    file = {
-        "name": "test",
-        "title": "A test",
-        "about": "",
-        "variant": "none",
-        "sweep": {"method": dict.fromkeys(errors, "")},
-        "measures": {"error": {"title": "Error", "path": ["error"], "over_runs": over_runs}},
-        "page": {"rows": [], "columns": "method"},
-        "published": {"error": {"a": 10.0}},
-        "claims": {"key": {"statement": "it holds", "measure": "error", "of": {"method": "a"}, **claim}},
-    }
+    claimed = experiment(
+        sweep={"method": dict.fromkeys(errors, "")},
+        measures={"error": {"title": "Error", "path": ["error"], "over_runs": over_runs}},
+        published={"error": {"a": 10.0}},
+        claims={"key": {"statement": "it holds", "measure": "error", "of": {"method": "a"}, **claim}},
+    )
     results = {
         key_of({"method": name}): {
-            (f"world {n // seeds}", n % seeds): {
-                "metrics": {"error": None if np.isnan(value) else value},
-                "timing": {},
-                "facts": {},
-            }
+            (f"world {n // seeds}", n % seeds): run_with(error=None if np.isnan(value) else value)
             for n, value in enumerate(values)
         }
         for name, values in errors.items()
     }
-    verdict = judge(read_experiment(file, "full"), results)["key"]
-    return verdict
+    return judge(claimed, results)["key"]
 
 
 CLEAR, ALIKE = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [2.0, 1.0, 4.0, 3.0, 6.0, 5.0]
@@ -172,11 +155,6 @@ def test_a_run_without_a_figure_does_not_keep_to_the_limit():
     assert (case.kept, case.judged, case.repetitions, case.holds) == (11, 11, 12, None)
 
 
-def test_a_largest_figure_is_compared_with_a_number():
-    with pytest.raises(ProblemsFound, match="which is compared with a number"):
-        judged({"below": {"method": "b"}}, over_runs="largest", a=CLEAR, b=FAR)
-
-
 def test_the_best_must_stand_against_every_other():
     """The rival with the lowest mean is all over the place; another one is better every single time."""
     wide = [-50.0, 70.0, -40.0, 60.0, -30.0, 44.0]
@@ -205,20 +183,6 @@ def test_a_claim_about_survivors_does_not_hold_but_it_may_fail():
 def test_a_condition_is_not_compared_with_itself():
     verdict = judged({"of": {}, "at_most": {"method": "b"}}, a=CLEAR, b=FAR)
     assert [case.where for case in verdict.cases] == ["a"]
-
-
-@pytest.mark.parametrize(
-    ("claim", "said"),
-    [
-        ({"below": "publisht"}, "expected a number"),
-        ({"below": 1.0, "above": 2.0}, "makes one comparison"),
-        ({"ratio_to": {"method": "b"}, "below": {"method": "b"}}, "a ratio is compared with a number"),
-        ({"ratio_to": {"method": "c"}, "below": 1.0}, "there is no 'c'"),
-    ],
-)
-def test_a_claim_that_says_nothing_clear_is_refused(claim: dict[str, object], said: str):
-    with pytest.raises(ProblemsFound, match=said):
-        held(claim, a=CLEAR, b=FAR)
 
 
 def test_a_case_says_what_was_compared():
@@ -280,40 +244,27 @@ def test_a_difference_that_is_rounding_is_none_and_five_percent_are_not_above(co
     assert held({comparison: 10.0}, a=[10.0 + by] * 6) is holds
 
 
-def test_not_above_is_open_where_the_interval_reaches_beyond_the_margin():
+def test_not_above_is_open_where_the_interval_reaches_beyond_the_margin_or_begins_within_it():
     figures = [9.0, 9.5, 10.0, 10.5, 11.0, 11.0]
-    assert held({"not_above": 10.0}, a=figures) is None
-    assert held({"not_above": 12.0}, a=figures) is True
-    assert held({"not_above": 8.0}, a=figures) is False
-
-
-def test_not_above_is_open_where_the_interval_begins_above_the_other_side_and_within_the_margin():
-    figures = [10.1, 10.2, 10.4, 10.6, 10.9, 11.0]  # by 0.1 to 1.0 above 10: 0.5 is the margin
-    assert held({"not_above": 10.0}, a=figures) is None
-    assert held({"at_most": 10.0}, a=figures) is False
+    assert [held({"not_above": limit}, a=figures) for limit in (8.0, 10.0, 12.0)] == [False, None, True]
+    within = [10.1, 10.2, 10.4, 10.6, 10.9, 11.0]  # by 0.1 to 1.0 above 10: 0.5 is the margin
+    assert held({"not_above": 10.0}, a=within) is None
+    assert held({"at_most": 10.0}, a=within) is False
 
 
 def swept(claim: dict[str, object], figures: dict[tuple[str, str], float]) -> list[Case]:
     """The cases of a claim about figures by method and day, each of six worlds."""
     methods, days = (list(dict.fromkeys(labels)) for labels in zip(*figures, strict=True))
-    file = {
-        "name": "test",
-        "title": "A test",
-        "about": "",
-        "variant": "none",
-        "sweep": {"method": dict.fromkeys(methods, ""), "day": dict.fromkeys(days, "")},
-        "measures": {"error": {"title": "Error", "path": ["error"]}},
-        "page": {"rows": ["day"], "columns": "method"},
-        "claims": {"key": {"statement": "s", "measure": "error", **claim}},
-    }
+    claimed = experiment(
+        sweep={"method": dict.fromkeys(methods, ""), "day": dict.fromkeys(days, "")},
+        page={"rows": ["day"], "columns": "method"},
+        claims={"key": {"statement": "s", "measure": "error", **claim}},
+    )
     results = {
-        key_of({"method": method, "day": day}): {
-            (f"world {n}", 0): {"metrics": {"error": figure}, "timing": {}, "facts": {}} for n in range(6)
-        }
+        key_of({"method": method, "day": day}): {(f"world {n}", 0): run_with(error=figure) for n in range(6)}
         for (method, day), figure in figures.items()
     }
-    verdict = judge(read_experiment(file, "full"), results)["key"]
-    return list(verdict.cases)
+    return list(judge(claimed, results)["key"].cases)
 
 
 GRID = {("a", "1"): 1.0, ("a", "2"): 2.0, ("b", "1"): 3.0, ("b", "2"): 1.0, ("c", "1"): 9.0, ("c", "2"): 9.0}
@@ -383,12 +334,9 @@ def test_means_are_compared_and_not_medians():
 
 
 def test_five_percent_of_a_negative_figure_are_as_much_as_of_a_positive_one():
-    assert held({"not_above": -10.0}, a=[-9.6] * 6) is True
-    assert held({"not_above": -10.0}, a=[-9.4] * 6) is False
-    assert held({"not_above": {"method": "b"}}, a=[-9.6] * 6, b=[-10.0] * 6) is True
-    assert held({"not_above": {"method": "b"}}, a=[-9.4] * 6, b=[-10.0] * 6) is False
-    assert held({"not_above": {"method": "b"}}, a=[10.4] * 6, b=[10.0] * 6) is True
-    assert held({"not_above": {"method": "b"}}, a=[10.51] * 6, b=[10.0] * 6) is False
+    for ours, theirs, holds in ((-9.6, -10.0, True), (-9.4, -10.0, False), (10.4, 10.0, True), (10.51, 10.0, False)):
+        assert held({"not_above": theirs}, a=[ours] * 6) is holds
+        assert held({"not_above": {"method": "b"}}, a=[ours] * 6, b=[theirs] * 6) is holds
 
 
 def test_a_ratio_is_of_repetitions_that_have_both_figures():
