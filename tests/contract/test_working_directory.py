@@ -11,11 +11,15 @@ from conftest import DATA, DRIVE, ROOT, TOUR, needs_data
 from contract.watched_folder import watched
 
 MARK = "open(r'{folder}/EXECUTED', 'w')\n"
-MODULES = (
-    *("numpy", "scipy", "yaml", "hydra", "cv2", "pickle", "sitecustomize", "usercustomize", "poselib", "joblib"),
-    *("config", "logging", "struct", "resource", "mcap", "rosbags", "conftest", "evil", "pyarrow", "pandas", "PIL"),
-)
+MODULES = """
+    numpy scipy yaml hydra cv2 pickle sitecustomize usercustomize poselib joblib config logging struct resource mcap
+    rosbags conftest evil pyarrow pandas PIL
+"""
 """Modules that are imported somewhere, or that settings name."""
+SHARED_LIBRARIES = """
+    libz.so libm.so libtbb.so libsvml.so libddsc.so libfaiss.so
+    libz.so.1 libm.so.6 libc.so.6 libtbb.so.12 libgomp.so.1 libddsc.so.11
+"""
 ROS2_PYTHON = Path(os.environ.get("OMNINAV_ROS2_PYTHON", ROOT / ".venv-ros2/bin/python"))
 
 
@@ -47,12 +51,8 @@ def hostile(folder: Path) -> list[str]:
         "fonts.conf": "",
         "optuna.db": "",
         "x86_64/libz.so.1": "",
-        **{f"{name}.so": "" for name in ("libz", "libm", "libtbb", "libsvml", "libddsc", "libfaiss")},
-        **{
-            name: ""
-            for name in ("libz.so.1", "libm.so.6", "libc.so.6", "libtbb.so.12", "libgomp.so.1", "libddsc.so.11")
-        },
-        **{f"{name}.py": MARK for name in MODULES},
+        **dict.fromkeys(SHARED_LIBRARIES.split(), ""),
+        **{f"{name}.py": MARK for name in MODULES.split()},
     }
     for name, content in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -81,37 +81,15 @@ def test_a_run_reads_nothing_of_the_folder_that_it_is_started_in(tmp_path: Path,
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*before, "runs"])
 
 
-LIBRARIES = (
-    *(
-        "numba",
-        "matplotlib.pyplot",
-        "cv2",
-        "scipy",
-        "networkx",
-        "poselib",
-        "rosbags.highlevel",
-        "mcap",
-        "pyarrow",
-        "rich",
-    ),
-    *(
-        "pandas",
-        "onnxruntime",
-        "faiss",
-        "joblib",
-        "optuna",
-        "dask",
-        "distributed",
-        "dask_jobqueue",
-        "zenoh",
-        "foxglove",
-    ),
-)
+LIBRARIES = """
+    numba matplotlib.pyplot cv2 scipy networkx poselib rosbags.highlevel mcap pyarrow rich pandas onnxruntime faiss
+    joblib optuna dask distributed dask_jobqueue zenoh foxglove
+"""
 
 
 def test_no_library_reads_the_folder_or_sends_later_processes_there(tmp_path: Path) -> None:
     hostile(tmp_path)
-    there = [name for name in LIBRARIES if importlib.util.find_spec(name.partition(".")[0])]
+    there = [name for name in LIBRARIES.split() if importlib.util.find_spec(name.partition(".")[0])]
     program = f"import importlib, omninav, subprocess, sys\nfor name in {there}: importlib.import_module(name)\n"
     program += "subprocess.run([sys.executable, '-P', '-c', 'import numpy'], check=True)\n"
     if importlib.util.find_spec("cyclonedds"):
@@ -162,9 +140,9 @@ def test_the_version_is_of_omninavs_own_checkout_and_no_others(tmp_path: Path, m
     for command in (
         ["init", "-q"],
         ["-c", "user.name=x", "-c", "user.email=x", "commit", "-q", "--allow-empty", "-mx"],
+        ["config", "core.fsmonitor", f"touch {tmp_path}/EXECUTED; false"],
     ):
         subprocess.run(["git", *command], cwd=tmp_path, check=True)
-    subprocess.run(["git", "config", "core.fsmonitor", f"touch {tmp_path}/EXECUTED; false"], cwd=tmp_path, check=True)
     site = tmp_path / "venv/site-packages/omninav/pipeline/run"
     site.mkdir(parents=True)
     monkeypatch.setattr(provenance, "__file__", str(site / "provenance.py"))
