@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-import tracemalloc
 import zipfile
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 import pytest
+from memory_peak import memory_peak
 
 from omninav.pipeline import BadInput, Value
 from omninav.pipeline.engine.artifact import read_artifact, read_header, type_of, write_artifact
@@ -57,10 +57,25 @@ def test_of_a_folder_the_files_in_it_are_named(file: Path):
         read_artifact(file.parent)
 
 
-def test_a_value_and_how_it_was_made_come_back(file: Path):
-    assert read_artifact(file).value == 2.5
-    assert type_of(file) is Number
-    assert read_header(file)["facts"] == {"made": "by hand"}
+def test_a_missing_or_foreign_file_is_refused_by_name(tmp_path: Path):
+    with pytest.raises(BadInput, match="there is no such file"):
+        read_artifact(tmp_path / "none.omap")
+    (tmp_path / "text.omap").write_text("not a map at all, but long enough to hold a sum " * 9)
+    with pytest.raises(BadInput, match="not an artifact file"):
+        read_artifact(tmp_path / "text.omap")
+
+
+def test_a_value_and_how_it_was_made_come_back_and_its_file_opens_in_numpy(tmp_path: Path):
+    path, points = tmp_path / "map.omap", Points(np.arange(6.0).reshape(3, 2))
+    write_artifact(path, points, {"poses": "truth"})
+    assert np.array_equal(read_artifact(path).points, points.points)
+    assert type_of(path) is Points
+    assert read_header(path)["facts"] == {"poses": "truth"}
+    with np.load(path, allow_pickle=False) as archive:
+        assert np.array_equal(archive["points"], points.points)
+    first = path.read_bytes()
+    write_artifact(path, points, {"poses": "truth"})
+    assert path.read_bytes() == first
 
 
 @pytest.mark.parametrize(
@@ -120,11 +135,5 @@ def test_a_type_named_by_a_file_imports_no_program(file: Path):
 
 def test_a_file_needs_no_memory_twice(tmp_path: Path):
     points = Points(np.random.default_rng(0).random((1_000_000, 2)))  # 16 MB
-    tracemalloc.start()
-    try:
-        write_artifact(tmp_path / "points.omap", points)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 8e6
+    assert memory_peak(write_artifact, tmp_path / "points.omap", points) < 8e6
     assert np.array_equal(read_artifact(tmp_path / "points.omap").points, points.points)

@@ -1,6 +1,6 @@
 """Arrays in the front of an artifact file: read and checked where they are needed."""
 
-import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,12 +10,13 @@ import pytest
 from conftest import RECORDINGS
 from hypothesis import given
 from hypothesis import strategies as st
+from memory_peak import memory_peak
 from small_run import reference_graph
 
 from omninav.pipeline import BadInput, StoredRows, Value
 from omninav.pipeline.engine import chunks
 from omninav.pipeline.engine.artifact import check_artifact, read_artifact, read_header, write_artifact
-from omninav.pipeline.engine.chunks import CHUNK
+from omninav.pipeline.engine.chunks import CHUNK, IN_MEMORY
 from omninav.pipeline.graph.contents import Shape
 
 ROWS = CHUNK // 8  # of 20 bytes: two and a half chunks
@@ -108,14 +109,18 @@ def test_numbers_that_are_not_finite_are_refused_when_they_are_read(tmp_path: Pa
         check_artifact(tmp_path / "nan.omap")
 
 
-def test_any_damaged_byte_of_a_file_is_found(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("in_memory", "check"), [(0, check_artifact), (IN_MEMORY, read_artifact)])
+def test_any_damaged_byte_of_a_file_is_found_and_any_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_memory: int, check: Callable[[Path], object]
+) -> None:
+    monkeypatch.setattr(chunks, "IN_MEMORY", in_memory)
     file = tmp_path / "small.omap"
     write_artifact(file, Tall(numbered(7), np.arange(7)))
     good = file.read_bytes()
-    for at in range(0, len(good), 5):
-        file.write_bytes(good[:at] + bytes([good[at] ^ 16]) + good[at + 1 :])
+    for at in range(0, len(good), 7):
+        file.write_bytes(good[:at] + bytes([good[at] ^ 1 << at % 8]) + good[at + 1 :])
         with pytest.raises(BadInput, match=r"small\.omap: "):
-            check_artifact(file)
+            check(file)
     for length in range(0, len(good), 97):
         file.write_bytes(good[:length])
         with pytest.raises(BadInput, match=r"small\.omap: "):
@@ -125,13 +130,7 @@ def test_any_damaged_byte_of_a_file_is_found(tmp_path: Path) -> None:
 def test_rows_are_written_again_without_reading_them_into_memory(file: Path, tmp_path: Path) -> None:
     write_artifact(tmp_path / "large.omap", Tall(numbered(1 << 20), np.arange(1 << 20)))  # 21 MB
     large = read_artifact(tmp_path / "large.omap")
-    tracemalloc.start()
-    try:
-        write_artifact(tmp_path / "again.omap", large)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 4e6
+    assert memory_peak(write_artifact, tmp_path / "again.omap", large) < 4e6
     assert (tmp_path / "again.omap").read_bytes() == (tmp_path / "large.omap").read_bytes()
 
 

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import toys
-from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.codec import BadEncoding, decode, decode_all, encode, encode_all, seal, unseal
 from omninav.pipeline.engine.disk_sequence import DiskSequence, Present
-from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import Value, value_name
 
 plain = st.recursive(
@@ -174,37 +172,3 @@ def test_a_spool_writes_small_values_together_and_large_ones_at_once(tmp_path: P
     assert spool.path.stat().st_size > before
     assert spool[201].array[0, 0] == 1
     spool.verify(202)
-
-
-def test_an_artifact_comes_back_with_its_facts_and_opens_in_numpy(tmp_path: Path):
-    path = tmp_path / "map.omap"
-    write_artifact(path, toys.Big(np.arange(6).reshape(2, 3)), {"poses": "truth"})
-    assert read_header(path)["facts"] == {"poses": "truth"}
-    assert read_artifact(path).array.tolist() == [[0, 1, 2], [3, 4, 5]]  # type: ignore[attr-defined]
-    with np.load(path, allow_pickle=False) as archive:
-        assert archive["array"].tolist() == [[0, 1, 2], [3, 4, 5]]
-    first = path.read_bytes()
-    write_artifact(path, toys.Big(np.arange(6).reshape(2, 3)), {"poses": "truth"})
-    assert path.read_bytes() == first
-
-
-@given(st.data())
-def test_any_flipped_bit_and_any_cut_of_an_artifact_is_refused_by_name(tmp_path_factory, data: st.DataObject):
-    path = tmp_path_factory.mktemp("artifact") / "map.omap"
-    write_artifact(path, toys.Big(np.arange(6)), {})
-    content = bytearray(path.read_bytes())
-    if data.draw(st.booleans()):
-        content[data.draw(st.integers(0, len(content) - 1))] ^= 1 << data.draw(st.integers(0, 7))
-    else:
-        content = content[: data.draw(st.integers(0, len(content) - 1))]
-    path.write_bytes(content)
-    with pytest.raises(BadInput, match=r"map\.omap"):
-        read_artifact(path)
-
-
-def test_a_missing_or_foreign_file_is_refused_by_name(tmp_path: Path):
-    with pytest.raises(BadInput, match="there is no such file"):
-        read_artifact(tmp_path / "none.omap")
-    (tmp_path / "text.omap").write_text("not a map at all, but long enough to hold a sum " * 9)
-    with pytest.raises(BadInput, match="not an artifact file"):
-        read_artifact(tmp_path / "text.omap")
