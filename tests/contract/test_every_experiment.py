@@ -35,7 +35,9 @@ def hydra():
 
 @functools.cache
 def settings_of(name: str):
-    return resolved_but_for_the_experiment(without_graph([f"+experiment={name}"]))
+    """What the command in an experiment's file composes."""
+    command = (CONF / f"{name}.yaml").read_text().split("\n")[1].partition("  omninav ")[2]
+    return resolved_but_for_the_experiment(without_graph(shlex.split(command)))
 
 
 @functools.cache
@@ -56,17 +58,14 @@ def test_every_experiment_can_be_read_by_the_command_in_its_file():
 
 
 def can_be_read(name):
-    text = (CONF / f"{name}.yaml").read_text()
-    inherited = re.search(r"^defaults: \[(\S+),", text, re.MULTILINE)
+    inherited = re.search(r"^defaults: \[(\S+),", (CONF / f"{name}.yaml").read_text(), re.MULTILINE)
     assert inherited is None or inherited[1].startswith("/experiment/"), "else a user's file cannot inherit it"
-    command = text.split("\n")[1].partition("  omninav ")[2]
-    config = resolved_but_for_the_experiment(without_graph(shlex.split(command)))
     folder, _, stem = name.partition("/")
     for profile in ("full", "quick"):
-        experiment = read_experiment(config["experiment"], profile)
+        found = experiment(name, profile)
         measures_alone = folder in ("peers", "recordings") or stem in ("home_store", "office", "grid")  # to start from
-        assert experiment.claims or measures_alone
-        assert experiment.conditions()
+        assert found.claims or measures_alone
+        assert found.conditions()
 
 
 def test_each_page_shows_how_far_odometry_alone_would_have_gone_wrong():
