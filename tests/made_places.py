@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from made_words import features_of
 
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.topological_map import DRIVEN, LOOP, TopologicalMap, stored
 
 
@@ -21,16 +22,7 @@ def made_map(
         owner += [one] * number
     ways += [[] for _ in loops]
     rng = np.random.default_rng(0)
-    features = [
-        LocalFeatures(
-            np.array([[1.0, 0.0, 0.0]]),
-            np.zeros((1, 2)),
-            rng.integers(0, 255, (1, 128)).astype(np.uint8),
-            np.zeros((1, 3), np.float32),
-            np.ones(1, np.float32),
-        )
-        for _ in owner
-    ]
+    features = [features_of(rng.integers(0, 255, (1, 128)).astype(np.uint8)) for _ in owner]
     poses = np.zeros((len(owner), 3))
     poses[:, :2] = np.array(spots)[owner]
     return TopologicalMap(

@@ -3,19 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
+from made_words import NOTHING
 
 from omninav.stages.values.compared_views import ComparedViews
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import LoopHypotheses
 
-NO_FEATURES = LocalFeatures(
-    np.empty((0, 3)),
-    np.empty((0, 2)),
-    np.empty((0, 128), np.uint8),
-    np.empty((0, 3), np.float32),
-    np.empty(0, np.float32),
-)
+NO_FEATURES = NOTHING
 
 
 def made_views(
