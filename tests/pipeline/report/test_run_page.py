@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from sample_metrics import VALUES, measured
 
-from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage, Table
+from omninav.pipeline import Bounds, Context, Figure, Metrics, Quantity, Stage, Table
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.report.chart import Chart
@@ -58,18 +58,8 @@ def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables
     manifest = {"cwd": str(tmp_path), **manifest}
     folder = tmp_path / "runs" / "a run"
     folder.mkdir(parents=True, exist_ok=True)
-    path = write_report(
-        folder,
-        manifest,
-        measured() if metrics is None else metrics,
-        TIMING,
-        SVG,
-        figures,
-        tables,
-        "seed: 3\nname: <x>\n",
-        graph,
-    )
-    return path.read_text()
+    metrics, config = measured() if metrics is None else metrics, "seed: 3\nname: <x>\n"
+    return write_report(folder, manifest, metrics, TIMING, SVG, figures, tables, config, graph).read_text()
 
 
 def text_of(page: str) -> str:
@@ -77,37 +67,34 @@ def text_of(page: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", plain)).split())
 
 
-def test_a_page_refers_to_nothing_outside_itself(tmp_path):
-    page = report(tmp_path)
+def test_a_page_is_well_formed_html_and_refers_to_nothing_outside_itself(tmp_path):
+    page, checker = report(tmp_path), Wellformed()
+    checker.feed(page)
+    assert checker.open == []
     assert re.findall(r"https?://[^\"\s<]+", page.replace(SVG, "")) == []
     assert not re.search(r"<(?:link|iframe|script src)\b|@import|url\(", page)
     assert set(re.findall(r'(?:src|href)="([^":#]*):', page)) == {"data"}
 
 
-def test_a_page_is_well_formed_html(tmp_path):
-    checker = Wellformed()
-    checker.feed(report(tmp_path))
-    assert checker.open == []
-
-
-def test_results_stand_with_units_and_the_estimate_beside_odometry_alone(tmp_path):
+def test_a_page_has_results_with_units_skipped_data_notes_and_the_command(tmp_path):
     said = text_of(report(tmp_path))
-    assert "Position error (m) all frames 0.500 0.073 0.810 12.3 after convergence 0.500 0.050" in said
-    assert "odometry alone 0.500 1.70 0.810 12.3" in said
-    assert "Loss rate (%) all frames 12.5" in said
-    assert "Converged after 12 frames" in said
-    assert "Map: size 168 kB" in said
-
-
-def test_a_page_has_skipped_data_notes_and_the_command(tmp_path):
-    said = text_of(report(tmp_path))
-    assert "source.duplicate frame 7 frame 12 <twice>" in said
-    assert "Odometry synthetic" in said
-    assert "omninav variant=omniview_mcl 'log=my drive.mcap'" in said
-    assert "omninav resume 'runs/a run'" in said
-    assert "match every tick 300 1.23 2.50 31.0" in said
-    assert "212 frames per second" in said
-    assert "name: <x>" in said
+    for words in (
+        "Position error (m) all frames 0.500 0.073 0.810 12.3 after convergence 0.500 0.050",
+        "odometry alone 0.500 1.70 0.810 12.3",
+        "Loss rate (%) all frames 12.5",
+        "Converged after 12 frames",
+        "Map: size 168 kB",
+        "source.duplicate frame 7 frame 12 <twice>",
+        "Odometry synthetic",
+        "omninav variant=omniview_mcl 'log=my drive.mcap'",
+        "omninav resume 'runs/a run'",
+        "match every tick 300 1.23 2.50 31.0",
+        "212 frames per second",
+        "name: <x>",
+    ):
+        assert words in said
+    skipped = "duplicate frame, 7 times (first: frame 12 <twice>)"  # above the results
+    assert said.index(skipped) < said.index("Position error")
 
 
 def test_plots_are_inside_the_page_in_their_order(tmp_path):
@@ -173,39 +160,39 @@ def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
     assert data["slides"][0]["overlay"] == "<circle/>"
 
 
-def test_what_was_skipped_stands_above_the_results(tmp_path):
-    said = text_of(report(tmp_path))
-    assert said.index("duplicate frame, 7 times (first: frame 12 <twice>)") < said.index("Position error")
-
-
 def test_ticks_in_which_a_stage_had_nothing_to_do_are_no_warning(tmp_path):
     manifest = MANIFEST | {"dropped": {"skipped.match": {"count": 9, "first": ""}}, "warnings": ["guessed speed"]}
     said = text_of(report(tmp_path, manifest=manifest))
     assert said.index("guessed speed") < said.index("Position error") < said.index("skipped.match 9")
 
 
-def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
-    class Smoothed(Stage):
-        """Smooths."""
+class Idle(Stage):
+    """What has parameters and does nothing."""
 
+    def step(self, ctx: Context) -> None: ...
+
+
+def graph_of(stage: type[Stage], **parameters: object) -> SimpleNamespace:
+    """A graph of a stage with these parameters, the others as they are by default."""
+    node = SimpleNamespace(name="smooth", signature=signature(stage), parameters=parameters)
+    return SimpleNamespace(nodes={"smooth": node})
+
+
+def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
+    class Smoothed(Idle):
         window: Annotated[int, Bounds(ge=1)] = 5
         """Readings that are averaged."""
         robust: bool = False
         """Whether outliers are left out."""
 
-        class Out(Outputs):
-            value: Metrics
-
-        def step(self, ctx: Context) -> Out: ...
-
-    node = SimpleNamespace(name="smooth", signature=signature(Smoothed), parameters={"window": 9})
-    rows = parameter_rows(SimpleNamespace(nodes={"smooth": node}))
+    graph = graph_of(Smoothed, window=9)
+    rows = parameter_rows(graph)
     assert [(row.name, row.value, row.default, row.changed) for row in rows] == [
         ("window", "9", "5", True),
         ("robust", "False", "False", False),
     ]
     assert rows[0].meaning == "Readings that are averaged."
-    said = text_of(report(tmp_path, graph=SimpleNamespace(nodes={"smooth": node})))
+    said = text_of(report(tmp_path, graph=graph))
     assert "Parameters (1 of 2 is not the default)" in said
     changed, every = said.partition("Parameters (")[2].split("All 2")
     assert "nodes.smooth.window 9 5 Readings" in changed
@@ -219,22 +206,12 @@ def test_settings_that_belong_together_are_compared_one_by_one_and_long_values_t
         size: int = 5
         shape: str = "flat"
 
-    class Smoothed(Stage):
-        """Smooths."""
-
+    class Smoothed(Idle):
         window: Window = Window()
-        """How readings are averaged."""
         names: tuple[str, ...] = ("x" * 200, "a")
-        """Readings."""
-
-        class Out(Outputs):
-            value: Metrics
-
-        def step(self, ctx: Context) -> Out: ...
 
     def changed(**parameters: object) -> list[bool]:
-        node = SimpleNamespace(name="smooth", signature=signature(Smoothed), parameters=parameters)
-        return [row.changed for row in parameter_rows(SimpleNamespace(nodes={"smooth": node}))]
+        return [row.changed for row in parameter_rows(graph_of(Smoothed, **parameters))]
 
     assert changed(window={"size": 5, "shape": "flat"}, names=["x" * 200, "a"]) == [False, False]
     assert changed(window={"shape": "flat"}) == [False, False]
