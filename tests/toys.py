@@ -67,15 +67,19 @@ class Count(Source):
         return self.length_ * self.logs
 
 
-class Constant(Stage):
-    """A number that is there before the loop."""
-
-    value: float = 0.0
+class GivesNumber(Stage):
+    """What gives a number each time."""
 
     class Out(Outputs):
         number: Number
 
-    def step(self, ctx: Context) -> Out:
+
+class Constant(GivesNumber):
+    """A number that is there before the loop."""
+
+    value: float = 0.0
+
+    def step(self, ctx: Context) -> GivesNumber.Out:
         return self.Out(number=Number(self.value))
 
 
@@ -91,7 +95,7 @@ class Restart(Stage):
         return self.Out(number=Number(self.value + ctx.tick.log) if ctx.tick.first_of_log else None)
 
 
-class Scale(Stage):
+class Scale(GivesNumber):
     """A number times a factor."""
 
     factor: Annotated[float, Bounds(gt=0, le=100)] = 1.0
@@ -99,10 +103,7 @@ class Scale(Stage):
     mode: Literal["plain", "negative"] = "plain"
     weights: tuple[float, ...] = ()
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number) -> Out:
+    def step(self, ctx: Context, number: Number) -> GivesNumber.Out:
         return self.Out(number=Number(number.value * self.factor * (-1 if self.mode == "negative" else 1)))
 
 
@@ -119,36 +120,27 @@ class Doubt(Stage):
         return self.Out(certainty=Certainty(float("nan") if ctx.tick.index >= self.since else 0.5))
 
 
-class Noise(Stage):
+class Noise(GivesNumber):
     """A number with noise from the stage's own generator."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number) -> Out:
+    def step(self, ctx: Context, number: Number) -> GivesNumber.Out:
         return self.Out(number=Number(number.value + ctx.rng.standard_normal()))
 
 
-class Add(Stage):
+class Add(GivesNumber):
     """The sum of two numbers, the second of which may be missing."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number, other: Number | None = None) -> Out:
+    def step(self, ctx: Context, number: Number, other: Number | None = None) -> GivesNumber.Out:
         return self.Out(number=Number(number.value + (other.value if other else 0.0)))
 
 
-class Remember(Stage):
+class Remember(GivesNumber):
     """Numbers seen so far, in a State."""
 
     class Seen(State):
         values: tuple = ()
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, number: Number, seen: Seen) -> Out:
+    def step(self, ctx: Context, number: Number, seen: Seen) -> GivesNumber.Out:
         seen.values = (*seen.values, number.value)
         return self.Out(number=Number(float(len(seen.values))))
 
@@ -174,13 +166,10 @@ class Enter(Stage):
         return self.Out(ledger=ledger)
 
 
-class Look(Stage):
+class Look(GivesNumber):
     """How many entries the ledger has."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, ledger: Ledger) -> Out:
+    def step(self, ctx: Context, ledger: Ledger) -> GivesNumber.Out:
         return self.Out(number=Number(float(len(ledger.entries))))
 
 
@@ -201,31 +190,25 @@ class Spell(Stage):
         return self.Out(word=Word(str(number.value)))
 
 
-class Swallow(Stage):
+class Swallow(GivesNumber):
     """Takes bulky things."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, big: Big) -> Out:
+    def step(self, ctx: Context, big: Big) -> GivesNumber.Out:
         return self.Out(number=Number(float(big.array.sum())))
 
 
-class Fail(Stage):
+class Fail(GivesNumber):
     """Raises at a tick."""
 
     at: int = 3
     early: bool = False
     """It raises in `setup`, before the first tick."""
 
-    class Out(Outputs):
-        number: Number
-
     def setup(self, ctx: Context) -> None:
         if self.early:
             raise RuntimeError("there is no wheel")
 
-    def step(self, ctx: Context, number: Number) -> Out:
+    def step(self, ctx: Context, number: Number) -> GivesNumber.Out:
         if ctx.tick.index == self.at:
             raise RuntimeError("the wheel fell off")
         return self.Out(number=number)
@@ -272,23 +255,17 @@ class DrawSlowly(Draw):
     on_request = True
 
 
-class Total(Stage):
+class Total(GivesNumber):
     """The sum of all numbers, after the loop."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, numbers: Sequence[Number | None]) -> Out:
+    def step(self, ctx: Context, numbers: Sequence[Number | None]) -> GivesNumber.Out:
         return self.Out(number=Number(sum(number.value for number in numbers if number is not None)))
 
 
-class Ledgers(Stage):
+class Ledgers(GivesNumber):
     """How many ledgers there were."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context, ledgers: Sequence[Ledger]) -> Out:
+    def step(self, ctx: Context, ledgers: Sequence[Ledger]) -> GivesNumber.Out:
         return self.Out(number=Number(float(len(ledgers))))
 
 
@@ -339,13 +316,10 @@ class Surveyor(Stage):
         return self.Out(plan=Surveyed(1.0))
 
 
-class Dice(Stage):
+class Dice(GivesNumber):
     """A number that is drawn before the loop."""
 
-    class Out(Outputs):
-        number: Number
-
-    def step(self, ctx: Context) -> Out:
+    def step(self, ctx: Context) -> GivesNumber.Out:
         return self.Out(number=Number(float(ctx.rng.random())))
 
 
