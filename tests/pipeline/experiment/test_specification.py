@@ -139,6 +139,7 @@ def claim_faults(change: dict[str, object], **measure: object) -> list[str]:
         ({"at_most": 1.0, "at_least": 2.0}, "a claim makes one comparison"),
         ({"at_least": "printed"}, "at_least: 'printed', expected a number"),
         ({"ratio_to": {"method": "b"}, "below": "published"}, "below: a ratio is compared with a number"),
+        ({"ratio_to": {"method": "b"}, "below": {"method": "b"}}, "below: a ratio is compared with a number"),
         ({"ratio_to": {"method": "b"}, "lowest": True}, "lowest: a ratio is compared with a number"),
     ],
 )
