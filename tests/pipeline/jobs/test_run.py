@@ -171,8 +171,13 @@ def test_settings_of_an_engine_that_make_no_sense_are_refused(given: object, mes
         read_engine(given)
 
 
-def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path):
-    pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+
+    def impatient(where: str, timeout: float, **given: object) -> object:
+        return distributed.Client(where, timeout=timeout / 10, **given)
+
+    monkeypatch.setattr("omninav.pipeline.jobs.dask_executor.Client", impatient)
     settings = EngineSettings("dask", options={"address": "tcp://127.0.0.1:9"})
     with pytest.raises(BadInput, match=r"tcp://127.0.0.1:9: no scheduler answers"), Workers(settings, tmp_path) as w:
         w.run([job("nothing", tmp_path)])
