@@ -4,27 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from camera_round_trip import assert_mask, assert_round_trip
 from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.stages.camera.double_sphere import DoubleSphere
 from omninav.stages.camera.rays import unit_vectors
-from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
+from omninav.stages.recordings.camera_yaml import write_camera
 
 LENS = DoubleSphere(640, 480, 110.0, 108.0, 318.0, 241.0, -0.2, 0.59, 230.0, yaw=0.4)
 """With numbers as calibrations of fisheye lenses of 190 degrees give them."""
-
-
-@pytest.mark.parametrize("xi", [-0.3, 0.0, 0.4])
-@pytest.mark.parametrize("alpha", [0.0, 0.3, 0.5, 0.62])
-@given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(-1.5, 1.5))
-def test_a_ray_comes_back_from_its_pixel(xi: float, alpha: float, azimuth: float, elevation: float) -> None:
-    assert_round_trip(DoubleSphere(640, 480, 160.0, 158.0, 318.0, 241.0, xi, alpha, 230.0, yaw=0.4), azimuth, elevation)
-
-
-def test_the_mask_is_the_disc_that_the_lens_lights() -> None:
-    assert_mask(LENS)
 
 
 @given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(0.6, 1.5))
@@ -53,4 +41,3 @@ def test_it_sees_below_the_horizon_and_says_how_far() -> None:
 
 def test_camera_yaml_holds_its_two_numbers_beside_k() -> None:
     assert "double_sphere:\n  xi: -0.2\n  alpha: 0.59\n" in write_camera(LENS)
-    assert write_camera(parse_camera(write_camera(LENS), "camera.yaml")) == write_camera(LENS)

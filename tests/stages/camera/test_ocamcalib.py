@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from camera_round_trip import assert_mask, assert_round_trip
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,17 +14,6 @@ from omninav.stages.recordings.recording import UnreadableRecording
 
 LENS = OCamCalib(640, 480, (-170.0, 0.0, 1.4e-3, -2.0e-6, 9.0e-9), 241.0, 318.0, 230.0, 5.0, 0.9991, -3e-4, 2e-4)
 MIRROR = OCamCalib(640, 480, (-140.0, 0.0, 4.0e-3), 239.5, 319.5, 236.0, 34.0, looks="down", yaw=0.3)
-
-
-@pytest.mark.parametrize("camera", [LENS, MIRROR], ids=["lens", "mirror"])
-@given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(-1.55, 1.55))
-def test_a_ray_comes_back_from_its_pixel(camera: OCamCalib, azimuth: float, elevation: float) -> None:
-    assert_round_trip(camera, azimuth, elevation)
-
-
-@pytest.mark.parametrize("camera", [LENS, MIRROR], ids=["lens", "mirror"])
-def test_the_mask_is_the_ring_that_is_used(camera: OCamCalib) -> None:
-    assert_mask(camera)
 
 
 @given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(-1.2, 0.6))
@@ -55,8 +43,7 @@ def test_affine_parameters_move_rows_by_columns_and_columns_by_rows() -> None:
     assert skewed.project(ray)[0] == pytest.approx((320.0 + 0.1 * row + column, 240.0 + 1.1 * row + 0.2 * column))
 
 
-def test_camera_yaml_holds_the_toolbox_s_numbers() -> None:
-    assert write_camera(parse_camera(write_camera(LENS), "camera.yaml")) == write_camera(LENS)
+def test_a_polynomial_that_bends_the_other_way_or_is_no_list_of_numbers_is_refused() -> None:
     with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must be \[a0, a1, …\] with a0 below 0"):
         parse_camera(write_camera(LENS).replace("- -170.0", "- 170.0"), "camera.yaml")
     with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must be a number or a word, not a list"):

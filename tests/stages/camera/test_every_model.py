@@ -1,0 +1,111 @@
+"""What holds for each camera model, and where pixels of those look that can be worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from camera_round_trip import assert_mask, assert_round_trip
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from omninav.stages.camera.cylindrical import Cylindrical
+from omninav.stages.camera.donut import Donut
+from omninav.stages.camera.double_sphere import DoubleSphere
+from omninav.stages.camera.dual_fisheye import DualFisheye
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.fisheye import Fisheye
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.ocamcalib import OCamCalib
+from omninav.stages.camera.perspective import Perspective
+from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
+
+CAMERAS: list[Camera] = [
+    Cylindrical(720, 150, 360.0, elevation_top=0.5, elevation_bottom=-0.4),
+    Cylindrical(120, 25, 60.0),
+    Donut(640, 480, 320.0, 240.0, 40.0, 200.0, "counter_clockwise", yaw=0.1),
+    DoubleSphere(640, 480, 110.0, 108.0, 318.0, 241.0, -0.2, 0.59, 230.0, yaw=0.4),
+    DualFisheye.of_size(640, 320),
+    DualFisheye(640, 320, 96.0, 158.0, 161.0, 482.0, 159.0, 156.0, 0.4, -2.0, yaw=0.7),
+    Equirectangular(720, 150, 360.0, elevation_top=0.7, elevation_bottom=-0.6),
+    Equirectangular(720, 150, 100.0, sense="counter_clockwise", elevation_top=0.7, elevation_bottom=-0.6, yaw=0.4),
+    Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, yaw=-0.7),
+    Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, 5.0, "counter_clockwise", yaw=0.2),
+    HyperbolicMirror(640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, 0.4, height=0.9, yaw=0.3),
+    OCamCalib(640, 480, (-170.0, 0.0, 1.4e-3, -2.0e-6, 9.0e-9), 241.0, 318.0, 230.0, 5.0, 0.9991, -3e-4, 2e-4),
+    OCamCalib(640, 480, (-140.0, 0.0, 4.0e-3), 239.5, 319.5, 236.0, 34.0, looks="down", yaw=0.3),
+    Perspective(640, 480, 500.0, 480.0, 320.0, 240.0, 0.3, yaw=0.5),
+]
+SPHERES: list[Camera] = [
+    DoubleSphere(640, 480, 160.0, 158.0, 318.0, 241.0, xi, alpha, 230.0)
+    for xi in (-0.3, 0.0, 0.4)
+    for alpha in (0.0, 0.3, 0.5, 0.62)
+]
+each_camera = pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.projection)
+
+
+@pytest.mark.parametrize("camera", CAMERAS + SPHERES, ids=lambda camera: camera.projection)
+@given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(-1.55, 1.55))
+def test_a_ray_comes_back_from_its_pixel(camera: Camera, azimuth: float, elevation: float) -> None:
+    assume(not isinstance(camera, Donut) or elevation >= -1.0)  # its rings have no place for what lies lower
+    assert_round_trip(camera, azimuth, elevation)
+
+
+@each_camera
+def test_the_mask_is_what_shows_the_world(camera: Camera) -> None:
+    """All of a strip or of an ordinary picture; of any other one its ring, its disc or its circles."""
+    assert_mask(camera)
+    whole = isinstance(camera, (Cylindrical, Equirectangular, Perspective))
+    assert camera.mask().all() == whole
+
+
+@each_camera
+def test_it_is_written_and_read_as_camera_yaml(camera: Camera) -> None:
+    assert write_camera(parse_camera(write_camera(camera), "camera.yaml")) == write_camera(camera)
+
+
+QUARTER = math.pi / 2
+FISHEYE = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, yaw=-0.7)
+ORDINARY = Perspective(640, 480, 500.0, 500.0, 320.0, 240.0, yaw=0.5)
+PAIR, PAIR_PX = DualFisheye.of_size(640, 320), 160.0 / math.radians(95.0)
+UNKNOWN = Cylindrical(120, 25, 60.0)
+STRIP = Equirectangular(720, 150, 360.0, elevation_top=1.2, elevation_bottom=-0.2)
+CYLINDER = Cylindrical(720, 150, 360.0, elevation_top=1.2, elevation_bottom=-0.2)
+
+
+@pytest.mark.parametrize(
+    ("camera", "pixel", "azimuth", "elevation"),
+    [
+        (FISHEYE, (318.0 + 140.0 * QUARTER, 241.0), -0.7, 0.0),  # the angle from the zenith grows with the radius
+        (ORDINARY, (320.0, 240.0), 0.5, 0.0),
+        (ORDINARY, (-180.0, 240.0), 0.5 + math.pi / 4, 0.0),
+        (ORDINARY, (320.0, -260.0), 0.5, math.pi / 4),
+        (PAIR, (159.5, 159.5), 0.0, 0.0),
+        (PAIR, (159.5 + 0.5 * PAIR_PX, 159.5), -0.5, 0.0),  # right of forward
+        (PAIR, (159.5, 159.5 - 0.5 * PAIR_PX), 0.0, 0.5),
+        (PAIR, (479.5, 159.5), math.pi, 0.0),
+        (PAIR, (479.5 + 0.5 * PAIR_PX, 159.5), math.pi - 0.5, 0.0),  # left of the robot
+        (Donut(640, 480, 320.0, 240.0, 40.0, 200.0, "counter_clockwise", yaw=0.1), (320.0, 120.0), QUARTER + 0.1, 0.0),
+        (STRIP, (359.5, 74.5), 0.0, 0.5),  # rows are elevations
+        (CYLINDER, (359.5, 74.5), 0.0, math.atan((math.tan(1.2) + math.tan(-0.2)) / 2)),  # their tangents
+        (Cylindrical(360, 20, 180.0), (89.5, 9.5), QUARTER, 0.0),
+        (Cylindrical(360, 20, 180.0, sense="counter_clockwise"), (269.5, 9.5), QUARTER, 0.0),
+        (UNKNOWN, (59.5, 12.0), 0.0, 0.0),
+    ],
+)
+def test_a_pixel_looks_where_the_model_says(
+    camera: Camera, pixel: tuple[float, float], azimuth: float, elevation: float
+) -> None:
+    ray = unit_vectors(azimuth, elevation)
+    assert camera.unproject(np.array(pixel))[0] == pytest.approx(ray)
+    assert camera.project(ray)[0] == pytest.approx(pixel)
+
+
+def test_elevations_are_those_of_the_edges_of_what_is_seen() -> None:
+    assert FISHEYE.elevations == pytest.approx((QUARTER, QUARTER - 230.0 / 140.0))
+    assert ORDINARY.elevations is None
+    assert not ORDINARY.project(unit_vectors(0.5 + math.pi, 0.0))[1]  # what lies behind
+    assert UNKNOWN.elevations == pytest.approx((25 * math.pi / 120, -25 * math.pi / 120))  # of square pixels
+    assert not UNKNOWN.elevations_known
+    assert Cylindrical(40, 100, 20.0).elevations == (QUARTER, -QUARTER)
