@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from landmark_world import driven, house, looks, misplaced
+from landmark_world import driven, misplaced
 
 from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
@@ -10,26 +10,11 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 
 
 @pytest.fixture(scope="module")
-def world():
-    return house(np.random.default_rng(0), landmarks=4000)
-
-
-@pytest.fixture(scope="module")
-def features(world):
-    """Features by reference, and the landmark of each."""
-    order = np.argsort(world.references, kind="stable")
-    starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
-    return LocalViews(starts, world.bearings[order], looks(world, order, 32)), world.landmarks[order]
-
-
-@pytest.fixture(scope="module")
-def verified(world, features):
-    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
-    seen[world.references, world.landmarks] = 1.0
+def verified(world, views, similarity):
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(world.poses[:, :2], axis=0).T))])
-    pairs = candidate_pairs(iter(seen @ seen.T), way)
+    pairs = candidate_pairs(iter(similarity), way)
     apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
-    return verified_pairs(features[0], np.concatenate([pairs, apart]), np.random.default_rng(2))
+    return verified_pairs(views, np.concatenate([pairs, apart]), np.random.default_rng(2))
 
 
 def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
@@ -43,8 +28,7 @@ def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
     assert np.degrees(np.percentile(np.abs(towards), 95)) < 2.0
 
 
-def test_matches_that_agree_are_of_one_landmark(features, verified):
-    landmarks = features[1]
+def test_matches_that_agree_are_of_one_landmark(landmarks, verified):
     assert (landmarks[verified.first] == landmarks[verified.second]).mean() > 0.97
     assert len(verified.first) == len(verified.second) == len(verified.ratio) > 12 * len(verified.pairs)
 
@@ -61,14 +45,14 @@ def test_a_drive_that_odometry_has_bent_is_straightened(world, verified):
     assert (straight[0] == odometry[0]).all()
 
 
-def test_without_a_pair_odometry_stays(world, features):
-    nothing = verified_pairs(features[0], np.zeros((0, 2), np.int64), np.random.default_rng(0))
+def test_without_a_pair_odometry_stays(world, views):
+    nothing = verified_pairs(views, np.zeros((0, 2), np.int64), np.random.default_rng(0))
     _, odometry = driven(world.poses)
     assert straightened_drive(odometry, nothing) == pytest.approx(odometry, abs=1e-6)
 
 
-def test_a_reference_without_features_has_no_pairs(features):
-    starts, bearings, descriptors = features[0]
+def test_a_reference_without_features_has_no_pairs(views):
+    starts, bearings, descriptors = views
     emptied = LocalViews(np.maximum(starts - starts[1], 0), bearings[starts[1] :], descriptors[starts[1] :])
     found = verified_pairs(emptied, np.array([[0, 1], [1, 2]]), np.random.default_rng(0))
     assert found.pairs.tolist() == [[1, 2]]

@@ -1,74 +1,61 @@
 import numpy as np
 import pytest
-from landmark_world import displaced, driven, house, looks, misplaced
+from landmark_world import displaced, driven, misplaced
 
 from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive, adjusted_to_given
 from omninav.stages.geometry.landmarks.map_making import LocalViews, neighbouring_pairs, pair_matches
 
 
-@pytest.fixture(scope="module")
-def world():
-    return house(np.random.default_rng(0), landmarks=4000)
-
-
-@pytest.fixture(scope="module")
-def views(world):
-    """Features by reference; a descriptor varies a little."""
-    order = np.argsort(world.references, kind="stable")
-    starts = np.searchsorted(world.references[order], np.arange(len(world.poses) + 1))
-    return LocalViews(starts, world.bearings[order], looks(world, order, 32))
-
-
-def rows(world):
-    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
-    seen[world.references, world.landmarks] = 1.0
-    return iter(seen @ seen.T)
-
-
 def seen_in(views):
     return lambda features: Lens(lambda _: views.bearings[features], np.empty(0))
 
 
-def to_given(world, views, poses):
-    matches = pair_matches(views, neighbouring_pairs(poses, rows(world), 0.5))
-    return adjusted_to_given(views, matches, poses, seen_in(views))
+@pytest.fixture
+def to_given(views, similarity):
+    """Adjusts given poses, by default to what the drive's images show."""
+
+    def run(poses, views=views):
+        matches = pair_matches(views, neighbouring_pairs(poses, iter(similarity), 0.5))
+        return adjusted_to_given(views, matches, poses, seen_in(views))
+
+    return run
 
 
-def test_exact_poses_stay_exact(world, views):
-    found = to_given(world, views, world.poses)
+def test_exact_poses_stay_exact(world, to_given):
+    found = to_given(world.poses)
     assert not found.problem
     assert misplaced(found.poses, world.poses)[0] < 0.002
 
 
-def test_poses_that_are_wrong_by_10_cm_and_2_degrees_are_mended(world, views):
+def test_poses_that_are_wrong_by_10_cm_and_2_degrees_are_mended(world, to_given):
     wrong = displaced(world.poses, np.random.default_rng(2))
-    found = to_given(world, views, wrong)
+    found = to_given(wrong)
     assert misplaced(wrong, world.poses)[0] > 0.12
     assert misplaced(found.poses, world.poses)[0] < 0.03
     assert np.abs((found.poses - wrong)[:, :2].mean(axis=0)).max() < 0.005  # the frame is that of all poses
 
 
-def test_a_single_wrong_pose_among_exact_ones_is_mended_and_the_others_stay(world, views):
+def test_a_single_wrong_pose_among_exact_ones_is_mended_and_the_others_stay(world, to_given):
     wrong = world.poses.copy()
     wrong[40] += [0.3, -0.2, 0.1]
-    found = to_given(world, views, wrong)
+    found = to_given(wrong)
     assert np.abs(found.poses - world.poses)[40] == pytest.approx(0.0, abs=0.01)
     assert misplaced(found.poses, world.poses)[0] < 0.003
 
 
-def test_exact_poses_stay_where_images_are_too_vague_to_fit_others_better(world, views):
+def test_exact_poses_stay_where_images_are_too_vague_to_fit_others_better(world, views, to_given):
     rng = np.random.default_rng(5)
     vague = views.bearings + np.radians(0.35) * rng.standard_normal(views.bearings.shape)
     vague /= np.linalg.norm(vague, axis=1, keepdims=True)
-    found = to_given(world, views.looking_along(vague), world.poses)
+    found = to_given(world.poses, views.looking_along(vague))
     assert not found.problem
     assert (found.poses == world.poses).all(axis=1).mean() > 0.95
 
 
-def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, views):
+def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, views, similarity):
     _, odometry = driven(world.poses)
-    found = adjusted_drive(views, rows(world), odometry, seen_in(views), None, np.random.default_rng(3))
+    found = adjusted_drive(views, iter(similarity), odometry, seen_in(views), None, np.random.default_rng(3))
     assert misplaced(odometry, world.poses)[0] > 0.4
     assert misplaced(found.poses, world.poses)[0] < 0.05
     assert found.poses[0] == pytest.approx(odometry[0])
@@ -76,27 +63,27 @@ def test_a_drive_by_odometry_is_straightened_and_its_first_pose_stays(world, vie
     assert found.scale is None
 
 
-def test_motion_seen_in_images_is_straightened_in_a_unit_of_its_own(world, views):
+def test_motion_seen_in_images_is_straightened_in_a_unit_of_its_own(world, views, similarity):
     _, odometry = driven(world.poses)
     odometry[:, :2] *= 1.7
-    found = adjusted_drive(views, rows(world), odometry, seen_in(views), None, np.random.default_rng(3), True)
+    found = adjusted_drive(views, iter(similarity), odometry, seen_in(views), None, np.random.default_rng(3), True)
     error, factor = misplaced(found.poses, world.poses)
     assert error < 0.02
     assert factor == pytest.approx(1.0 / 1.7, rel=0.05)
 
 
-def test_a_drive_that_comes_back_to_no_place_stays_as_it_is(world, views):
+def test_a_drive_that_comes_back_to_no_place_stays_as_it_is(world, views, similarity):
     some = slice(0, 5)
     few = LocalViews(views.starts[:6], views.bearings[: views.starts[5]], views.descriptors[: views.starts[5]])
-    similarity = (row[some] for row in list(rows(world))[some])
+    similarity = iter(similarity[some, some])
     found = adjusted_drive(few, similarity, world.poses[some], seen_in(few), None, np.random.default_rng(0))
     assert "came back to" in found.problem
     assert (found.poses == world.poses[some]).all()
 
 
-def test_images_of_a_mirrored_camera_leave_the_poses(world, views):
+def test_images_of_a_mirrored_camera_leave_the_poses(world, views, to_given):
     mirrored = views.looking_along(views.bearings * [1.0, -1.0, 1.0])
-    found = to_given(world, mirrored, world.poses)
+    found = to_given(world.poses, mirrored)
     assert "contradicts the poses" in found.problem
     assert (found.poses == world.poses).all()
 

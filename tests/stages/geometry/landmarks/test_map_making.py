@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-from landmark_world import NOISE, house, looks
+from landmark_world import NOISE
 
 from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.map_making import (
-    LocalViews,
     bearing_sigma,
     fitting_matches,
     local_views,
@@ -25,42 +24,24 @@ def tracks_between(views, pairs, poses):
 
 
 @pytest.fixture(scope="module")
-def world():
-    return house(np.random.default_rng(0), landmarks=4000)
+def pairs(world, similarity):
+    return neighbouring_pairs(world.poses, iter(similarity), 0.5)
 
 
 @pytest.fixture(scope="module")
-def features(world):
-    """Features of each reference, and the landmark of each; a descriptor varies a little."""
-    order = np.argsort(world.references, kind="stable")
-    cuts = np.searchsorted(world.references[order], np.arange(1, len(world.poses)))
-    views = local_views(np.split(world.bearings[order], cuts), np.split(looks(world, order), cuts))
-    return views, world.landmarks[order]
-
-
-@pytest.fixture(scope="module")
-def pairs(world):
-    seen = np.zeros((len(world.poses), len(world.points)), np.float32)
-    seen[world.references, world.landmarks] = 1.0
-    return neighbouring_pairs(world.poses, iter(seen @ seen.T), 0.5)
-
-
-@pytest.fixture(scope="module")
-def found(world, features, pairs):
-    views, _ = features
+def found(world, views, pairs):
     return triangulated(views, tracks_between(views, pairs, world.poses), world.poses)
 
 
-def test_landmarks_lie_where_the_points_of_the_world_are(world, features, found) -> None:
-    own = features[1][found.features]
+def test_landmarks_lie_where_the_points_of_the_world_are(world, landmarks, found) -> None:
+    own = landmarks[found.features]
     off = np.linalg.norm(found.points[found.landmarks] - world.points[own], axis=1)
     assert len(found.points) > 1000
     assert np.median(off) < 0.02
     assert np.percentile(off, 95) < 0.2
 
 
-def test_sightings_of_a_landmark_are_of_one_point_from_different_references(features, found) -> None:
-    views, landmarks = features
+def test_sightings_of_a_landmark_are_of_one_point_from_different_references(views, landmarks, found) -> None:
     first = landmarks[found.features][np.searchsorted(found.landmarks, np.arange(len(found.points)))]
     assert (landmarks[found.features] == first[found.landmarks]).mean() > 0.99
     seen_by = np.column_stack([found.landmarks, views.owners[found.features]])
@@ -69,19 +50,17 @@ def test_sightings_of_a_landmark_are_of_one_point_from_different_references(feat
 
 
 @pytest.mark.parametrize("flip", [[1, -1, 1], [-1, 1, 1]])
-def test_a_mirrored_camera_gives_next_to_no_landmarks(world, features, pairs, found, flip) -> None:
-    starts, bearings, descriptors = features[0]
-    views = LocalViews(starts, bearings * flip, descriptors)
-    mirrored = triangulated(views, tracks_between(views, pairs, world.poses), world.poses)
+def test_a_mirrored_camera_gives_next_to_no_landmarks(world, views, pairs, found, flip) -> None:
+    flipped = views.looking_along(views.bearings * flip)
+    mirrored = triangulated(flipped, tracks_between(flipped, pairs, world.poses), world.poses)
     assert len(mirrored.points) < 0.15 * len(found.points)
 
 
-def test_the_deviation_of_bearings_is_that_of_the_images(world, features, found) -> None:
-    assert bearing_sigma(features[0], found, world.poses) == pytest.approx(NOISE, rel=0.15)
+def test_the_deviation_of_bearings_is_that_of_the_images(world, views, found) -> None:
+    assert bearing_sigma(views, found, world.poses) == pytest.approx(NOISE, rel=0.15)
 
 
-def test_each_reference_has_the_landmarks_that_it_sees(features, found) -> None:
-    views, _ = features
+def test_each_reference_has_the_landmarks_that_it_sees(views, found) -> None:
     starts, seen = sightings_by_reference(views, found)
     assert len(starts) == len(views) + 1
     for reference in (0, 50, len(views) - 1):
@@ -89,16 +68,14 @@ def test_each_reference_has_the_landmarks_that_it_sees(features, found) -> None:
         assert sorted(seen[starts[reference] : starts[reference + 1]]) == sorted(own)
 
 
-def test_a_landmark_looks_like_its_sightings_on_average(features, found) -> None:
-    views, _ = features
+def test_a_landmark_looks_like_its_sightings_on_average(views, found) -> None:
     means = mean_descriptors(views, found)
     assert np.linalg.norm(means, axis=1) == pytest.approx(1.0, abs=1e-5)
     alike = np.einsum("od,od->o", means[found.landmarks], views.compared(found.features))
     assert np.median(alike) > 0.97
 
 
-def test_of_each_reference_the_landmarks_stay_that_most_references_see(features, found, monkeypatch) -> None:
-    views, _ = features
+def test_of_each_reference_the_landmarks_stay_that_most_references_see(views, found, monkeypatch) -> None:
     monkeypatch.setattr(map_making, "MAX_SEEN", 10)
     few = widely_seen(views, found)
     owners, counts = views.owners[found.features], np.bincount(found.landmarks)
@@ -111,16 +88,16 @@ def test_of_each_reference_the_landmarks_stay_that_most_references_see(features,
     assert (found.points[found.landmarks[np.isin(found.features, few.features)]] == few.points[few.landmarks]).all()
 
 
-def test_a_map_of_few_landmarks_keeps_them_all(features, found) -> None:
-    kept = widely_seen(features[0], found)
+def test_a_map_of_few_landmarks_keeps_them_all(views, found) -> None:
+    kept = widely_seen(views, found)
     assert kept.points.tolist() == found.points.tolist()
     assert kept.features.tolist() == found.features.tolist()
 
 
-def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(features, found, monkeypatch) -> None:
-    whole = mean_descriptors(features[0], found)
+def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(views, found, monkeypatch) -> None:
+    whole = mean_descriptors(views, found)
     monkeypatch.setattr(map_making, "BLOCK", 7)
-    assert mean_descriptors(features[0], found).tobytes() == whole.tobytes()
+    assert mean_descriptors(views, found).tobytes() == whole.tobytes()
 
 
 def test_features_of_any_length_are_put_together_also_with_images_without_any() -> None:
