@@ -81,11 +81,11 @@ FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 CYLINDER = Cylindrical(720, 180, 360.0, elevation_top=0.6, elevation_bottom=-0.8)
 CAMERAS = [
-    camera_of(WorldConfig()),
+    camera_of(WorldConfig(camera=mirror(320))),
     CYLINDER,
     Equirectangular(720, 180, 360.0, elevation_top=0.7, elevation_bottom=-0.85),
     Perspective(320, 240, 277.0, 277.0, 159.5, 119.5),
-    DoubleSphere(640, 480, 110.0, 110.0, 319.5, 239.5, -0.2, 0.59, 238.0, yaw=0.3),
+    DoubleSphere(320, 240, 55.0, 55.0, 159.5, 119.5, -0.2, 0.59, 119.0, yaw=0.3),
 ]
 
 
@@ -116,50 +116,6 @@ def test_each_camera_sees_a_box_within_half_a_pixel_of_where_its_edges_project(
     assert not lit[outside > 0.5].any()
 
 
-@pytest.mark.parametrize("pose", [(4.6, 4.2, 0.3), (7.2, 6.4, -2.0), (6.3, 3.2, 1.9)])
-def test_the_corners_of_a_box_are_found_within_half_a_pixel(
-    marker: tuple[Scene, npt.NDArray[np.float64]], pose: tuple[float, float, float]
-) -> None:
-    """Seen through a lens straight lines stay straight: the convex hull of the picture against that of the corners."""
-    scene, corners = marker
-    centre = seen_from(np.array([[6.0, 5.0, 0.9]]), pose)[0]
-    camera = Perspective(
-        width=640,
-        height_px=480,
-        focal_x=500.0,
-        focal_y=500.0,
-        centre_x=320.0,
-        centre_y=240.0,
-        yaw=math.atan2(centre[1], centre[0]),
-    )
-    picture = render(scene, camera_rays(camera), pose, EYE)[..., 0]
-    ahead = turned(seen_from(corners, pose), -camera.yaw)
-    expected = np.stack([320.0 - 500.0 * ahead[:, 1] / ahead[:, 0], 240.0 - 500.0 * ahead[:, 2] / ahead[:, 0]], axis=1)
-    hull = cv2.convexHull(expected.astype(np.float32))[:, 0].astype(np.float64)
-    lit = picture > 127
-    inside = np.array(
-        [
-            [cv2.pointPolygonTest(hull.astype(np.float32), (float(u), float(v)), True) for u in range(640)]
-            for v in range(480)
-        ]
-    )
-    assert lit[inside > 0.5].all()
-    assert not lit[inside < -0.5].any()
-
-
-def test_a_turn_of_the_robot_is_a_shift_of_the_panorama(demo: Scene) -> None:
-    rays = camera_rays(PANORAMA)
-    before = render(demo, rays, (5.8, 4.5, 0.4), EYE)
-    columns = 37  # a rotated counter-clockwise moves the scene to the right
-    after = render(demo, rays, (5.8, 4.5, 0.4 + columns * 2 * math.pi / 720), EYE)
-    differences = np.abs(np.roll(before, columns, axis=1).astype(int) - after)
-    # Rounding may flip what a ray at an edge meets; a shift by 0.1 column more would change far more pixels.
-    assert np.mean(differences.max(axis=-1) > 2) < 0.002
-    off = render(demo, rays, (5.8, 4.5, 0.4 + (columns + 0.1) * 2 * math.pi / 720), EYE)
-    wrong = np.abs(np.roll(before, columns, axis=1).astype(int) - off)
-    assert differences.mean() < 0.1 * wrong.mean()
-
-
 def test_the_panorama_has_no_seam(demo: Scene) -> None:
     """First and last columns differ as neighbours inside do: with the seam put elsewhere the same pixels come out."""
     rays = camera_rays(PANORAMA)
@@ -174,32 +130,6 @@ def test_the_sense_of_a_strip_mirrors_it(demo: Scene) -> None:
     clockwise = render(demo, camera_rays(strip), (5.8, 4.5, 0.4), EYE)
     counter = dataclasses.replace(strip, sense="counter_clockwise")
     np.testing.assert_array_equal(clockwise[:, ::-1], render(demo, camera_rays(counter), (5.8, 4.5, 0.4), EYE))
-
-
-def test_what_lies_ahead_is_in_the_middle_and_what_lies_left_is_left_of_it(
-    marker: tuple[Scene, npt.NDArray[np.float64]],
-) -> None:
-    scene, _ = marker
-    rays = camera_rays(PANORAMA)
-    for bearing in (0.0, 0.5, -1.2):
-        heading = math.atan2(5.0 - 4.2, 6.0 - 3.6) - bearing
-        picture = render(scene, rays, (3.6, 4.2, heading), EYE)[..., 0]
-        column = np.nonzero(picture > 127)[1].mean() + 0.5
-        assert abs(column - (360.0 - bearing / (2 * math.pi) * 720)) < 3
-
-
-def test_a_bearing_in_the_mirror_is_the_angle_in_the_picture_plus_yaw(
-    marker: tuple[Scene, npt.NDArray[np.float64]],
-) -> None:
-    """Architecture, section 5: atan2(v - cy, u - cx) + yaw, counter-clockwise from the robot's forward."""
-    scene, _ = marker
-    camera = camera_of(DEMO)
-    assert isinstance(camera, HyperbolicMirror)
-    heading = 0.7
-    picture = render(scene, camera_rays(camera), (3.6, 4.2, heading), EYE)[..., 0]
-    v, u = np.nonzero(picture > 127)
-    seen = math.atan2(v.mean() - camera.centre_y, u.mean() - camera.centre_x) + camera.yaw
-    assert abs(seen - (math.atan2(5.0 - 4.2, 6.0 - 3.6) - heading)) < math.radians(1)
 
 
 def test_a_low_shelf_is_looked_over(demo: Scene) -> None:
