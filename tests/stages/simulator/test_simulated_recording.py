@@ -3,13 +3,13 @@
 import dataclasses
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from world_files import DEMO
 
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.simulator import simulated_recording as simulated
 from omninav.stages.simulator.config import Day, Route
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
@@ -29,13 +29,18 @@ def test_a_simulated_drive_is_a_recording(tour: SimulatedRecording) -> None:
     assert not recording.dropped
 
 
+def test_odometry_drifts_but_not_away(tour: SimulatedRecording) -> None:
+    """In the spirit of photoreal-house: a few per cent of a way of 32 m."""
+    true, thought = (between(poses[0], poses[-1]) for poses in (tour.truth, tour.odometry))
+    assert 0.3 < np.hypot(*(true - thought)[:2]) < 2.5
+
+
 @pytest.mark.parametrize(("route", "least", "most"), [("tour", 120, 160), ("drive", 80, 105)])
 @pytest.mark.parametrize("day", [0, 1, 2, 5])
 def test_routes_have_their_length_and_never_touch_anything(route: str, least: int, most: int, day: int) -> None:
-    config = DEMO
-    recording = SimulatedRecording(config, route, day)
+    recording = SimulatedRecording(DEMO, route, day)
     assert least <= len(recording.stamps) <= most
-    assert World(config, day).is_free(recording.driven[:, :2], config.robot.radius).all()
+    assert World(DEMO, day).is_free(recording.driven[:, :2], DEMO.robot.radius).all()
     steps = np.hypot(*np.diff(recording.truth[:, :2], axis=0).T)
     assert 0.15 < np.median(steps) < 0.25
     assert steps.max() < 0.25
@@ -69,54 +74,12 @@ def test_what_other_days_bring_makes_no_other_drive() -> None:
     assert SimulatedRecording(later, "drive", 2).digest() != SimulatedRecording(DEMO, "drive", 2).digest()
 
 
-def test_odometry_drifts_but_not_away(tour: SimulatedRecording) -> None:
-    """In the spirit of photoreal-house: a few per cent of the way over stretches of ten metres."""
-    shares = []
-    for day in range(6):
-        recording = SimulatedRecording(DEMO, "drive", day)
-        truth, seen = recording.truth, recording.odometry
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
-        for start in range(0, len(way), 10):
-            end = np.searchsorted(way, way[start] + 10.0)
-            if end < len(way):
-                moved, thought = (simulated.se2.between(p[start], p[end]) for p in (truth, seen))
-                shares.append(np.hypot(*(moved - thought)[:2]) / 10.0)
-    assert 0.01 < np.median(shares) < 0.08
-
-
-def test_places_look_different(tour: SimulatedRecording) -> None:
-    """Any two pictures far apart differ more, after the best turn, than neighbours along the drive do."""
-    frames = range(0, len(tour.stamps), 20)
-    rings = {frame: _ring(tour, frame) for k in frames for frame in (k, k + 1) if k + 1 < len(tour.stamps)}
-    starts = [k for k in frames if k + 1 in rings]
-    near = [_distance(rings[k], rings[k + 1]) for k in starts]
-    far = [_distance(rings[a], rings[b]) for a in starts for b in starts if a < b]
-    assert np.median(far) > 1.5 * np.median(near)
-    assert min(far) > np.median(near)
-
-
-def _ring(recording: SimulatedRecording, frame: int) -> np.ndarray:
-    """A coarse panorama (18, 72, 3) read straight off the mirror picture."""
-    azimuth, radius = np.meshgrid(np.arange(72) * 2 * np.pi / 72, np.linspace(60, 225, 18))
-    picture = recording.image(frame).astype(float)
-    camera = recording.camera
-    u, v = camera.centre_x + radius * np.cos(azimuth), camera.centre_y + radius * np.sin(azimuth)
-    smooth = cv2.blur(picture, (9, 9))
-    return smooth[np.round(v).astype(int), np.round(u).astype(int)]
-
-
-def _distance(one: np.ndarray, other: np.ndarray) -> float:
-    return min(float(np.abs(one - np.roll(other, shift, axis=1)).mean()) for shift in range(72))
-
-
 def test_a_route_that_is_not_there_is_refused_with_those_that_are() -> None:
     with pytest.raises(UnreadableRecording, match="home_store_demo' has no route 'aisles'; it has: drive, tour"):
         SimulatedRecording(DEMO, "aisles", 0)
 
 
 def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(tmp_path: Path) -> None:
-    from omninav.stages.recordings.opening import open_recording
-
     config = dataclasses.replace(DEMO, routes={"short": Route(((2.0, 1.5), (3.5, 1.5)))})
     recording = SimulatedRecording(config, "short", 2)
     record(recording, tmp_path / "one.mcap")

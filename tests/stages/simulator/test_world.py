@@ -9,7 +9,7 @@ import yaml
 from world_files import DEMO, world_of
 
 from omninav.stages.simulator import textures
-from omninav.stages.simulator.config import Block, Day, WorldConfig
+from omninav.stages.simulator.config import Day, WorldConfig
 from omninav.stages.simulator.occupancy import occupancy, write_grid
 from omninav.stages.simulator.plan_image import draw_plan
 from omninav.stages.simulator.world import World
@@ -29,12 +29,6 @@ def test_clearance_is_the_distance_to_the_nearest_face(demo: World) -> None:
     points = [(3.7, 2.0), (1.7, 2.9), (5.6, 3.8), (0.5, 3.0), (3.7, 2.9), (-1.0, 3.0)]
     np.testing.assert_allclose(demo.clearance(points), [0.4, 0.4, 0.5, 0.47, 0.0, 0.0], atol=0.031)
     np.testing.assert_array_equal(demo.is_free(points, 0.3), [True, True, True, True, False, False])
-
-
-def test_turned_bodies_keep_their_corners_clear() -> None:
-    config = WorldConfig(shelves=(), wall_panels=(), blocks=(Block((6.0, 4.0), (2.0, 2.0), 1.0, yaw=np.pi / 4),))
-    clear = World(config).clearance([(6.0 + np.sqrt(2) + 0.5, 4.0), (7.0, 5.0), (7.5, 5.5)])
-    np.testing.assert_allclose(clear, [0.5, np.sqrt(2) - 1, np.sqrt(2) * 1.5 - 1], atol=1e-9)
 
 
 def test_mats_are_driven_over_and_lamps_driven_under(demo: World) -> None:

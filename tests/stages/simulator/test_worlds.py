@@ -133,12 +133,12 @@ def test_who_builds_a_map_soon_comes_back_to_where_he_has_been(name: str, route:
     assert np.diff(returns).max() < farthest
 
 
-def test_the_campus_tour_has_about_545_images() -> None:
-    assert len(SimulatedRecording(world_of("campus"), "tour", 0).stamps) == pytest.approx(545, abs=10)
-
-
-def test_a_lap_of_the_office_loop_has_about_100_images() -> None:
-    assert len(SimulatedRecording(world_of("office_loop"), "lap", 0).stamps) == pytest.approx(100, abs=8)
+@pytest.mark.parametrize(
+    ("name", "route", "least", "most"),
+    [("campus", "tour", 535, 555), ("office_loop", "lap", 92, 108), ("institute", "changing", 8000, 8400)],
+)
+def test_routes_have_as_many_images_as_those_of_the_papers(name: str, route: str, least: int, most: int) -> None:
+    assert least <= len(SimulatedRecording(world_of(name), route, 0).stamps) <= most
 
 
 def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> None:
@@ -155,10 +155,6 @@ def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> 
     row = int(np.searchsorted(kidnap.times, kidnap.lifted[0][0]))
     turned = wrap(kidnap.driven[row, 2] - kidnap.driven[row - 1, 2])
     assert abs(turned) == pytest.approx(math.pi, abs=0.15)
-
-
-def test_the_changing_institute_has_8000_pictures_in_one_drive() -> None:
-    assert 8000 <= len(SimulatedRecording(world_of("institute"), "changing", 0).stamps) <= 8400
 
 
 def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each() -> None:
@@ -318,9 +314,8 @@ def test_clearance_is_exact_far_from_everything() -> None:
 # Bytes
 
 
-@pytest.mark.parametrize("name", ["home_store_small", "office", "campus"])
-def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> None:
-    config = world_of(name)
+def test_a_piece_of_a_log_of_rooms_is_the_same_bytes_twice(tmp_path: Path) -> None:
+    config = world_of("office")
     short = dataclasses.replace(config, routes={"piece": dataclasses.replace(config.routes["drive"], length=0.3)})
     for log in ("one.mcap", "two.mcap"):
         record(SimulatedRecording(short, "piece", 1), tmp_path / log)
