@@ -1,24 +1,19 @@
 """Whole views by cosine transform and Fourier spectrum, of turned pictures and of a turned robot."""
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import fft
-from world_files import DEMO
+from turned_robot import look
 
 from omninav.pipeline import Context, Stage
 from omninav.stages.features.averaged_strip import Contrast, averaged_strip, local_contrast
 from omninav.stages.features.dct import CosineTransform, cosine_basis, lowest_frequencies
 from omninav.stages.features.fourier import SegmentSpectrum, spectrum_around
-from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.world import World
-from omninav.stages.unwarp.panorama import UnwarpPanorama
-from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import WholeView
 
 STAGES = [
@@ -35,25 +30,6 @@ def described(stage: Any, pixels: np.ndarray) -> WholeView:
     view = stage.step(context, panorama=Panorama(pixels)).view
     assert isinstance(view, WholeView)
     return view
-
-
-@pytest.fixture(scope="module")
-def seen() -> Any:
-    """What the demo's robot sees at a pose, as a panorama's pixels."""
-    scene = World(DEMO).scene
-    camera = camera_of(DEMO)
-    rays = camera_rays(camera)
-    unwarp = UnwarpPanorama()
-    context = Context("unwarp")
-    unwarp.setup(context)
-
-    @functools.cache
-    def look(x: float, y: float, heading: float) -> np.ndarray:
-        picture = Image(render(scene, rays, (x, y, heading), 0.9))
-        panorama: Panorama = unwarp.step(context, image=picture, camera=camera).panorama
-        return panorama.pixels
-
-    return look
 
 
 def test_the_basis_is_the_orthonormal_transform_of_scipy() -> None:
@@ -144,11 +120,11 @@ def test_a_panorama_moved_to_the_right_is_the_same_place_seen_by_a_robot_turned_
 
 @pytest.mark.parametrize("stage", STAGES, ids=repr)
 @pytest.mark.parametrize("turn", [0.5, -1.2, 2.9])
-def test_a_robot_that_turned_on_the_spot_knows_the_place_and_its_turn(seen: Any, stage: Stage, turn: float) -> None:
+def test_a_robot_that_turned_on_the_spot_knows_the_place_and_its_turn(stage: Stage, turn: float) -> None:
     """Rendered through the mirror at two headings; a metre further on looks less alike than turned."""
-    kept = described(stage, seen(5.8, 4.5, 0.4)).values[None]
-    view = described(stage, seen(5.8, 4.5, 0.4 + turn))
-    away = described(stage, seen(6.8, 4.5, 0.4))
+    kept = described(stage, look("panorama", 0.4, 5.8, 4.5).pixels).values[None]
+    view = described(stage, look("panorama", 0.4 + turn, 5.8, 4.5).pixels)
+    away = described(stage, look("panorama", 0.4, 6.8, 4.5).pixels)
     assert view.distances(kept)[0] < 0.5 * away.distances(kept)[0]
     assert abs(math.remainder(view.turns(kept)[0] - turn, 2 * math.pi)) < math.radians(2)
 
