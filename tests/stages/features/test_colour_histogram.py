@@ -9,29 +9,28 @@ from omninav.stages.features.colour_histogram import ColourHistogram, colour_his
 PIXELS = np.random.default_rng(0).integers(0, 256, (40, 72, 3), dtype=np.uint8)
 
 
-@pytest.mark.parametrize("space", ["rgb", "lab", "ycrcb", "hsv"])
+SPACES = {
+    "rgb": cv2.COLOR_BGR2RGB,
+    "lab": cv2.COLOR_BGR2Lab,
+    "ycrcb": cv2.COLOR_BGR2YCrCb,
+    "hsv": cv2.COLOR_BGR2HSV,
+}
+
+
 @pytest.mark.parametrize("joint", [False, True])
-def test_each_segment_sums_to_one(space, joint):
-    counted = colour_histograms(PIXELS, 12, space, (4, 3, 5), joint)
-    assert counted.shape == (12, 60 if joint else 12)
-    assert counted.sum(axis=1) == pytest.approx(np.ones(12), abs=1e-6)
-
-
-def test_separate_histograms_are_those_of_opencv():
-    counted = colour_histograms(PIXELS, 6, "rgb", (8, 4, 16))
+@pytest.mark.parametrize("space", SPACES)
+def test_histograms_of_each_segment_are_those_of_opencv_and_sum_to_one(space, joint):
+    bins, tops = (8, 4, 16), [180 if space == "hsv" else 256, 256, 256]
+    counted = colour_histograms(PIXELS, 6, space, bins, joint)
+    converted = cv2.cvtColor(PIXELS, SPACES[space])
     for segment in range(6):
-        part = PIXELS[:, 12 * segment : 12 * segment + 12]
-        peers = [cv2.calcHist([part], [2 - c], None, [n], [0, 256]).ravel() for c, n in enumerate((8, 4, 16))]
-        assert counted[segment] == pytest.approx(np.concatenate(peers) / (3 * 480), abs=1e-6)
-
-
-def test_joint_histograms_are_those_of_opencv():
-    counted = colour_histograms(PIXELS, 6, "lab", (4, 4, 4), joint=True)
-    lab = cv2.cvtColor(PIXELS, cv2.COLOR_BGR2Lab)
-    for segment in range(6):
-        part = lab[:, 12 * segment : 12 * segment + 12]
-        peer = cv2.calcHist([part], [0, 1, 2], None, [4, 4, 4], [0, 256, 0, 256, 0, 256]).ravel()
-        assert counted[segment] == pytest.approx(peer / 480, abs=1e-6)
+        part = [converted[:, 12 * segment : 12 * segment + 12]]
+        if joint:
+            peer = cv2.calcHist(part, [0, 1, 2], None, bins, [0, tops[0], 0, 256, 0, 256]).ravel()
+        else:
+            channels = zip(bins, tops, strict=True)
+            peer = np.concatenate([cv2.calcHist(part, [c], None, [n], [0, top]) for c, (n, top) in enumerate(channels)])
+        assert counted[segment] == pytest.approx(peer.ravel() / peer.sum(), abs=1e-6)
 
 
 def test_a_channel_can_be_left_out():
