@@ -128,21 +128,27 @@ def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecordi
     assert kidnappings[1]["to"] == [5.0, 1.4, 0.2]
 
 
-def test_lost_images_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
-    taken = len(SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED).stamps)
-    assert 0 < len(drive.sent) < taken
+@pytest.fixture(scope="module")
+def undisturbed() -> SimulatedRecording:
+    """The same drive, of which every image arrives in time."""
+    return SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED)
+
+
+def test_lost_images_are_missing_and_overtaken_ones_are_counted(
+    drive: SimulatedRecording, undisturbed: SimulatedRecording, log: Path
+):
+    assert 0 < len(drive.sent) < len(undisturbed.stamps)
     assert len(drive.stamps) == len(drive.sent) - drive.dropped["backward_stamp"]
     assert drive.dropped["backward_stamp"] > 0
     assert open_recording(str(log)).dropped == drive.dropped
     assert (np.diff(drive.stamps) > 0).all()
 
 
-def test_losing_images_does_not_change_those_that_arrive(drive: SimulatedRecording):
-    whole = SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED)
-    frame = int(np.flatnonzero(whole.stamps == drive.stamps[5])[0])
+def test_losing_images_does_not_change_those_that_arrive(drive: SimulatedRecording, undisturbed: SimulatedRecording):
+    frame = int(np.flatnonzero(undisturbed.stamps == drive.stamps[5])[0])
     assert frame > 5
-    np.testing.assert_array_equal(whole.image(frame), drive.image(5))
-    np.testing.assert_array_equal(whole.rolled, drive.rolled)
+    np.testing.assert_array_equal(undisturbed.image(frame), drive.image(5))
+    np.testing.assert_array_equal(undisturbed.rolled, drive.rolled)
 
 
 def test_ranges_come_back_from_the_log_as_they_were_before_each_picture(drive: SimulatedRecording, log: Path):
@@ -208,11 +214,7 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
     assert [out.motion is None for out in read] == [out.tick.first_of_log for out in read]
     assert sum(out.tick.first_of_log for out in read) == 2
     for one, other in zip(read, driven, strict=True):
-        assert (one.tick.stamp, one.tick.log, one.tick.first_of_log) == (
-            other.tick.stamp,
-            other.tick.log,
-            other.tick.first_of_log,
-        )
+        assert vars(one.tick) == vars(other.tick) | {"frame": one.tick.frame}
         assert one.motion is None or vars(one.motion) == pytest.approx(vars(other.motion), abs=1e-9)
 
 

@@ -56,24 +56,19 @@ def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(b
     assert forth[0] != World(BUSY, day=1).people_at(40.0, track)
 
 
-def test_some_keep_the_robot_company_and_nobody_is_run_over(busy: World, track: Track) -> None:
-    beside = 0
+def test_some_keep_the_robot_company_and_nobody_is_run_over_or_trodden_on(busy: World, track: Track) -> None:
+    walkers, beside = {person.height for person in busy.people_at(0.0)}, 0
     for seconds in np.arange(10.0, 60.0, 0.5):
         robot = track.poses[np.searchsorted(track.times, seconds), :2]
-        distance = np.hypot(*(positions(busy.people_at(seconds, track)) - robot).T)
-        assert distance.min() > 0.55
-        beside += int((distance < 1.5).any())
-    assert beside > 40  # of 100 moments
-
-
-def test_nobody_stands_on_the_feet_of_a_companion(busy: World, track: Track) -> None:
-    walkers = {person.height for person in busy.people_at(0.0)}
-    for seconds in np.arange(10.0, 60.0, 0.5):
         people = busy.people_at(seconds, track)
         places = positions(people)
+        distance = np.hypot(*(places - robot).T)
+        assert distance.min() > 0.55
+        beside += int((distance < 1.5).any())
         for number, person in enumerate(people):
             if person.height not in walkers:
                 assert np.hypot(*(np.delete(places, number, axis=0) - places[number]).T).min() > 0.5
+    assert beside > 40  # of 100 moments
 
 
 @pytest.mark.parametrize("route", ["tour", "drive"])
