@@ -10,7 +10,7 @@ from omninav.stages.geometry.two_views.epipolar import shared_residuals
 from omninav.stages.homing.two_view_pose import TwoViewPose
 from omninav.stages.metrics.two_view_errors import TwoViewErrors
 from omninav.stages.source.two_views import TwoViews, TwoViewsState
-from omninav.stages.values.two_views import BearingPairs, RelativeView
+from omninav.stages.values.two_views import BearingPairs
 
 
 def problems(seed: int = 0, **how) -> list[TwoViews.Out]:
@@ -73,18 +73,3 @@ def test_too_few_pairs_are_counted() -> None:
     ctx = Context("homing")
     assert TwoViewPose().step(ctx, BearingPairs(np.zeros((1, 3)), np.zeros((1, 3)))).view is None
     assert ctx.counts["no_relative_pose"] == 1
-
-
-def test_errors_are_the_angles_between_the_poses() -> None:
-    # Turned by 2 degrees about the vertical, the direction off by 5: one of two within 3 degrees, one not found.
-    a, b = math.radians(2.0), math.radians(5.0)
-    turned = np.array([[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]])
-    ahead, none = np.array([1.0, 0.0, 0.0]), np.zeros(0, np.bool_)
-    truth = [RelativeView(np.eye(3), ahead, none)] * 3
-    off = RelativeView(turned, np.array([math.cos(b), math.sin(b), 0.0]), none, 32)
-    found = [off, RelativeView(turned, ahead, none, 64), None]
-    values = TwoViewErrors().step(Context("errors"), truth, found).metrics.values["two_views"]
-    assert values["success_rate"] == pytest.approx(1 / 3)
-    assert values["rotation_error_deg"]["median"] == pytest.approx(2.0)
-    assert values["direction_error_deg"]["median"] == pytest.approx(2.5)
-    assert values["samples"] == 48.0

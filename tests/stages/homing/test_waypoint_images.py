@@ -2,17 +2,13 @@
 
 import math
 
-import numpy as np
 import pytest
-from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.homing.first_view_path import FirstViewPath, FirstViewPathState
 from omninav.stages.homing.waypoint_images import WaypointImages, WaypointImagesState
-from omninav.stages.metrics.homing_errors import HomingErrors
-from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.homing import HomingVector, ImagePath
 
 PATH = ImagePath(4, tuple(none_found() for _ in range(3)), ("a", "b", "c"))
 
@@ -118,22 +114,3 @@ def test_the_first_view_is_given_once_a_second_later() -> None:
     given = [remember.step(ctx, kept, Tick(k, 200_000_000 * k, first_of_log=k == 0), views[k]).path for k in range(9)]
     assert [path is not None for path in given] == [k == 5 for k in range(9)]
     assert given[5].views == (views[0],)
-
-
-def test_errors_are_those_of_the_way_back_to_the_first_pose() -> None:
-    # Carried 2 m to +y; it looks along +x, so that the way back is at -90 degrees; the vector says -80.
-    poses = [Pose(0.0, 0.0, 0.0), Pose(0.0, 2.0, 0.0), Pose(0.0, 1.0, 0.0), Pose(0.03, 0.04, 0.1)]
-    ticks = [Tick(k, 10**9 * k) for k in range(4)]
-    said = [None, vector(0, direction=math.radians(-80.0), turn=0.0), vector(0, state="lost"), vector(0, 0.0)]
-    progress = [None, None, None, PathProgress(0, 1, 1, 0, True, True, True)]
-    values = HomingErrors().step(Context("errors"), collected(ticks, poses), said, progress).metrics.values["homing"]
-    assert values["start_m"] == pytest.approx(2.0)
-    assert values["end_error_m"] == pytest.approx(0.05)
-    assert values["end_turn_deg"] == pytest.approx(math.degrees(0.1))
-    assert values["time_s"] == 2.0
-    assert values["arrived"] == 1
-    assert values["direction_error_deg"]["median"] == pytest.approx(10.0)
-    assert values["first"]["direction_error_deg"] == pytest.approx(10.0)
-    assert values["lost_rate"] == pytest.approx(1 / 3)
-    assert HomingErrors().step(Context("errors"), collected(ticks, [None] * 4), said, progress).metrics is None
-    assert np.isfinite(values["inliers"])

@@ -5,14 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from world_files import DEMO, world_of
 
+from omninav.stages.recordings.occupancy_grid import read_occupancy
 from omninav.stages.simulator import textures
 from omninav.stages.simulator.config import Day, WorldConfig
-from omninav.stages.simulator.occupancy import occupancy, write_grid
+from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.plan_image import draw_plan
 from omninav.stages.simulator.world import World
+from omninav.stages.values.grid import FREE, OCCUPIED
 
 
 @pytest.fixture(scope="module")
@@ -36,24 +37,13 @@ def test_mats_are_driven_over_and_lamps_driven_under(demo: World) -> None:
 
 
 def test_the_grid_agrees_with_clearance_and_is_what_map_server_reads(demo: World, tmp_path: Path) -> None:
-    path = write_grid(demo, tmp_path)
-    described = yaml.safe_load(path.read_text())
-    header, size, top, body = (tmp_path / described["image"]).read_bytes().split(b"\n", 3)
-    columns, rows = (int(n) for n in size.split())
-    assert (header, top) == (b"P5", b"255")
-    levels = np.frombuffer(body, dtype=np.uint8).reshape(rows, columns)
-    share = (255 - levels.astype(float)) / 255
-    assert set(np.unique(share > described["occupied_thresh"])) == {True, False}
-    occupied = occupancy(demo)[0]
-    rng = np.random.default_rng(0)
-    for x, y in rng.uniform((0, 0), demo.config.size, (300, 2)):
-        column = int((x - described["origin"][0]) / described["resolution"])
-        row = rows - 1 - int((y - described["origin"][1]) / described["resolution"])
-        clear = demo.clearance([(x, y)])[0]
-        if clear > 0.1:
-            assert share[row, column] < described["free_thresh"]
-        if clear == 0.0 and occupied[rows - 1 - row, column]:
-            assert share[row, column] > described["occupied_thresh"]
+    grid = read_occupancy(write_grid(demo, tmp_path))
+    points = np.random.default_rng(0).uniform((0, 0), demo.config.size, (300, 2))
+    states, clear = grid.cells[tuple(grid.cells_of(points).T)], demo.clearance(points)
+    assert (states[clear > 0.1] == FREE).all()
+    assert (clear == 0.0).sum() > 40
+    assert (states[clear == 0.0] == OCCUPIED).all()
+    assert (tmp_path / "map.pgm").read_bytes()[:3] == b"P5\n"
 
 
 def test_the_seed_decides_the_looks() -> None:
