@@ -59,10 +59,10 @@ def test_references_that_stand_for_several_count_as_several():
 def test_the_length_of_a_correlated_series_is_found():
     step, length = 0.25, 2.0
     keep = math.exp(-step / length)
-    series = np.zeros(3000)
+    series = np.zeros(1000)
     for n in range(1, len(series)):
         series[n] = keep * series[n - 1] + math.sqrt(1 - keep**2) * RNG.standard_normal()
-    places = np.column_stack([step * np.arange(3000), np.zeros(3000)])
+    places = np.column_stack([step * np.arange(1000), np.zeros(1000)])
     assert correlation_length(series, places) == pytest.approx(length, rel=0.35)
-    assert correlation_length(np.ones(3000), places) is None
+    assert correlation_length(np.ones(1000), places) is None
     assert correlation_length(series[:3], places[:3]) is None
