@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from world_files import DEMO
+from turned_robot import CAMERA, look
 
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.perspective import Perspective
@@ -13,20 +13,15 @@ from omninav.stages.homing.column_table import ColumnTable
 from omninav.stages.homing.first_image import FirstImage
 from omninav.stages.homing.min_warping import INVERSE_DEPTH_RATIOS, Columns, places_of_columns, warped
 from omninav.stages.homing.warping import MinWarping, MinWarpingState
-from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.config import mirror
-from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.world import World
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Image
 
-CAMERA = camera_of(replace(DEMO, camera=mirror(columns=320)))
 LOST = HomingVector(3, 0.0, 0.0, 1.0, 1.0, 1.0, None, 0, "lost", "2 matches")
 TARGET = (5.0, 5.0, 0.4)
 
 
 def seen(pose: tuple[float, float, float]) -> Image:
-    return Image(render(World(DEMO).scene, camera_rays(CAMERA), pose, 0.9))
+    return look("mirror", pose[2], *pose[:2])  # type: ignore[return-value]
 
 
 def vector(stage: MinWarping, image: Image, target: Image, given: HomingVector = LOST) -> HomingVector:
