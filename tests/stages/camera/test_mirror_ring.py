@@ -1,17 +1,15 @@
 """The ring of an uncalibrated mirror, found in its image."""
 
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from conftest import DATA, needs_data
 from made_rings import ring_picture
 
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.mirror_ring import RingNotFound, find_ring
-
-DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -36,7 +34,7 @@ ALVIN = [
 ]
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample data in {DATA}")
+@needs_data
 @pytest.mark.parametrize(("name", "ring"), CALIBRATION + ALVIN, ids=lambda value: str(value).split("/")[-1])
 def test_the_ring_is_found_in_every_real_mirror_image(name: str, ring: tuple[float, float, float, float]) -> None:
     # Where the circles were laid by eye over the pictures, to about 1 % of their width: one camera each, that stands
@@ -46,9 +44,8 @@ def test_the_ring_is_found_in_every_real_mirror_image(name: str, ring: tuple[flo
     assert np.abs(np.subtract(find_ring(pixels), ring)).max() < 0.015 * pixels.shape[1]
 
 
+@needs_data
 def test_the_ring_of_the_photoreal_mirror_is_its_mask_in_the_camera_file() -> None:
-    if not DATA.is_dir():
-        pytest.skip(f"no sample data in {DATA}")
     reader = LogReader(DATA / "photoreal-house" / "drive.mcap")
     first = next(reader.messages(["/camera/image/compressed"]))
     pixels = cv2.imdecode(np.frombuffer(first.content.data, np.uint8), cv2.IMREAD_COLOR)
