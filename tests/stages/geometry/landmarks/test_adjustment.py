@@ -52,12 +52,6 @@ def test_wrong_sightings_are_told_from_right_ones(world, found):
     assert found.rms == pytest.approx(NOISE, rel=0.25)
 
 
-def test_the_same_input_gives_the_same_bytes(world, wrong_poses, found):
-    again = seen(world, wrong_poses, pose_sigmas=np.tile(POSE_SIGMAS, (len(wrong_poses), 1)))
-    assert again.poses.tobytes() == found.poses.tobytes()
-    assert again.points.tobytes() == found.points.tobytes()
-
-
 def test_the_order_of_sightings_does_not_matter(world, wrong_poses, found):
     order = np.random.default_rng(2).permutation(len(world.references))
     again = adjusted(
@@ -70,6 +64,7 @@ def test_the_order_of_sightings_does_not_matter(world, wrong_poses, found):
         np.tile(POSE_SIGMAS, (len(wrong_poses), 1)),
     )
     assert again.poses.tobytes() == found.poses.tobytes()
+    assert again.points.tobytes() == found.points.tobytes()
     assert (again.inliers == found.inliers[order]).all()
 
 
