@@ -1,4 +1,4 @@
-"""Patches of a turned robot's views, on the mirror image and on the panorama."""
+"""Patches of a turned robot's views, on the mirror image and on the panorama, and of tilted images."""
 
 import dataclasses
 import math
@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.model import Camera
+from omninav.stages.features.affine_sift import AffineSift
 from omninav.stages.features.rotation_reduced_sift import EDGE_RATIO, RotationReducedSift
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 
 
-def found(picture: Image | Panorama, camera: Camera = CAMERA, **parameters: object) -> LocalFeatures:
-    stage, context = RotationReducedSift(**parameters), Context("features")
+def found(
+    picture: Image | Panorama, camera: Camera = CAMERA, kind: type[Stage] = RotationReducedSift, **parameters: object
+) -> LocalFeatures:
+    stage, context = kind(**parameters), Context("features")
     stage.setup(context)
     features = stage.step(context, image=picture, camera=camera).features
     assert isinstance(features, LocalFeatures)
@@ -126,3 +129,15 @@ def test_descriptors_of_own_orientation_are_those_of_their_points() -> None:
     assert len(own) == 100
     seen = {(*np.float32(at).tolist(), row.tobytes()) for at, row in zip(own.points, own.descriptors, strict=True)}
     assert seen <= known
+
+
+def test_affine_features_of_tilted_images_are_found_beside_sifts_own() -> None:
+    affine, plain = (
+        found(look("mirror", 0.3), kind=kind, orientation="own", max_features=4000, max_pixels=20_000)
+        for kind in (AffineSift, RotationReducedSift)
+    )
+    assert len(affine) > 2 * len(plain)
+    gap = np.linalg.norm(affine.points[:, None] - plain.points[None], axis=2)
+    assert (gap.min(axis=0) < 0.5).mean() > 0.9
+    apart = np.linalg.norm(affine.descriptors[gap.argmin(axis=0)].astype(float) - plain.descriptors, axis=1)
+    assert np.median(apart) < 50.0
