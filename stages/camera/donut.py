@@ -74,7 +74,7 @@ class Donut(Camera, projection="donut"):
         radius = (1.0 + elevation) * (ring.inner + ring.outer) / 2.0
         u = ring.centre_x + radius * np.cos(azimuth - self.yaw)
         pixels = np.stack([u, ring.centre_y + sign * radius * np.sin(azimuth - self.yaw)], axis=-1)
-        return pixels, self.shows(pixels)
+        return pixels, self.shows(pixels) & (radius >= 0.0)  # lower, a ray would land across the ring
 
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
         """Elevation = radius / the middle one - 1. Raises BadInput."""
