@@ -4,39 +4,30 @@ import math
 
 import numpy as np
 import pytest
-from small_run import collected
+from measured_drives import Row, figures, made_drive
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.retrieval_precision import RetrievalPrecision
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import Answers
 
-ROBOT = Pose(3.0, -2.0, 1.0)
+ROBOT = (3.0, -2.0, 1.0)
 
 
-def map_of(*poses: tuple[float, float, float]) -> ReferenceGraph:
+def map_of(*poses: tuple[float, float, float], robot: tuple[float, float, float] = ROBOT) -> ReferenceGraph:
     """References so far from the robot (m, m, degrees)."""
-    at = np.array([(ROBOT.x + x, ROBOT.y + y, ROBOT.heading + math.radians(turn)) for x, y, turn in poses])
+    at = np.array(poses, np.float64) * (1.0, 1.0, math.pi / 180) + robot
     return ReferenceGraph(at, np.ones((len(at), 1, 2), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
 
 
-def told(
-    map: ReferenceGraph, *answers: list[tuple[int, float, float]] | None, truth: Pose | None = ROBOT, **parameters
-):
+def told(map: ReferenceGraph, *answers: list[tuple[int, float, float]] | None, truth: Row = ROBOT):
     """Of answers (reference, similarity, turn in degrees) to an image each."""
-    given = [
-        None
-        if each is None
-        else Answers(*(np.array(part) for part in zip(*each, strict=True)))
-        if each
-        else Answers(np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0))
-        for each in answers
-    ]
-    given = [each and Answers(each.references, each.similarities, np.radians(each.turns)) for each in given]
-    drive = collected([Tick(n, n, 0, n) for n in range(len(given))], [truth] * len(given))
-    metrics = RetrievalPrecision(**parameters).step(Context("answers"), drive, given, map).metrics
-    return metrics and metrics.values["answers"]
+    given = []
+    for each in answers:
+        references, similarities, turns = np.array(each or [], np.float64).reshape(-1, 3).T
+        found = Answers(references.astype(np.int64), similarities.astype(np.float32), np.radians(turns))
+        given.append(None if each is None else found)
+    measured = figures(RetrievalPrecision(), made_drive([truth] * len(given)), given, map)
+    return measured and measured["answers"]
 
 
 @pytest.mark.parametrize(
@@ -61,15 +52,9 @@ def test_an_answer_is_near_within_five_metres_and_thirty_degrees(
 
 
 def test_an_answer_at_the_limits_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
-    at = ReferenceGraph(
-        np.array([(3.0, 3.0, np.pi / 2)]),
-        np.ones((1, 1, 2), np.float32),
-        "histograms",
-        np.zeros((0, 2), np.int64),
-        "truth",
-    )
     monkeypatch.setattr("omninav.stages.metrics.retrieval_precision.WITHIN_DEG", 90.0)
-    found = told(at, [(0, 0.5, 0.0)], truth=Pose(3.0, -2.0, 0.0))
+    straight = (3.0, -2.0, 0.0)
+    found = told(map_of((0.0, 5.0, 90.0), robot=straight), [(0, 0.5, 0.0)], truth=straight)
     assert (found["nearby_rate"], found["background_rate"]) == (1.0, 1.0)
 
 
