@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from small_run import collected, mixture_run, reference_graph, small_run
+from measured_drives import AT_ORIGIN, figures, made_drive
+from small_run import mixture_run, reference_graph, small_run
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.metrics.map_pose_errors import MapPoseErrors
 from omninav.stages.metrics.map_size import MapSize
 from omninav.stages.metrics.view_map_size import ViewMapSize, visited_area
@@ -15,12 +16,11 @@ from omninav.stages.values.maps import ReferenceEvent
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-CTX = Context("map")
-
 
 def test_a_map_of_references_is_as_large_as_its_arrays():
-    found = MapSize().step(CTX, reference_graph(40)).metrics.values["map"]
-    size = 40 * 10 * 20 * 4 + 40 * 3 * 8 + 39 * 2 * 8
+    ctx = Context("map")
+    found = MapSize().step(ctx, reference_graph(40)).metrics.values["map"]
+    size = 40 * 10 * 20 * 4 + 40 * 3 * 8 + 39 * 2 * 8  # 10 x 20 float32 and 3 float64 each, edges of 2 int64
     assert found == {
         "size_bytes": size,
         "references": 40,
@@ -28,30 +28,42 @@ def test_a_map_of_references_is_as_large_as_its_arrays():
         "reference_size_bytes": size / 40,
         "pose_source": "truth",
     }
-    assert MapSize().step(CTX, reference_graph(0)).metrics.values["map"]["reference_size_bytes"] is None
+    assert ctx.facts["map_poses"] == "truth"
+    assert figures(MapSize(), reference_graph(0))["map"]["reference_size_bytes"] is None
 
 
-def test_a_map_of_views_is_as_large_as_its_arrays_and_as_dense_as_what_was_visited():
-    run = small_run(frames=12)
-    map = mixture_run(run)[0]
-    found = ViewMapSize().step(CTX, run.drive, map).metrics.values["map"]
-    views, parts = len(map), len(map.weights)
-    assert (views, parts) == (10, 11)
-    assert found["size_bytes"] == views * (6 * 4 + 2 * 8) + parts * (8 + 3 * 8 + 9 * 8 + 8 + 8)
-    assert (found["references"], found["components"]) == (views, parts)
-    assert found["reference_size_bytes"] == found["size_bytes"] / views
-    assert found["references_per_m2"] == pytest.approx(views / found["visited_area_m2"])
-    empty = ViewMapSize().step(CTX, collected([Tick(0, 0)], [None]), ViewMixtures.empty()).metrics.values["map"]
-    assert (empty["visited_area_m2"], empty["reference_size_bytes"], empty["references_per_m2"]) == (0.0, None, None)
+@pytest.fixture(scope="module")
+def run():
+    return small_run(frames=12)
 
 
-def test_the_area_is_that_of_the_true_path_or_of_the_estimates_where_there_is_no_truth():
-    run = small_run(frames=12)
-    map = mixture_run(run)[0]
-    true, blind = (ViewMapSize().step(CTX, each, map).metrics.values["map"] for each in (run.drive, run.blind))
-    assert true["visited_area_m2"] == visited_area(run.drive.truth[:, :2], 1.0)
-    assert blind["visited_area_m2"] == visited_area(run.drive.estimate[:, :2], 1.0)
-    assert true["visited_area_m2"] != blind["visited_area_m2"]
+@pytest.fixture(scope="module")
+def views(run):
+    return mixture_run(run)[0]
+
+
+def test_a_map_of_views_is_as_large_as_its_arrays_and_as_dense_as_what_was_visited(run, views):
+    found = figures(ViewMapSize(), run.drive, views)["map"]
+    number, parts = len(views), len(views.weights)
+    assert (number, parts) == (10, 11)
+    assert found["size_bytes"] == number * (6 * 4 + 2 * 8) + parts * (8 + 3 * 8 + 9 * 8 + 8 + 8)
+    assert (found["references"], found["components"]) == (number, parts)
+    assert found["reference_size_bytes"] == found["size_bytes"] / number
+    assert found["references_per_m2"] == pytest.approx(number / found["visited_area_m2"])
+
+
+@pytest.mark.parametrize(("seen", "density"), [(None, None), (AT_ORIGIN, 0.0)])
+def test_an_empty_map_has_no_size_of_a_reference_and_where_nothing_was_seen_no_density(seen, density):
+    empty = figures(ViewMapSize(), made_drive([seen]), ViewMixtures.empty())["map"]
+    assert (empty["reference_size_bytes"], empty["references_per_m2"]) == (None, density)
+    assert (empty["visited_area_m2"] > 0.0) == (seen is not None)
+
+
+def test_the_area_is_that_of_the_true_path_or_of_the_estimates_where_there_is_no_truth(run, views):
+    true, blind = (figures(ViewMapSize(), each, views)["map"]["visited_area_m2"] for each in (run.drive, run.blind))
+    assert true == visited_area(run.drive.truth[:, :2], 1.0)
+    assert blind == visited_area(run.drive.estimate[:, :2], 1.0)
+    assert true != blind
 
 
 @pytest.mark.parametrize("near", [0.5, 1.0, 3.0])
@@ -71,58 +83,53 @@ def test_the_area_of_a_spot_is_that_of_the_cells_whose_middles_are_within_reach(
         assert visited_area(np.array([spot]), 2.0) == near
 
 
-def learned(by_odometry, source="odometry", truths=((0, 0), (2, 0), (2, 2), (0, 2), (5, 5))):
+SQUARE = [(0, 0), (2, 0), (2, 2), (0, 2)]
+
+
+def learned(by_odometry, truths=SQUARE, source="odometry"):
     """Reference k comes in frame 2 k; its true pose is `truths[k]`."""
     map = dataclasses.replace(reference_graph(len(by_odometry)), pose_source=source)
     map.put(poses=np.array([(x, y, 0.0) for x, y in by_odometry], np.float64).reshape(-1, 3))
     events, truth = [], []
     for reference, spot in enumerate(truths[: len(by_odometry)]):
         events += [ReferenceEvent(reference, "far"), None]
-        truth += [None if spot is None else Pose(*map_floats(spot), 0.0), Pose(90.0, 90.0, 0.0)]
+        truth += [spot and Pose(float(spot[0]), float(spot[1]), 0.0), Pose(90.0, 90.0, 0.0)]
     return events, truth, map
 
 
-def map_floats(spot):
-    return (float(number) for number in spot)
-
-
-SQUARE = [(0, 0), (2, 0), (2, 2), (0, 2)]
+def map_error(events, truth, map, straightened=None):
+    found = figures(MapPoseErrors(), events, truth, map, straightened or map)
+    return found and found["map_error"]
 
 
 def test_references_are_measured_after_the_map_was_laid_over_the_truth():
-    turned = [(10 - y, 3 + x) for x, y in SQUARE]
-    wide = [(2 * x, 2 * y) for x, y in SQUARE]
-    events, truth, map = learned(wide)
-    found = MapPoseErrors().step(CTX, events, truth, map, learned(turned)[2]).metrics.values["map_error"]
-    assert found["references"] == 4
-    assert found["as_driven_m"] == pytest.approx(math.sqrt(2))
-    assert found["straightened_m"] == pytest.approx(0.0, abs=1e-12)
+    turned, wide = [(10 - y, 3 + x) for x, y in SQUARE], [(2 * x, 2 * y) for x, y in SQUARE]
+    assert map_error(*learned(wide), learned(turned)[2]) == {
+        "references": 4,
+        "as_driven_m": pytest.approx(math.sqrt(2)),
+        "straightened_m": pytest.approx(0.0, abs=1e-12),
+    }
 
 
 def test_an_error_is_the_root_mean_square():
     bent = [(0, 0), (2, 0), (4, 0), (6, 1)]
-    events, truth, map = learned(bent, truths=((0, 0), (2, 0), (4, 0), (6, 0)))
-    found = MapPoseErrors().step(CTX, events, truth, map, map).metrics.values["map_error"]
     angle = math.atan2(sum(y * (x - 3.0) for x, y in bent), sum((x - 3.0) ** 2 for x, _ in bent))
     cos, sin = math.cos(angle), math.sin(angle)
     left = [
         math.dist((cos * (x - 3.0) + sin * (y - 0.25), -sin * (x - 3.0) + cos * (y - 0.25)), (x - 3.0, 0.0))
         for x, y in bent
     ]
+    found = map_error(*learned(bent, [(0, 0), (2, 0), (4, 0), (6, 0)]))
     assert found["as_driven_m"] == pytest.approx(math.sqrt(sum(error**2 for error in left) / 4))
 
 
 def test_a_reference_without_a_true_pose_does_not_count_and_two_are_too_few():
     wrong = [*SQUARE[:3], (77, 77)]
-    events, truth, map = learned(wrong, truths=((0, 0), (2, 0), (2, 2), None))
-    found = MapPoseErrors().step(CTX, events, truth, map, map).metrics.values["map_error"]
+    found = map_error(*learned(wrong, [*SQUARE[:3], None]))
     assert (found["references"], found["as_driven_m"]) == (3, pytest.approx(0.0, abs=1e-12))
-    few = learned(wrong, truths=((0, 0), (2, 0), None, None))
-    assert MapPoseErrors().step(CTX, *few, few[2]).metrics is None
+    assert map_error(*learned(wrong, [*SQUARE[:2], None, None])) is None
 
 
 def test_a_map_of_true_poses_or_of_none_is_not_measured():
-    true = learned(SQUARE, source="truth")
-    assert MapPoseErrors().step(CTX, *true, true[2]).metrics is None
-    empty = learned([])
-    assert MapPoseErrors().step(CTX, *empty, empty[2]).metrics is None
+    assert map_error(*learned(SQUARE, source="truth")) is None
+    assert map_error(*learned([])) is None
