@@ -2,13 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from measured_drives import figures, made_drive, on_x
 from scipy.optimize import minimize
-from small_run import collected, eight, small_run
+from small_run import eight, small_run
 
-from omninav.pipeline import Context, Tick
-from omninav.stages.fusion.pose_estimate import BeliefEstimate
-from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.metrics.map_size import MapSize
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.metrics.relative_errors import (
     RelativeErrors,
     absolute_trajectory_errors,
@@ -16,8 +14,6 @@ from omninav.stages.metrics.relative_errors import (
     pairs_apart,
     relative_pose_errors,
 )
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Pose
 
 
 @given(st.floats(-3, 3), st.floats(-9, 9), st.floats(-9, 9))
@@ -65,71 +61,40 @@ def test_relative_errors_agree_with_matrices_multiplied_one_by_one():
         assert degrees[number] == pytest.approx(abs(np.degrees(np.arctan2(error[1, 0], error[0, 0]))))
 
 
-def test_odometry_five_percent_too_long_errs_by_five_centimetres_per_metre_and_its_steps_turn_too_far():
-    truth = np.zeros((50, 3))
-    truth[:, 0] = np.arange(50) * 0.1
-    estimate = truth * 1.05
-    metres, degrees = relative_pose_errors(estimate, truth, *pairs_apart(truth, 1.0))
+def test_an_estimate_five_percent_too_long_errs_by_five_centimetres_per_metre():
+    truth = np.array(on_x(0.1 * n for n in range(50)))
+    metres, degrees = relative_pose_errors(truth * 1.05, truth, *pairs_apart(truth, 1.0))
     np.testing.assert_allclose(metres, 0.05, atol=1e-12)
     np.testing.assert_allclose(degrees, 0.0, atol=1e-12)
-    np.testing.assert_allclose(between(estimate[0], estimate[10])[0], 1.05)
-
-
-def test_the_stage_names_its_figures_and_gives_none_without_truth():
-    run = small_run(frames=40)
-    found = RelativeErrors().step(Context("relative"), run.drive).metrics.values
-    assert set(found) == {
-        "absolute_trajectory_error_m",
-        "unaligned_trajectory_error_m",
-        "relative_position_error_m",
-        "relative_heading_error_deg",
-        "relative_error_distance_m",
-    }
-    blind = RelativeErrors().step(Context("relative"), run.blind)
-    assert blind.metrics.values == {}
-
-
-def test_a_maps_size_is_that_of_its_arrays():
-    run, ctx = small_run(frames=2), Context("map_size")
-    found = MapSize().step(ctx, run.map).metrics.values["map"]
-    # 40 references of 10 x 20 float32 and 3 float64, 39 edges of 2 int64
-    assert found["size_bytes"] == 40 * (200 * 4 + 3 * 8) + 39 * 2 * 8
-    assert (found["references"], found["edges"]) == (40, 39)
-    assert ctx.facts["map_poses"] == "truth"
-
-
-def test_the_estimate_is_the_beliefs_own():
-    run = small_run(frames=1)
-    out = BeliefEstimate().step(Context("estimate"), run.beliefs[0])
-    assert out.estimate.pose.x == run.estimates[0].pose.x
 
 
 def test_figures_of_errors_worked_by_hand():
-    truth = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    truth = np.array(on_x(range(4)))
     estimate = np.add(truth, [(0.0, 1.0, 0.0), (0.0, -1.0, 0.1), (0.0, -1.0, 0.1), (0.0, 1.0, 0.4)])
-    ticks = [Tick(n, n) for n in range(4)]
-    seen = [PoseEstimate(Pose(*row), np.eye(3), 1.0, Pose(*row)) for row in estimate.tolist()]
-    drive = collected(ticks, [Pose(*row) for row in truth.tolist()], None, seen)
-    found = RelativeErrors().step(Context("relative"), drive).metrics.values
-    for name in ("absolute_trajectory_error_m", "unaligned_trajectory_error_m"):
-        assert found[name] == pytest.approx({"rmse": 1.0, "mean": 1.0, "median": 1.0, "max": 1.0})
+    drive = made_drive(truth, estimate)
+    even = pytest.approx({"rmse": 1.0, "mean": 1.0, "median": 1.0, "max": 1.0})
     turns = np.degrees([0.1, 0.0, 0.3])
-    assert found["relative_heading_error_deg"] == pytest.approx(
-        {"rmse": np.sqrt((turns**2).mean()), "mean": turns.mean(), "median": np.median(turns), "max": turns.max()}
-    )
-    assert found["relative_error_distance_m"] == 1.0
-    two = RelativeErrors().step(Context("relative"), drive.at(slice(2))).metrics.values
-    assert two["unaligned_trajectory_error_m"]["max"] == 1.0
-    assert RelativeErrors().step(Context("relative"), drive.at(slice(1))).metrics.values == {}
+    found = figures(RelativeErrors(), drive)
+    metres = found.pop("relative_position_error_m")
+    assert found == {
+        "absolute_trajectory_error_m": even,
+        "unaligned_trajectory_error_m": even,
+        "relative_heading_error_deg": pytest.approx(
+            {"rmse": np.sqrt((turns**2).mean()), "mean": turns.mean(), "median": np.median(turns), "max": turns.max()}
+        ),
+        "relative_error_distance_m": 1.0,
+    }
+    assert metres["mean"] == pytest.approx(relative_pose_errors(estimate, truth, *pairs_apart(truth, 1.0))[0].mean())
+    assert figures(RelativeErrors(), drive.at(slice(2)))["unaligned_trajectory_error_m"]["max"] == 1.0
+    assert figures(RelativeErrors(), drive.at(slice(1))) == figures(RelativeErrors(), made_drive([None] * 3)) == {}
 
 
 def test_only_frames_of_the_last_log_with_truth_and_estimate_are_compared_and_a_short_path_has_no_pair():
-    run = small_run(frames=20, logs=2)
-    drive = run.drive
+    drive = small_run(frames=20, logs=2).drive
     drive.truth[:20] += 100.0
     drive.truth[25] = np.nan
     drive.estimate[30] = np.nan
-    found = RelativeErrors(distance_m=1000.0).step(Context("relative"), drive).metrics.values
+    found = figures(RelativeErrors(distance_m=1000.0), drive)
     assert set(found) == {"absolute_trajectory_error_m", "unaligned_trajectory_error_m"}
     scored = [row for row in range(20, 40) if row not in (25, 30)]
     away = np.hypot(*(drive.estimate - drive.truth)[scored, :2].T)

@@ -1,38 +1,30 @@
-import itertools
-
 import numpy as np
 import pytest
-from small_run import collected
+from measured_drives import AT_ORIGIN, Row, figures, made_drive, on_x
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.revisit_error import RevisitError, first_against_later, over_visits, visit_numbers
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Motion, Pose
 
-CTX = Context("metric")
+MODULE = "omninav.stages.metrics.revisit_error"
 
 
 def there_and_back(times: int, drift: float, kept: float):
     """Along a line of 10 m and back, `times` times. Odometry drifts sideways by `drift` a metre, and the estimate is
     off by `kept` of what odometry was off by when it first came there."""
-    xs = np.concatenate([[*range(10), *range(10, 0, -1)]] * times).astype(float)
-    truth = [Pose(x + 0.5, 0.5, 0.0) for x in xs]
-    motion = [None, *(Motion(after.x - before.x, drift, 0.0) for before, after in itertools.pairwise(truth))]
-    poses = [Pose(true.x, 0.5 + kept * drift * (true.x - 0.5), 0.0) for true in truth]
-    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
-    return collected([Tick(n, n * 10**9) for n in range(len(truth))], truth, motion, estimates)
+    xs = np.concatenate([[*range(10), *range(10, 0, -1)]] * times) + 0.5
+    believed = [(x, 0.5 + kept * drift * (x - 0.5), 0.0) for x in xs]
+    return made_drive(on_x(xs, 0.5), believed, [None, *[(step, drift, 0.0) for step in np.diff(xs)]])
 
 
-def test_errors_are_those_of_the_odometry_of_the_first_visit(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("omninav.stages.metrics.revisit_error.AWAY_M", 0.5)
-    found = RevisitError().step(CTX, there_and_back(3, 0.1, 1.0)).metrics.values["first_visits"]
-    assert found["places"] == 11
-    assert found["ratio"] == pytest.approx(1.0)
-    assert found["correlation"] == pytest.approx(1.0)
-    monkeypatch.setattr("omninav.stages.metrics.revisit_error.AWAY_M", 0.5)
-    halved = RevisitError().step(CTX, there_and_back(3, 0.1, 0.5)).metrics.values["first_visits"]
-    assert halved["ratio"] == pytest.approx(0.5)
-    assert halved["odometry_error_m"] == pytest.approx(0.5)
+@pytest.mark.parametrize("kept", [1.0, 0.5])
+def test_errors_are_those_of_the_odometry_of_the_first_visit(kept: float, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.AWAY_M", 0.5)
+    assert figures(RevisitError(), there_and_back(3, 0.1, kept))["first_visits"] == {
+        "places": 11,
+        "ratio": pytest.approx(kept),
+        "correlation": pytest.approx(1.0),
+        "odometry_error_m": pytest.approx(0.5),
+        "position_error_m": pytest.approx(0.5 * kept),
+    }
 
 
 def test_a_place_is_visited_again_once_the_robot_has_been_away():
@@ -44,8 +36,8 @@ def test_a_place_is_visited_again_once_the_robot_has_been_away():
 def test_each_number_of_visits_has_its_own_mean(monkeypatch: pytest.MonkeyPatch):
     drive = there_and_back(2, 0.1, 1.0)
     drive.estimate[20:, 1] += 1.0  # the second time
-    monkeypatch.setattr("omninav.stages.metrics.revisit_error.AWAY_M", 0.5)
-    visits = RevisitError().step(CTX, drive).metrics.values["visits"]
+    monkeypatch.setattr(f"{MODULE}.AWAY_M", 0.5)
+    visits = figures(RevisitError(), drive)["visits"]
     # The nine places between the ends are passed four times, 0.1 to 0.9 m off; the ends twice.
     assert visits == {"number": [1, 2, 3, 4], "position_error_m": pytest.approx([0.5, 0.5, 1.5, 1.5]), "places": 9}
 
@@ -65,38 +57,33 @@ def test_every_place_counts_alike_however_many_frames_a_visit_has():
 
 
 def test_nothing_is_measured_without_truth():
-    blind = collected([Tick(0, 0)], [None])
-    assert RevisitError().step(CTX, blind).metrics.values == {}
+    assert figures(RevisitError(), made_drive([None])) == {}
+
+
+def seen_at(places: list[Row], errors: list[float] | float = 1.0):
+    """`visits` of a robot that was at these true poses, with estimates so far (m) to the side."""
+    truth = np.array(places)
+    offsets = np.outer(np.broadcast_to(errors, len(truth)), (0.0, 1.0, 0.0))
+    (visits,) = figures(RevisitError(), made_drive(truth, truth + offsets)).values()
+    return visits
 
 
 def test_a_place_is_a_square_of_a_metre_and_another_visit_begins_beyond_five():
-    stage = RevisitError()
     xs = [0.1, 0.9, 1.1, 3.0, 0.5, 5.0, 0.5]  # back in the first cell after 4.4 m, and after 9 m
-    truth = [Pose(x, -0.5, 0.0) for x in xs]
-    seen = [PoseEstimate(Pose(x, k - 0.5, 0.0), np.eye(3), 1.0, Pose(x, 0.0, 0.0)) for k, x in enumerate(xs)]
-    visits = stage.step(CTX, collected([Tick(n, n) for n in range(7)], truth, None, seen)).metrics.values
     # At their first visits four places are off by (0 + 1 + 4) / 3, 2, 3 and 5 m; only one comes twice.
     first = (5 / 3 + 2.0 + 3.0 + 5.0) / 4
-    assert visits == {"visits": {"number": [1], "position_error_m": [pytest.approx(first)], "places": 4}}
-
-
-def seen_at(places: list[tuple[float, float, float]]):
-    """`visits` of a robot that was at these true poses, with estimates 1 m off."""
-    truth = [Pose(*place) for place in places]
-    seen = [PoseEstimate(Pose(x, y + 1.0, turn), np.eye(3), 1.0, Pose(x, y, turn)) for x, y, turn in places]
-    drive = collected([Tick(n, n) for n in range(len(truth))], truth, None, seen)
-    return RevisitError().step(CTX, drive).metrics.values["visits"]
+    visits = seen_at(on_x(xs, -0.5), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    assert visits == {"number": [1], "position_error_m": [pytest.approx(first)], "places": 4}
 
 
 def test_a_place_is_a_cell_of_the_floor_whichever_way_the_robot_looks(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("omninav.stages.metrics.revisit_error.PLACE_M", 2.0)
-    places = [(0.5, 0.5, 0.0), (1.5, 1.5, 2.0), (2.0, 0.5, 0.0), (0.5, 2.5, 0.0)]
+    monkeypatch.setattr(f"{MODULE}.PLACE_M", 2.0)
+    places: list[Row] = [(0.5, 0.5, 0.0), (1.5, 1.5, 2.0), (2.0, 0.5, 0.0), (0.5, 2.5, 0.0)]
     assert seen_at(places) == {"number": [1], "position_error_m": [1.0], "places": 3}
 
 
 def test_five_and_a_half_metres_are_away():
-    found = seen_at([(0.5, 0.0, 0.0), (3.25, 0.0, 0.0), (0.5, 0.0, 0.0), (3.25, 0.0, 0.0)])
-    assert found == {"number": [1, 2], "position_error_m": [1.0, 1.0], "places": 2}
+    assert seen_at(on_x([0.5, 3.25, 0.5, 3.25])) == {"number": [1, 2], "position_error_m": [1.0, 1.0], "places": 2}
 
 
 def test_figures_are_means_over_the_places_that_were_visited_again():
@@ -123,14 +110,11 @@ def test_figures_are_means_over_the_places_that_were_visited_again():
 
 
 def test_a_log_begins_elsewhere_and_frames_without_truth_or_estimate_do_not_count():
-    pose = Pose(0.5, 0.5, 0.0)
-    seen = [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 6
-    ticks = [Tick(n, n, n // 2, n % 2) for n in range(6)]
-    motion = [None, Motion(0.0, 0.0, 0.0)] * 3
-    truth = [pose, pose, pose, pose, None, None]
-    found = RevisitError().step(CTX, collected(ticks, truth, motion, [*seen[:3], None, *seen[4:]])).metrics
-    assert found.values["visits"] == {"number": [1, 2], "position_error_m": [0.0, 0.0], "places": 1}
-    assert found.values["first_visits"]["places"] == 1
+    here = (0.5, 0.5, 0.0)
+    truth, believed = [*[here] * 4, None, None], [*[here] * 3, None, *[here] * 2]
+    found = figures(RevisitError(), made_drive(truth, believed, [None, AT_ORIGIN] * 3, [0, 0, 1, 1, 2, 2]))
+    assert found["visits"] == {"number": [1, 2], "position_error_m": [0.0, 0.0], "places": 1}
+    assert found["first_visits"]["places"] == 1
 
 
 def test_visits_are_told_apart_by_the_path_and_not_by_frames():

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_run import collected, small_run
+from measured_drives import AT_ORIGIN, made_drive
+from small_run import small_run
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import chain
 from omninav.stages.geometry.plane.smoothing import contradicted, smoothed, smoothed_with_lag
@@ -14,7 +15,7 @@ from omninav.stages.metrics.smoothed_trajectory import SmoothTrajectory
 from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.pose import Pose
 
 FRAMES = 80
 CTX = Context("smoothing")
@@ -84,18 +85,13 @@ def test_every_log_is_smoothed_and_written(tmp_path: Path):
         out.metrics.values["smoothed"]["position_error_m"]["mean"]
         < position_errors(drive.last_log.estimate, drive.last_log.truth).mean() + 0.01
     )
-    ctx = Context("file")
-    ctx.folder = tmp_path
-    TrajectoryFile(name="trajectory_smoothed").step(ctx, out.drive)
+    TrajectoryFile(name="trajectory_smoothed").step(Context("file", folder=tmp_path), out.drive)
     assert len((tmp_path / "trajectory_smoothed.tum").read_text().splitlines()) == 40
     assert (tmp_path / "trajectory_smoothed_0.tum").is_file()
 
 
 def test_without_odometry_nothing_is_smoothed():
-    pose = Pose(0.0, 0.0, 0.0)
-    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 3
-    drive = collected([Tick(n, n) for n in range(3)], [pose] * 3, estimates=estimates)
-    assert SmoothTrajectory().step(CTX, drive).drive is None
+    assert SmoothTrajectory().step(CTX, made_drive([AT_ORIGIN] * 3, [AT_ORIGIN] * 3)).drive is None
     assert SmoothTrajectory(lag=2).step(CTX, small_run(frames=12).blind).metrics is None
 
 
@@ -112,8 +108,7 @@ def beside(confidence: float | None = None, frame: int = 0, lost_m: float = 2.5)
     rows = zip(estimates.tolist(), covariances, strict=True)
     seen = [PoseEstimate(Pose(*row), covariance, 1.0, Pose(*row)) for row, covariance in rows]
     told = [None if confidence is None or k < frame else PoseConfidence(confidence) for k in range(FRAMES)]
-    poses, steps = [Pose(*row) for row in truth.tolist()], [Motion(*row) for row in motions[1:].tolist()]
-    drive = collected([Tick(k, k, 0, k) for k in range(FRAMES)], poses, [None, *steps], seen, confidences=told)
+    drive = made_drive(truth, motion=[None, *motions[1:]], estimates=seen, confidences=told)
     return SmoothTrajectory(lost_m=lost_m).step(CTX, drive)
 
 
