@@ -1,10 +1,12 @@
 """Right matches before the first wrong one, of made-up pictures whose points are known."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 import pytest
+from measured_drives import figures
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
@@ -26,8 +28,13 @@ from omninav.stages.values.pose import Pose
 RNG = np.random.default_rng(5)
 POINTS = RNG.uniform((-8.0, -8.0, -1.0), (8.0, 8.0, 2.0), (40, 3))
 LOOKS = RNG.integers(0, 255, (40, 128)).astype(np.uint8)
-
+AS_FAR_APART = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
 APART_M = "omninav.stages.metrics.first_matches.APART_M"
+Search = Literal["both_ways", "one_way"]
+Best = Literal["clearest", "nearest"]
+both_searches = pytest.mark.parametrize("search", ["both_ways", "one_way"])
+both_orders = pytest.mark.parametrize("best", ["clearest", "nearest"])
+Patches, Columns = tuple[LocalFeatures, Depths], tuple[VerticalSegments, Depths]
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +42,18 @@ def one_metre_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(APART_M, (1.0,))
 
 
-def seen(x: float, swapped: bool = False) -> tuple[LocalFeatures, Depths]:
+def matches(
+    one: Patches | Columns, other: Patches | Columns, known: Sequence[bool] = (True, True), lens=(), **parameters
+) -> dict:
+    """What is found of two images a metre apart; `known`: of which of them the depths are."""
+    features = [one[0], other[0]]
+    depths = [depth if there else None for (_, depth), there in zip((one, other), known, strict=True)]
+    if isinstance(one[0], VerticalSegments):
+        return figures(FirstMatches(by="columns", **parameters), AS_FAR_APART, (), features, depths, lens)["matches"]
+    return figures(FirstMatches(**parameters), AS_FAR_APART, features, (), depths, lens)["matches"]
+
+
+def around(x: float, swapped: bool = False) -> Patches:
     """All points from x metres along the way; `swapped`: the last two look like each other's place."""
     away = POINTS - (x, 0.0, 0.0)
     metres = np.linalg.norm(away, axis=1)
@@ -47,27 +65,15 @@ def seen(x: float, swapped: bool = False) -> tuple[LocalFeatures, Depths]:
     return LocalFeatures(away / metres[:, None], *nothing), Depths(metres, np.zeros((0, 2)))
 
 
-Search = Literal["both_ways", "one_way"]
-Best = Literal["clearest", "nearest"]
-
-
-def judged(swapped: bool, search: Search = "both_ways", best: Best = "clearest") -> dict[str, float]:
-    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 0.4, 1.0)]
-    views = [seen(0.0), seen(0.4), seen(1.0, swapped)]
-    stage = FirstMatches(search=search, best=best)
-    out = stage.step(Context("m"), poses, [view for view, _ in views], (), [depths for _, depths in views])
-    return dict(out.metrics.values["matches"]["apart"][0])
-
-
-@pytest.mark.parametrize("search", ["both_ways", "one_way"])
-@pytest.mark.parametrize("best", ["clearest", "nearest"])
+@both_searches
+@both_orders
 def test_without_a_wrong_match_all_are_counted(search: Search, best: Best) -> None:
-    found = judged(False, search=search, best=best)
+    found = matches(around(0.0), around(1.0), search=search, best=best)["apart"][0]
     assert (found["pairs"], found["first_right"], found["right"], found["right_share"]) == (1, 40.0, 40.0, 1.0)
 
 
 def test_nothing_counts_behind_a_wrong_match() -> None:
-    found = judged(True, best="nearest")
+    found = matches(around(0.0), around(1.0, swapped=True), best="nearest")["all"]
     assert (found["first_right"], found["right"]) == (0.0, 38.0)
     assert found["by_chance"] < 0.1
 
@@ -77,13 +83,14 @@ def test_a_run_ends_at_the_first_wrong_one() -> None:
     assert run_of_right(np.array([True, True])) == 2
 
 
-def test_pairs_are_spread_over_the_log_and_as_far_apart_as_said() -> None:
-    poses = np.column_stack([np.arange(100) * 0.3, np.zeros(100), np.zeros(100)])
-    pairs = pairs_apart(poses, 2.0, 10)
-    assert len(pairs) == 10
-    assert {other - one for one, other in pairs} == {7}
-    assert pairs[0][0] == 0
-    assert pairs[-1][1] == 99
+def test_thirty_pairs_are_taken_of_each_distance_evenly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(APART_M, (0.5, 1.0, 2.0))
+    poses = np.column_stack([np.arange(100) * 0.5, np.zeros(100), np.zeros(100)])
+    found = figures(FirstMatches(), [Pose(*map(float, pose)) for pose in poses])["matches"]
+    assert [(each["m"], each["pairs"]) for each in found["apart"]] == [(0.5, 30), (1.0, 30), (2.0, 30)]
+    assert found["all"]["pairs"] == 90
+    assert pairs_apart(poses, 0.5, 3) == [(0, 1), (49, 50), (98, 99)]
+    assert pairs_apart(poses, 1.75, 3) == [(0, 4), (48, 52), (95, 99)]
     assert pairs_apart(poses, 1000.0, 10) == []
 
 
@@ -109,7 +116,7 @@ def turned(bearings: np.ndarray, axis: int, degrees: float) -> np.ndarray:
     return found
 
 
-def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) -> tuple[LocalFeatures, Depths]:
+def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) -> Patches:
     away = SIDES - (x, 0.0, 0.0)
     metres = np.linalg.norm(away, axis=1)
     bearings = turned(away / metres[:, None], axis, degrees)
@@ -119,41 +126,35 @@ def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) ->
     return patches, Depths(metres, np.zeros((0, 2)))
 
 
-def of_sides(axis=2, degrees=0.0, colour=0.0, known=True, lens=(), **parameters) -> dict:
-    views = [sides(0.0), sides(1.0, axis, degrees, colour)]
-    depths = [depth for _, depth in views] if known else ()
-    stage = FirstMatches(**parameters)
-    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-    out = stage.step(Context("m"), poses, [view for view, _ in views], (), depths, lens)
-    return out.metrics.values["matches"]
+def beside(degrees: float = 0.0, axis: int = 2, colour: float = 0.0, **parameters) -> dict:
+    """Of points to the sides that are seen turned in the second image."""
+    return matches(sides(0.0), sides(1.0, axis, degrees, colour), **parameters)
 
 
 @pytest.mark.parametrize(("degrees", "share"), [(1.9, 1.0), (2.1, 0.0)])
 def test_a_patch_is_right_up_to_two_degrees_from_where_its_partner_is_seen(degrees: float, share: float) -> None:
-    found = of_sides(degrees=degrees)
-    assert (found["depths_known"], found["all"]["pairs"]) == (1, 1)
-    assert found["all"]["right_share"] == share
+    found = beside(degrees)
+    assert (found["depths_known"], found["all"]["pairs"], found["all"]["right_share"]) == (1, 1, share)
 
 
 @pytest.mark.parametrize(("degrees", "share"), [(1.35, 1.0), (1.5, 0.0)])
 def test_without_depths_it_is_right_where_both_are_a_degree_from_one_plane(degrees: float, share: float) -> None:
-    found = of_sides(axis=0, degrees=degrees, known=False)
-    assert found["depths_known"] == 0
-    assert found["all"]["right_share"] == share
+    found = beside(degrees, axis=0, known=(False, False))
+    assert (found["depths_known"], found["all"]["right_share"]) == (0, share)
 
 
-@pytest.mark.parametrize("search", ["both_ways", "one_way"])
+@both_searches
 @pytest.mark.parametrize(("colour", "matched"), [(0.45, 20.0), (0.55, 0.0)])
 def test_patches_of_other_colours_are_not_matched(search: Search, colour: float, matched: float) -> None:
-    assert of_sides(colour=colour, search=search)["all"]["right"] == matched
+    assert beside(colour=colour, search=search)["all"]["right"] == matched
 
 
 @pytest.mark.parametrize(("degrees", "share"), [(3.9, 1.0), (4.1, 0.0)])
 def test_a_large_patch_is_right_up_to_half_of_its_diameter(degrees: float, share: float) -> None:
-    assert of_sides(degrees=degrees, lens=(None, LENS))["all"]["right_share"] == share
+    assert beside(degrees, lens=(None, LENS))["all"]["right_share"] == share
 
 
-def columns(x: float, higher_deg: float = 0.0) -> tuple[VerticalSegments, Depths]:
+def columns(x: float, higher_deg: float = 0.0) -> Columns:
     """Twenty upright edges 40 m to the left, from 1 m below the camera to a metre above, their upper ends moved up."""
     feet = np.stack([np.linspace(-15.0, 15.0, 20) - x, np.full(20, 40.0)], axis=1)
     level = np.hypot(*feet.T)
@@ -164,60 +165,62 @@ def columns(x: float, higher_deg: float = 0.0) -> tuple[VerticalSegments, Depths
     return segments, Depths(np.zeros(0), np.hypot(level, 1.0)[:, None].repeat(2, axis=1))
 
 
-def of_columns(higher_deg: float = 0.0, known: bool = True, **parameters) -> dict:
-    views = [columns(0.0), columns(1.0, higher_deg)]
-    depths = [depth for _, depth in views] if known else ()
-    stage = FirstMatches(by="columns", **parameters)
-    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-    out = stage.step(Context("m"), poses, (), [view for view, _ in views], depths)
-    return out.metrics.values["matches"]["all"]
-
-
-@pytest.mark.parametrize("best", ["clearest", "nearest"])
+@both_orders
 @pytest.mark.parametrize(("degrees", "right"), [(0.0, 20.0), (2.9, 20.0), (3.1, 0.0)])
 def test_a_column_is_right_where_both_of_its_ends_are(best: Best, degrees: float, right: float) -> None:
-    found = of_columns(degrees, best=best)
-    assert (found["pairs"], found["right"]) == (1, right)
-    assert found["first_right"] == right
+    found = matches(columns(0.0), columns(1.0, degrees), best=best)["all"]
+    assert (found["pairs"], found["right"], found["first_right"]) == (1, right, right)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_column_is_wrong_where_one_of_its_ends_is(end: int) -> None:
+    second, far = columns(1.0)
+    elevations = second.elevations.copy()
+    elevations[:, end] += np.radians(9.0)
+    moved = dataclasses.replace(second, elevations=elevations)
+    assert matches(columns(0.0), (moved, far))["all"]["right"] == 0.0
 
 
 @pytest.mark.parametrize(("degrees", "right"), [(1.35, 20.0), (1.5, 0.0)])
 def test_without_depths_a_column_is_right_where_both_ends_are_in_a_plane(degrees: float, right: float) -> None:
-    assert of_columns(degrees, known=False)["right"] == right
+    assert matches(columns(0.0), columns(1.0, degrees), (False, False))["all"]["right"] == right
+
+
+@pytest.mark.parametrize("given", [(True, False), (False, True)])
+@pytest.mark.parametrize(
+    "pair", [(sides(0.0), sides(1.0, degrees=1.9)), (columns(0.0), columns(1.0, 2.0))], ids=["patches", "columns"]
+)
+def test_depths_of_one_view_alone_do_not_judge_a_match(pair: tuple, given: tuple[bool, bool]) -> None:
+    found = matches(*pair, known=given)
+    assert found["depths_known"] == 1
+    assert found["all"] == matches(*pair, known=(False, False))["all"]
 
 
 def test_patches_and_columns_are_counted_together_the_best_of_both_first() -> None:
     patches, segments = [sides(x) for x in (0.0, 1.0)], [columns(0.0), columns(1.0, 9.0)]
     depths = [Depths(one.patches, other.ends) for (_, one), (_, other) in zip(patches, segments, strict=True)]
-    given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], [each for each, _ in patches], [each for each, _ in segments]
-    found = {}
-    for by in ("patches", "columns", "both"):
-        stage = FirstMatches(by=by)
-        found[by] = stage.step(Context("m"), *given, depths).metrics.values["matches"]["all"]
-    assert [found[by]["right"] for by in found] == [20.0, 0.0, 20.0]
-    assert [found[by]["right_share"] for by in found] == [1.0, 0.0, 0.5]
+    given = AS_FAR_APART, [each for each, _ in patches], [each for each, _ in segments], depths
+    found = [figures(FirstMatches(by=by), *given)["matches"]["all"] for by in ("patches", "columns", "both")]
+    assert [each["right"] for each in found] == [20.0, 0.0, 20.0]
+    assert [each["right_share"] for each in found] == [1.0, 0.0, 0.5]
 
 
 def test_the_second_image_is_of_other_light_where_there_is_one() -> None:
-    given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     segments, depths = zip(columns(0.0), columns(1.0), strict=True)
     others, other_depths = zip(columns(0.0), columns(1.0, 9.0), strict=True)
-    stage = FirstMatches(by="columns")
-    plain = stage.step(Context("m"), given, (), segments, depths).metrics.values["matches"]["all"]
     lit = {"other_segments": others, "other_depths": other_depths}
-    other = stage.step(Context("m"), given, (), segments, depths, **lit).metrics.values["matches"]["all"]
+    given = FirstMatches(by="columns"), AS_FAR_APART, (), segments, depths
+    plain, other = (figures(*given, **more)["matches"]["all"] for more in ({}, lit))
     assert (plain["right"], plain["found_again"]) == (20.0, 1.0)
     assert (other["matched"], other["right"], other["found_again"]) == (20.0, 0.0, 0.0)
-    few = [segments[0], segments[1].chosen(slice(0, 5))]
-    found = stage.step(Context("m"), given, (), few, [depths[0], Depths(depths[1].patches, depths[1].ends[:5])])
-    assert found.metrics.values["matches"]["all"]["found_again"] == 0.25  # of twenty in the first image
+    few = segments[1].chosen(slice(0, 5)), Depths(depths[1].patches, depths[1].ends[:5])
+    assert matches(columns(0.0), few)["all"]["found_again"] == 0.25  # of twenty in the first image
 
 
 def test_a_pair_without_features_has_no_match_and_no_chance(monkeypatch: pytest.MonkeyPatch) -> None:
-    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     monkeypatch.setattr(APART_M, (1.0, 5.0))
-    found = FirstMatches().step(Context("m"), poses).metrics.values["matches"]
     none = {"right_share": None, "found_again": None, "by_chance": None}
+    found = figures(FirstMatches(), AS_FAR_APART)["matches"]
     assert found["apart"] == [
         {"m": 1.0, "pairs": 1, "matched": 0.0, "first_right": 0.0, "right": 0.0, **none},
         {"m": 5.0, "pairs": 0, "matched": None, "first_right": None, "right": None, **none},
@@ -226,9 +229,9 @@ def test_a_pair_without_features_has_no_match_and_no_chance(monkeypatch: pytest.
 
 
 def test_images_without_a_true_pose_make_no_pair() -> None:
-    poses = [None, Pose(0.0, 0.0, 0.0), Pose(0.9, 0.0, 0.0), Pose(1.0, 0.0, 0.0)]
-    views = [None, sides(0.0)[0], sides(0.9)[0], sides(1.0)[0]]
-    found = FirstMatches().step(Context("m"), poses, views).metrics.values["matches"]["all"]
+    poses = [None, *[Pose(x, 0.0, 0.0) for x in (0.0, 0.9, 1.0)]]
+    views = [None, *[sides(x)[0] for x in (0.0, 0.9, 1.0)]]
+    found = figures(FirstMatches(), poses, views)["matches"]["all"]
     assert (found["pairs"], found["right"]) == (1, 20.0)
 
 
@@ -247,11 +250,11 @@ def test_figures_of_pairs_are_medians_and_shares_of_all_matches() -> None:
     }
 
 
-def test_a_partner_of_another_is_half_of_them_away() -> None:
-    pairs = Pairs(np.arange(5), np.arange(5), np.zeros(5), np.zeros(5))
-    assert shifted(pairs).first.tolist() == [0, 1, 2, 3, 4]
-    assert shifted(pairs).second.tolist() == [3, 4, 0, 1, 2]
-    assert shifted(pairs.chosen(np.array([0]))).second.tolist() == [0]
+@pytest.mark.parametrize("partners", [[0], [1, 0], [2, 0, 1], [3, 4, 0, 1, 2]])
+def test_a_partner_of_another_is_half_of_them_away_and_at_least_one(partners: list[int]) -> None:
+    number = len(partners)
+    pairs = shifted(Pairs(np.arange(number), np.arange(number), np.zeros(number), np.zeros(number)))
+    assert (pairs.first.tolist(), pairs.second.tolist()) == (list(range(number)), partners)
 
 
 def test_half_a_patch_is_the_less_of_across_and_down_and_nothing_where_the_lens_does_not_see() -> None:
@@ -262,26 +265,31 @@ def test_half_a_patch_is_the_less_of_across_and_down_and_nothing_where_the_lens_
     assert np.degrees(half_widths(patches, lens)) == pytest.approx([4.0, 4.0], abs=0.01)
 
 
-def test_thirty_pairs_are_taken_of_each_distance_evenly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(APART_M, (0.5, 1.0, 2.0))
-    poses = np.column_stack([np.arange(100) * 0.5, np.zeros(100), np.zeros(100)])
-    truth = [Pose(*map(float, pose)) for pose in poses]
-    found = FirstMatches().step(Context("m"), truth).metrics.values["matches"]
-    assert [(each["m"], each["pairs"]) for each in found["apart"]] == [(0.5, 30), (1.0, 30), (2.0, 30)]
-    assert found["all"]["pairs"] == 90
-    assert pairs_apart(poses, 0.5, 3) == [(0, 1), (49, 50), (98, 99)]
+@pytest.mark.parametrize("step", [(1, 0), (-1, 0), (0, 1), (0, -1), None])
+def test_half_a_patch_is_what_the_lens_sees_of_it(step: tuple[int, int] | None) -> None:
+    patches = sides(0.0)[0].chosen(np.array([0]))
+    middle, reach = patches.points[0], patches.sizes[0] / 2.0
+    edge = turned(patches.bearings, 2, 5.0)
+
+    class Keyhole(Equirectangular):
+        """A lens that sees one of the patch's four ends."""
+
+        def unproject(self, points):
+            seen = step is not None and np.allclose(points[0], middle + reach * np.array(step))
+            return (edge if seen else np.full((1, 3), np.nan)), np.array([seen])
+
+    widths = np.degrees(half_widths(patches, Keyhole(360, 90, 180.0)))
+    apart = np.degrees(np.arccos(np.clip(patches.bearings[0] @ edge[0], -1.0, 1.0)))
+    assert widths == pytest.approx([0.0 if step is None else apart], abs=1e-6)
 
 
 def looking(first: np.ndarray, second: np.ndarray, **parameters) -> dict[str, float]:
     """What is found of two views of points far to the sides, a metre apart, that look so: descriptors (20, 128)."""
-    views = [
-        dataclasses.replace(sides(x)[0], descriptors=looks.astype(np.uint8), colours=np.full((len(looks), 3), 0.3))
-        for x, looks in ((0.0, first), (1.0, second))
-    ]
-    depths = [sides(x)[1] for x in (0.0, 1.0)]
-    stage = FirstMatches(**parameters)
-    out = stage.step(Context("m"), [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], views, (), depths)
-    return dict(out.metrics.values["matches"]["all"])
+    views = []
+    for x, looks in ((0.0, first), (1.0, second)):
+        patches, depths = sides(x)
+        views.append((dataclasses.replace(patches, descriptors=looks.astype(np.uint8)), depths))
+    return matches(*views, **parameters)["all"]
 
 
 PLAIN = np.clip(LOOKS[:20], 20, 200).astype(np.int64)
@@ -293,7 +301,7 @@ def with_entry(looks: np.ndarray, row: int, entry: int, more: int) -> np.ndarray
     return changed
 
 
-@pytest.mark.parametrize("search", ["both_ways", "one_way"])
+@both_searches
 def test_the_clearest_come_first_or_the_nearest(search: Search) -> None:
     # Two that look alike but for 10, and are seen as each other, 3 off; all others far from each other, and 50 off.
     first = PLAIN.copy()
@@ -324,52 +332,3 @@ def test_a_partner_is_clearer_than_the_second_by_a_fifth(second_nearest: float, 
     first = PLAIN.copy()
     first[1] = 255 - first[1]
     assert looking(first, second, search="one_way")["matched"] == matched - 1.0  # none looks like the second patch
-
-
-@pytest.mark.parametrize("given", [(True, False), (False, True)])
-def test_depths_of_one_view_alone_do_not_judge_a_match(given: tuple[bool, bool]) -> None:
-    views, poses = [sides(0.0), sides(1.0, axis=2, degrees=1.9)], [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-    depths = [depth if there else None for (_, depth), there in zip(views, given, strict=True)]
-    found = FirstMatches().step(Context("m"), poses, [view for view, _ in views], (), depths)
-    assert found.metrics.values["matches"]["depths_known"] == 1
-    assert found.metrics.values["matches"]["all"] == of_sides(degrees=1.9, known=False)["all"]
-    uprights = [columns(0.0), columns(1.0, 2.0)]
-    depths = [depth if there else None for (_, depth), there in zip(uprights, given, strict=True)]
-    stage = FirstMatches(by="columns")
-    found = stage.step(Context("m"), poses, (), [view for view, _ in uprights], depths)
-    assert found.metrics.values["matches"]["all"] == of_columns(2.0, known=False)
-
-
-def test_a_column_is_wrong_where_its_lower_end_is() -> None:
-    (first, near), (second, far) = columns(0.0), columns(1.0)
-    for end in (0, 1):
-        elevations = second.elevations.copy()
-        elevations[:, end] += np.radians(9.0)
-        views = [first, dataclasses.replace(second, elevations=elevations)]
-        poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
-        out = FirstMatches(by="columns").step(Context("m"), poses, (), views, [near, far])
-        assert out.metrics.values["matches"]["all"]["right"] == 0.0
-
-
-def test_the_partner_of_another_is_at_least_one_away() -> None:
-    for number, partners in ((2, [1, 0]), (3, [2, 0, 1])):
-        pairs = Pairs(np.arange(number), np.arange(number), np.zeros(number), np.zeros(number))
-        assert shifted(pairs).second.tolist() == partners
-
-
-@pytest.mark.parametrize("step", [(1, 0), (-1, 0), (0, 1), (0, -1), None])
-def test_half_a_patch_is_what_the_lens_sees_of_it(step: tuple[int, int] | None) -> None:
-    patches = sides(0.0)[0].chosen(np.array([0]))
-    middle, reach = patches.points[0], patches.sizes[0] / 2.0
-    edge = turned(patches.bearings, 2, 5.0)
-
-    class Keyhole(Equirectangular):
-        """A lens that sees one of the patch's four ends."""
-
-        def unproject(self, points):
-            seen = step is not None and np.allclose(points[0], middle + reach * np.array(step))
-            return (edge if seen else np.full((1, 3), np.nan)), np.array([seen])
-
-    widths = np.degrees(half_widths(patches, Keyhole(360, 90, 180.0)))
-    apart = np.degrees(np.arccos(np.clip(patches.bearings[0] @ edge[0], -1.0, 1.0)))
-    assert widths == pytest.approx([0.0 if step is None else apart], abs=1e-6)
