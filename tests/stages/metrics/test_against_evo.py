@@ -10,14 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import DRIVE, TOUR, Command
-from small_run import collected
+from measured_drives import figures, made_drive
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.metrics.relative_errors import RelativeErrors
 from omninav.stages.plots.trajectory_file import TrajectoryFile
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Pose
 
 EVO = Path(sys.executable).parent
 pytestmark = pytest.mark.skipif(not (EVO / "evo_ape").exists(), reason="evo is not installed: pip install -e '.[dev]'")
@@ -39,29 +36,16 @@ def assert_same(ours: dict[str, float], theirs: dict[str, float]) -> None:
     assert ours == pytest.approx({name: theirs[name] for name in ("rmse", "mean", "median", "max")}, abs=SAME)
 
 
-def test_the_absolute_error_of_a_run_is_evos(omninav: Command, tmp_path: Path):
-    omninav("variant=plain_matching", f"tour={TOUR}", f"log={DRIVE}", check=True)
-    run = tmp_path / "runs" / "latest"
-    ours = json.loads((run / "metrics.json").read_text())["absolute_trajectory_error_m"]
-    assert_same(ours, evo(run, "evo_ape", "--align"))
-
-
-def test_relative_errors_are_evos(tmp_path: Path):
+def test_absolute_and_relative_errors_are_evos(tmp_path: Path):
     """Of a robot that takes equal steps, so that the first image 1 m further on is also the one nearest to 1 m."""
     rng, step_m = np.random.default_rng(8), 0.25
     headings = np.cumsum(rng.normal(0.0, 0.2, 60))
     steps = step_m * np.column_stack([np.cos(headings), np.sin(headings)])
     truth = np.column_stack([np.cumsum(steps, axis=0), headings])
     estimate = truth + rng.normal(0.0, (0.1, 0.1, 0.05), truth.shape)
-    ticks = [Tick(n, (n + 1) * 10**9, 0, n, n == 0) for n in range(len(truth))]
-    poses = [Pose(*map(float, pose)) for pose in estimate]
-    drive = collected(
-        ticks,
-        [Pose(*map(float, pose)) for pose in truth],
-        estimates=[PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses],
-    )
+    drive = made_drive(truth, estimate)
     TrajectoryFile().step(Context("file", folder=tmp_path), drive)
-    ours = RelativeErrors(distance_m=1.0).step(Context("errors"), drive).metrics.values
+    ours = figures(RelativeErrors(distance_m=1.0), drive)
     pairs = ("evo_rpe", "--delta", "1", "--delta_unit", "m", "--all_pairs", "--pairs_from_reference")
     assert_same(ours["relative_position_error_m"], evo(tmp_path, *pairs, "--pose_relation", "trans_part"))
     assert_same(ours["relative_heading_error_deg"], evo(tmp_path, *pairs, "--pose_relation", "angle_deg"))
