@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from measured_drives import AT_ORIGIN, Row, figures, made_drive
 from scipy.stats import chi2, mannwhitneyu
-from small_run import collected
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.pipeline.report.key_figures import key_figures
 from omninav.stages.geometry.probability.calibration import (
     area_under_roc,
@@ -66,9 +66,12 @@ def made(confidences: list[float | None], sigma: float = 0.3) -> Drive:
     x = rng.normal(0.0, 0.3, (number, 2)) + np.where(np.arange(number) >= 0.75 * number, 5.0, 0.0)[:, None]
     covariance = np.diag([sigma**2, sigma**2, 0.01])
     estimates = [PoseEstimate(Pose(a, b, 0.0), covariance, 1.0, Pose(a, b, 0.0)) for a, b in x.tolist()]
-    ticks = [Tick(n, n * 10**9) for n in range(number)]
     told = [None if each is None else PoseConfidence(each) for each in confidences]
-    return collected(ticks, [Pose(0.0, 0.0, 0.0)] * number, estimates=estimates, confidences=told)
+    return made_drive([AT_ORIGIN] * number, estimates=estimates, confidences=told)
+
+
+def measured(drive: Drive, **parameters: float) -> dict:
+    return figures(Calibration(**parameters), drive)["calibration"]
 
 
 def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
@@ -79,15 +82,13 @@ def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
     assert drawn is not None
     assert b"confidence" in drawn.content
     assert "0.5 m and 10°" in drawn.caption
-    blind = Calibration().step(Context("calibration"), made([0.9] * 100 + [0.1] * 300)).metrics.values["calibration"]
+    blind = measured(made([0.9] * 100 + [0.1] * 300))
     assert blind["lost_auroc"] < 0.9
     assert blind["expected_error"] > found["expected_error"]
 
 
 def test_ellipses_hold_as_many_true_positions_as_they_say_and_fewer_where_they_are_too_small():
-    right = made([None] * 400)
-    right = right.at(np.arange(300))
-    out = Calibration().step(Context("calibration"), right)
+    out = Calibration().step(Context("calibration"), made([None] * 400).at(np.arange(300)))
     found = out.metrics.values["calibration"]
     assert found["ellipse_50"] == pytest.approx(0.5, abs=0.06)
     assert found["ellipse_95"] == pytest.approx(0.95, abs=0.03)
@@ -95,8 +96,7 @@ def test_ellipses_hold_as_many_true_positions_as_they_say_and_fewer_where_they_a
     assert out.reliability is None
     assert ReliabilityDiagram().step(Context("plot"), out.reliability).figure is None
     assert "expected_error" not in found
-    small = made([None] * 400, sigma=0.1).at(np.arange(300))
-    assert Calibration().step(Context("calibration"), small).metrics.values["calibration"]["ellipse_50"] < 0.2
+    assert measured(made([None] * 400, sigma=0.1).at(np.arange(300)))["ellipse_50"] < 0.2
 
 
 def test_squared_errors_over_covariances_are_chi_squared_and_a_flat_covariance_has_none():
@@ -115,41 +115,35 @@ def test_confidence_is_plotted_where_there_is_one():
     assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).figure is None
 
 
-TRUE = Pose(3.0, -2.0, 1.0)
+TRUE = (3.0, -2.0, 1.0)
 
 
-def beside(offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Pose | None]) -> Drive:
-    """Estimates that lie so far (m, m, degrees) from the true pose."""
-    poses = [Pose(TRUE.x + x, TRUE.y + y, TRUE.heading + np.radians(turn)) for x, y, turn in offsets]
-    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+def beside(
+    offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Row] | None = None, **parameters
+) -> dict:
+    """Of estimates that lie so far (m, m, degrees) from the true pose."""
+    believed = np.array(offsets) * (1.0, 1.0, np.pi / 180) + TRUE
     told = [PoseConfidence(each) for each in confidences]
-    return collected([Tick(n, n) for n in range(len(poses))], truth, estimates=estimates, confidences=told)
+    return measured(made_drive(truth or [TRUE] * len(offsets), believed, confidences=told), **parameters)
 
 
 def test_a_frame_is_right_within_both_tolerances_and_lost_beyond_its_own():
     offsets = [(0.5, 0, 0), (0.6, 0, 0), (0, 0, 10.1), (0, 2.5, 0), (0, 3.0, 0), (0, 0, -9.9), (9.0, 9.0, 0)]
-    drive = beside(offsets, [0.9, 0.4, 0.6, 0.5, 0.2, 0.55, 0.3], [TRUE] * 6 + [None])
-    found = Calibration().step(Context("calibration"), drive).metrics.values["calibration"]
+    found = beside(offsets, [0.9, 0.4, 0.6, 0.5, 0.2, 0.55, 0.3], [TRUE] * 6 + [None])
     assert found["right_share"] == pytest.approx(2 / 6)
     assert found["wrong_auroc"] == pytest.approx(7 / 8)  # 0.6 of a wrong frame is above 0.55 of a right one
     assert found["lost_auroc"] == 1.0
 
 
 def test_an_ellipse_ends_where_chi_squared_of_two_degrees_says():
-    offsets = [(1.17, 0, 0), (0, 1.185, 0), (2.44, 0, 0), (0, -2.455, 0)]
-    drive = beside(offsets, [0.5] * 4, [TRUE] * 4)
-    found = Calibration().step(Context("calibration"), drive).metrics.values["calibration"]
+    found = beside([(1.17, 0, 0), (0, 1.185, 0), (2.44, 0, 0), (0, -2.455, 0)], [0.5] * 4)
     assert (found["ellipse_50"], found["ellipse_95"]) == (0.25, 0.75)
     assert found["nees"] == pytest.approx(np.mean([1.17**2, 1.185**2, 2.44**2, 2.455**2]))
 
 
 def test_an_estimate_at_both_tolerances_is_right() -> None:
-    poses = [Pose(0.5, 0.0, np.pi / 2), Pose(0.5, 0.0, 1.6)]
-    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
-    told = [PoseConfidence(0.5)] * 2
-    drive = collected([Tick(0, 0), Tick(1, 1)], [Pose(0.0, 0.0, 0.0)] * 2, estimates=estimates, confidences=told)
-    found = Calibration(within_deg=90.0).step(Context("calibration"), drive).metrics.values["calibration"]
-    assert found["right_share"] == 0.5
+    drive = made_drive([AT_ORIGIN] * 2, [(0.5, 0.0, np.pi / 2), (0.5, 0.0, 1.6)], confidences=[PoseConfidence(0.5)] * 2)
+    assert measured(drive, within_deg=90.0)["right_share"] == 0.5
 
 
 @pytest.mark.parametrize(("sigma", "first"), [(0.3, ()), (0.1, ("calibration.ellipse_95",))])

@@ -21,13 +21,6 @@ def test_every_tick_has_its_row():
     assert drive.motion[1:12, 0].tolist() == [motion.x for motion in run.motion[1:12]]
 
 
-def test_contacts_and_metres_of_a_simulated_robot_are_kept():
-    ticks = [Tick(0, 0), Tick(1, 10**9)]
-    drive = collected(ticks, [None, None], tallies=[EpisodeStatistics(0, 0.0), EpisodeStatistics(2, 0.5)])
-    assert drive.collisions.tolist() == [0, 2]
-    assert drive.distance.tolist() == [0.0, 0.5]
-
-
 def test_sequences_of_different_length_are_an_error():
     with pytest.raises(ValueError, match="shorter"):
         collected([Tick(0, 0)], [])

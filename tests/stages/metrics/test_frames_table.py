@@ -3,14 +3,15 @@ import csv
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from small_run import collected, small_run
+from measured_drives import AT_ORIGIN, made_drive
+from small_run import small_run
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.metrics.frames_table import FramesTable, columns_of
 from omninav.stages.values.belief import PlaceBelief, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.evidence import ImageEvidence
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import BestMatch
 
 
@@ -31,13 +32,13 @@ def test_every_frame_has_a_row_in_both_files(tmp_path):
 
 
 def test_what_there_is_none_of_is_an_empty_cell(tmp_path):
-    (row,) = written(tmp_path, collected([Tick(0, 5)], [None]))
+    (row,) = written(tmp_path, made_drive([None]))
     assert {name for name, cell in row.items() if cell} == {"log", "frame", "stamp_ns", "time_s"}
 
 
 def test_errors_are_those_of_the_estimate_against_the_truth():
     belief = PlaceBelief(np.array([0.2, 0.8]), np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 3.0]]))
-    columns = columns_of(collected([Tick(0, 0)], [Pose(0.0, 0.0, -3.0)], estimates=[belief.estimate()]))
+    columns = columns_of(made_drive([(0.0, 0.0, -3.0)], estimates=[belief.estimate()]))
     assert columns["position_error_m"].tolist() == [5.0]
     assert columns["heading_error_deg"][0] == pytest.approx(np.degrees(2 * np.pi - 6.0))
     assert columns["place"].tolist() == [1]
@@ -45,17 +46,16 @@ def test_errors_are_those_of_the_estimate_against_the_truth():
 
 
 def test_a_match_says_what_looked_most_like_the_image(tmp_path):
-    drive = collected([Tick(0, 0), Tick(1, 1)], [None] * 2, matches=[BestMatch(7, 0.5, similarity=0.9), None])
-    first, second = written(tmp_path, drive)
+    matches = [BestMatch(7, 0.5, similarity=0.9), None]
+    first, second = written(tmp_path, made_drive([None] * 2, matches=matches))
     assert (first["reference"], first["similarity"], first["reference_turn"]) == ("7", "0.9", "0.5")
     assert (second["reference"], second["similarity"], first["visual_distance"]) == ("", "", "")
 
 
 def test_of_several_logs_too_a_state_or_conflict_that_is_not_known_is_an_empty_cell(tmp_path):
-    ticks = [Tick(k, k, log=k // 2) for k in range(4)]
     told = [None, PoseConfidence(0.2, "lost"), PoseConfidence(0.9), None]
     found = [ImageEvidence(), None, ImageEvidence(conflict="a clock"), None]
-    rows = written(tmp_path, collected(ticks, [None] * 4, confidences=told, evidence=found))
+    rows = written(tmp_path, made_drive([None] * 4, logs=[0, 0, 1, 1], confidences=told, evidence=found))
     assert [row["state"] for row in rows] == ["", "lost", "tracking", ""]
     table = parquet.read_table(tmp_path / "frames.parquet").to_pydict()
     assert table["state"] == [None, "lost", "tracking", None]
@@ -63,14 +63,15 @@ def test_of_several_logs_too_a_state_or_conflict_that_is_not_known_is_an_empty_c
 
 
 def test_a_run_without_frames_has_a_table_without_rows(tmp_path):
-    assert written(tmp_path, collected([], [])) == []
+    assert written(tmp_path, made_drive([])) == []
     assert parquet.read_table(tmp_path / "frames.parquet").num_rows == 0
 
 
 def test_every_column_holds_its_own_figure():
     covariance = np.array([[0.1, 0.2, 0.3], [0.2, 0.5, 0.6], [0.3, 0.6, 0.9]])
     seen = PoseEstimate(Pose(1.0, 2.0, 0.3), covariance, 0.7, Pose(4.0, 5.0, 0.6))
-    drive = collected([Tick(0, 7, 0, 3)], [Pose(-1.0, -2.0, -0.3)], [Motion(0.1, 0.2, 0.25)], [seen])
+    drive = made_drive([(-1.0, -2.0, -0.3)], motion=[(0.1, 0.2, 0.25)], estimates=[seen])
+    drive.frames[:], drive.stamps[:] = 3, 7
     columns = {name: column.tolist()[0] for name, column in columns_of(drive).items()}
     for name, pose in (("estimate", (1.0, 2.0, 0.3)), ("mean", (4.0, 5.0, 0.6)), ("truth", (-1.0, -2.0, -0.3))):
         assert tuple(columns[f"{name}_{axis}"] for axis in ("x", "y", "heading")) == pose
@@ -84,9 +85,7 @@ def test_every_column_holds_its_own_figure():
 
 def test_an_error_needs_both_truth_and_estimate_and_the_first_place_and_reference_are_none(tmp_path):
     seen = PlaceBelief(np.array([0.8, 0.2]), np.zeros((2, 3))).estimate()
-    drive = collected(
-        [Tick(k, k) for k in range(2)], [None, Pose(0.0, 0.0, 0.0)], None, [seen, None], None, [BestMatch(0, 0.0), None]
-    )
+    drive = made_drive([None, AT_ORIGIN], estimates=[seen, None], matches=[BestMatch(0, 0.0), None])
     columns = columns_of(drive)
     assert np.isnan(columns["position_error_m"]).all()
     assert np.isnan(columns["heading_error_deg"]).all()

@@ -1,13 +1,12 @@
 import math
 
 import pytest
-from small_run import collected
+from measured_drives import figures, made_drive, on_x
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.homing_errors import HomingErrors
 from omninav.stages.values.homing import HomingVector, PathProgress
-from omninav.stages.values.pose import Motion, Pose
 
+MODULE = "omninav.stages.metrics.homing_errors"
 EAST, NORTH = 0.0, math.pi / 2
 HOME = (2.0, 1.0, NORTH)
 PATH = [HOME, (2.0, 5.0, EAST), (2.0, 3.0, EAST), (2.0, 1.25, NORTH), (2.0, 0.5, NORTH + 0.1)]
@@ -31,11 +30,10 @@ VECTORS = [
 ]
 
 
-def homing(path=PATH, vectors=VECTORS, arrived=(True, False, False, True, True), **parameters):
-    ticks = [Tick(k, 2 * k * 10**9) for k in range(len(path))]
-    drive = collected(ticks, [pose and Pose(*pose) for pose in path])
-    metrics = HomingErrors(**parameters).step(Context("homing"), drive, vectors, [at(each) for each in arrived]).metrics
-    return metrics and metrics.values["homing"]
+def homing(path=PATH, vectors=VECTORS, arrived=(True, False, False, True, True), motion=None):
+    drive = made_drive(path, motion=motion, every_s=2.0)
+    found = figures(HomingErrors(), drive, vectors, [at(each) for each in arrived])
+    return found and found["homing"]
 
 
 def test_the_error_at_the_end_is_that_of_the_last_pose_however_close_it_came_before():
@@ -57,14 +55,10 @@ def test_it_begins_where_it_was_carried_to():
 
 
 def test_a_robot_that_drives_on_away_from_home_begins_where_it_was_put_down():
-    path = [(0.0, 0.0, EAST), (3.0, 0.0, EAST), (3.3, 0.0, EAST), (2.0, 0.0, EAST)]
-    motion = [None, Motion(0.0, 0.0, 0.0), Motion(0.3, 0.0, 0.0), Motion(-1.3, 0.0, 0.0)]
-    drive = collected([Tick(k, k * 10**9) for k in range(4)], [Pose(*pose) for pose in path], motion)
+    motion = [None, (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (-1.3, 0.0, 0.0)]
     vectors = [None, vector(EAST, 0.0, 7), vector(math.pi), vector(math.pi, 0.0, 8, "lost")]
-    found = (
-        HomingErrors().step(Context("homing"), drive, vectors, [at(False)] * 3 + [at(True)]).metrics.values["homing"]
-    )
-    assert (found["start_m"], found["time_s"], found["lost_rate"]) == (3.0, 2.0, pytest.approx(1 / 3))
+    found = homing(on_x([0.0, 3.0, 3.3, 2.0]), vectors, (False, False, False, True), motion)
+    assert (found["start_m"], found["time_s"], found["lost_rate"]) == (3.0, 4.0, pytest.approx(1 / 3))
     assert found["first"]["direction_error_deg"] == pytest.approx(180.0)
 
 
@@ -74,15 +68,13 @@ def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_fr
     assert found["inliers"] == 14.0
     degrees = [math.degrees(error) for error in (0.3, 0.38, 0.4)]
     assert list(found["direction_error_deg"].values()) == pytest.approx(degrees)
-    monkeypatch.setattr("omninav.stages.metrics.homing_errors.FROM_M", 0.1)
+    monkeypatch.setattr(f"{MODULE}.FROM_M", 0.1)
     assert homing()["direction_error_deg"]["max"] > 60.0
 
 
 def test_a_vector_at_from_m_itself_is_not_measured(monkeypatch: pytest.MonkeyPatch):
-    path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST)]
-    vectors = [None, vector(math.pi + 0.1), vector(math.pi + 0.7)]
-    monkeypatch.setattr("omninav.stages.metrics.homing_errors.FROM_M", 0.5)
-    found = homing(path, vectors, (False,) * 3)
+    monkeypatch.setattr(f"{MODULE}.FROM_M", 0.5)
+    found = homing(on_x([0.0, 4.0, 0.5]), [None, vector(math.pi + 0.1), vector(math.pi + 0.7)], (False,) * 3)
     assert found["direction_error_deg"]["max"] == pytest.approx(math.degrees(0.1))
 
 
@@ -91,15 +83,17 @@ def test_who_never_says_that_it_arrived_has_not():
     assert (found["arrived"], found["time_s"]) == (0, None)
 
 
-def test_it_has_reached_what_it_was_near_when_it_said_so(monkeypatch: pytest.MonkeyPatch):
-    path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST), (0.6, 0.0, EAST)]
-    vectors = [None, *[vector(math.pi)] * 3]
-    found = homing(path, vectors, (False, False, True, True))
-    assert (found["arrived"], found["reached"]) == (1, 1)
-    assert homing(path, vectors, (False, False, False, True))["reached"] == 0
-    monkeypatch.setattr("omninav.stages.metrics.homing_errors.WITHIN_M", 0.6)
-    assert homing(path, vectors, (False, False, False, True))["reached"] == 1
-    assert homing(path, vectors, (False,) * 4)["reached"] == 0
+@pytest.mark.parametrize(
+    ("arrived", "reached", "within_60_cm"),
+    [((False, False, True, True), 1, 1), ((False, False, False, True), 0, 1), ((False,) * 4, 0, 0)],
+)
+def test_it_has_reached_what_it_was_near_when_it_said_so(
+    arrived, reached, within_60_cm, monkeypatch: pytest.MonkeyPatch
+):
+    given = on_x([0.0, 4.0, 0.5, 0.6]), [None, *[vector(math.pi)] * 3], arrived
+    assert homing(*given)["reached"] == reached
+    monkeypatch.setattr(f"{MODULE}.WITHIN_M", 0.6)
+    assert homing(*given)["reached"] == within_60_cm
 
 
 def test_where_the_target_was_never_found_no_error_is_told():

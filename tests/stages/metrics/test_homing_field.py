@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.homing.first_view_target import FirstViewTarget, FirstViewTargetState
 from omninav.stages.metrics.homing_field import HomingFieldErrors
 from omninav.stages.plots.homing_vectors import ShowHomingVectors
@@ -23,46 +23,45 @@ def vector(direction: float, turn: float, state: Literal["new", "lost"] = "new")
     return HomingVector(1, direction, turn, 1.0, 1.0, 1.0, None, 20, state)
 
 
-def judged() -> HomingFieldErrors.Out:
-    # From (0.5, 0) looking back the target is ahead, and 0.4 - pi to turn; from (0, 1.5) it is to the right.
-    vectors = [None, vector(0.1, 0.4 - math.pi), vector(-math.pi / 2 - 0.3, 0.6), vector(0.0, 0.0, "lost")]
-    return HomingFieldErrors(rings=3).step(CTX, POSES, vectors)
+def field(poses: list[Pose | None], vectors: list[HomingVector | None], **parameters: float) -> HomingFieldErrors.Out:
+    return HomingFieldErrors(**parameters).step(CTX, poses, vectors)
+
+
+def values_of(poses: list[Pose | None], vectors: list[HomingVector | None], **parameters: float) -> dict:
+    return field(poses, vectors, **parameters).metrics.values["homing_field"]
+
+
+# From (0.5, 0) looking back the target is ahead, and 0.4 - pi to turn; from (0, 1.5) it is to the right.
+VECTORS = [None, vector(0.1, 0.4 - math.pi), vector(-math.pi / 2 - 0.3, 0.6), vector(0.0, 0.0, "lost")]
 
 
 def test_errors_are_angles_to_the_true_way_and_lost_views_count_as_half_a_turn() -> None:
-    values = judged().metrics.values["homing_field"]
-    assert values["views"] == 3
-    assert values["found_rate"] == pytest.approx(2 / 3)
-    assert values["median_deg"] == pytest.approx(math.degrees(0.3))
-    assert values["of_found_deg"] == pytest.approx(math.degrees(0.2))
-    assert values["turn_deg"] == pytest.approx(math.degrees(0.1))
-    by = values["by_distance"]
-    assert by["views"] == [1, 2, 0]
-    assert by["median_deg"][0] == pytest.approx(math.degrees(0.1))
-    assert by["median_deg"][2] is None
+    values = values_of(POSES, VECTORS, rings=3)
+    assert (values["views"], values["found_rate"]) == (3, pytest.approx(2 / 3))
+    angles = [values[name] for name in ("median_deg", "of_found_deg", "turn_deg")]
+    assert np.radians(angles) == pytest.approx([0.3, 0.2, 0.1])
+    assert values["by_distance"]["views"] == [1, 2, 0]
+    assert values["by_distance"]["median_deg"][::2] == [pytest.approx(math.degrees(0.1)), None]
     assert values["within"]["views"] == [1, 3, 3]
     assert values["within"]["found_rate"][1] == pytest.approx(2 / 3)
 
 
 def test_the_picture_has_a_dart_for_each_view_that_has_a_vector_and_one_for_the_target() -> None:
-    field = judged().field
-    assert field is not None
-    figure = ShowHomingVectors().step(CTX, field).figure
+    shown = field(POSES, VECTORS).field
+    assert shown is not None
+    figure = ShowHomingVectors().step(CTX, shown).figure
     assert figure is not None
-    assert figure.content.count(b"<polygon") == np.isfinite(field.directions).sum() + 1
+    assert figure.content.count(b"<polygon") == np.isfinite(shown.directions).sum() + 1
     assert "From 3 views" in figure.caption
     assert ShowHomingVectors().step(CTX).figure is None
 
 
 def test_without_another_view_there_is_no_field() -> None:
-    out = HomingFieldErrors().step(CTX, POSES[:1], [None])
-    assert out.metrics is None
-    assert out.field is None
+    out = field(POSES[:1], [None])
+    assert out.metrics is out.field is None
 
 
 def test_every_tick_but_the_first_has_a_target_of_its_own() -> None:
-    from omninav.pipeline import Tick
-
     nothing = np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 128), np.uint8)
     views = [
         LocalFeatures(*nothing, np.zeros((0, 3), np.float32), np.zeros(0, np.float32))
@@ -75,19 +74,15 @@ def test_every_tick_but_the_first_has_a_target_of_its_own() -> None:
     assert all(out.target.features is views[0] and out.features is views[0] for out in outs[1:])
 
 
-def field(poses: list[Pose | None], vectors: list[HomingVector | None], **parameters: float):
-    return HomingFieldErrors(**parameters).step(CTX, poses, vectors)
-
-
 def test_a_view_at_the_edge_of_two_rings_is_in_the_inner_one(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = [Pose(0.0, 0.0, 0.0), *[Pose(-x, 0.0, 0.0) for x in (0.5, 1.0, 2.0, 2.5)]]
-    values = field(poses, [None, *[vector(0.0, 0.0)] * 4], rings=2).metrics.values["homing_field"]
+    values = values_of(poses, [None, *[vector(0.0, 0.0)] * 4], rings=2)
     assert values["views"] == 4
     assert values["by_distance"]["to_m"] == [1.0, 2.0]
     assert values["by_distance"]["views"] == [2, 1]
     assert values["within"]["views"] == [2, 3]
     monkeypatch.setattr("omninav.stages.metrics.homing_field.WIDTH_M", 2.5)
-    wide = field(poses, [None, *[vector(0.0, 0.0)] * 4]).metrics.values["homing_field"]["by_distance"]
+    wide = values_of(poses, [None, *[vector(0.0, 0.0)] * 4])["by_distance"]
     assert wide["views"] == [4, *[0] * 7]
     assert wide["to_m"] == [2.5 * k for k in range(1, 9)]
 
@@ -105,6 +100,6 @@ def test_errors_are_medians_of_angles_the_short_way_around() -> None:
     poses = [Pose(0.0, 0.0, 3.0), *[Pose(float(x), 0.0, -3.0) for x in (1, 2, 3)]]
     ahead = math.pi + 3.0
     vectors = [None, *[vector(ahead + off, 6.0 + off) for off in (0.1, -0.2, 0.9)]]
-    values = field(poses, vectors).metrics.values["homing_field"]
+    values = values_of(poses, vectors)
     assert values["of_found_deg"] == pytest.approx(math.degrees(0.2))
     assert values["turn_deg"] == pytest.approx(math.degrees(0.2))

@@ -5,17 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_run import collected
+from measured_drives import figures, made_drive
 from two_views import unit
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.metrics.matched_and_tracked import MatchedAndTracked
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
-from omninav.stages.values.pose import Pose
 
 HOME, AWAY, HALF, NEAR = (1.0, 1.0, 0.3), (4.0, 1.0, 2.0), (3.0, 1.4, 2.2), (1.4, 1.05, 0.4)
 POSES = [HOME, AWAY, HALF, NEAR]
@@ -59,14 +57,12 @@ class Run:
     def track(self, bearings) -> TrackedFeatures:
         return TrackedFeatures(5, ROWS, np.full(N, TRACKED), np.zeros((N, 2)), bearings, self.places.copy())
 
-    def judged(self, **parameters):
+    def judged(self):
         ticks = len(self.poses)
-        drive = collected([Tick(k, k * 10**9) for k in range(ticks)], [Pose(*pose) for pose in self.poses])
-        target = HomingTarget(0, described(seen(self.poses[0])))
-        found = MatchedAndTracked(**parameters).step(
-            Context("pairs"), drive, self.maps, self.tracks, [target] * ticks, self.features, [self.matches] * ticks
-        )
-        return found.metrics and found.metrics.values["pairs"]
+        targets = [HomingTarget(0, described(seen(self.poses[0])))] * ticks
+        given = self.maps, self.tracks, targets, self.features, [self.matches] * ticks
+        found = figures(MatchedAndTracked(), made_drive(self.poses), *given)
+        return found and found["pairs"]
 
 
 def test_exact_pairs_are_all_right_and_have_no_noise():
@@ -150,8 +146,7 @@ def test_without_a_map_or_truth_there_is_nothing():
     run = Run()
     run.maps[1] = None
     assert run.judged() is None
-    drive = collected([Tick(k, k) for k in range(2)], [Pose(*HOME), None])
-    assert MatchedAndTracked().step(Context("pairs"), drive, *[[None, None]] * 5).metrics is None
+    assert figures(MatchedAndTracked(), made_drive([HOME, None]), *[[None, None]] * 5) is None
 
 
 def test_a_map_made_where_the_target_is_has_no_epipolar_plane():

@@ -6,19 +6,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_places import made_map
-from small_run import collected
+from measured_drives import AT_ORIGIN, figures, made_drive
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, lost_metres, shortest_metres
 from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Motion, Pose
 
 # 3 m east, then 4 m north; place 3 lies apart
 CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, (1, 2): 0})
 PLACES = np.array([0, 1, 2])
+
+
+def navigated(drive, ways, map=CORNER):
+    found = figures(Navigation(), drive, ways, map)
+    return found and found["navigation"]
 
 
 def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
@@ -26,26 +29,32 @@ def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
         each if isinstance(each, PlannedRoute) else PlannedRoute(PLACES, each, 0, "tired" if each == "gave up" else "")
         for each in states
     ]
-    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
-    truth = [Pose(x, y, 0.0) for x, y in spots]
     counts, metres = (np.broadcast_to(each, len(spots)).tolist() for each in (collisions, driven))
     tallies = [EpisodeStatistics(*each) for each in zip(counts, metres, strict=True)]
-    drive = collected(ticks, truth, tallies=tallies if tallied else None)
-    metrics = Navigation().step(Context("navigation"), drive, ways, map).metrics
-    return metrics.values["navigation"]
+    drive = made_drive([(x, y, 0.0) for x, y in spots], tallies=tallies if tallied else None)
+    return navigated(drive, ways, map)
 
 
 def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
     spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (3.0, 3.8)]
     found = ended(spots, ["under way", "under way", "arrived", "arrived"], driven=7.2)
-    assert found["reached"]
-    assert found["end_error_m"] == pytest.approx(0.2)
-    assert found["path_length_m"] == pytest.approx(7.2)
-    assert found["shortest_m"] == pytest.approx(7.0)
-    assert found["time_s"] == 2.0
-    assert (found["reached_rate"], found["collision_free_rate"]) == (1.0, 1.0)
-    assert (found["path_length_ratio"], found["time_per_metre_s"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
-    assert (found["goal"], found["routes"], found["collisions"]) == (2, 1, 0)
+    assert found == {
+        "reached": True,
+        "reached_rate": 1.0,
+        "collision_free_rate": 1.0,
+        "collisions": 0,
+        "end_error_m": pytest.approx(0.2),
+        "reached_error_m": pytest.approx(0.2),
+        "path_length_m": pytest.approx(7.2),
+        "shortest_m": pytest.approx(7.0),
+        "path_length_ratio": pytest.approx(7.2 / 7.0),
+        "time_s": 2.0,
+        "time_per_metre_s": pytest.approx(2.0 / 7.0),
+        "goal": 2,
+        "routes": 1,
+        "state": "arrived",
+        "reason": "",
+    }
 
 
 def test_of_a_real_robot_no_contacts_are_claimed_and_odometry_measures_its_path():
@@ -87,8 +96,9 @@ def test_of_a_map_of_odometry_it_is_not_said_where_its_places_are():
     assert (found["path_length_m"], found["state"]) == (5.0, "arrived")
 
 
-def test_the_time_of_a_drive_ends_when_it_gives_up():
-    assert ended([(0.0, 0.0)] * 4, ["under way", "gave up", "gave up", "gave up"])["time_s"] == 1.0
+@pytest.mark.parametrize(("states", "seconds"), [(["under way"] * 4, 3.0), (["under way", *["gave up"] * 3], 1.0)])
+def test_the_time_of_a_drive_ends_when_it_gives_up_or_else_with_it(states, seconds):
+    assert ended([(0.0, 0.0)] * 4, states)["time_s"] == seconds
 
 
 def test_the_shortest_way_begins_at_the_closest_view():
@@ -98,8 +108,7 @@ def test_the_shortest_way_begins_at_the_closest_view():
 
 
 def test_without_a_way_there_is_nothing_to_say():
-    tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
-    assert Navigation().step(Context("n"), collected([tick], [Pose(0.0, 0.0, 0.0)]), [None], CORNER).metrics is None
+    assert navigated(made_drive([AT_ORIGIN]), [None]) is None
 
 
 def test_the_goal_is_reached_up_to_half_a_metre_from_it():
@@ -107,26 +116,17 @@ def test_the_goal_is_reached_up_to_half_a_metre_from_it():
     assert reached == [True, False]
 
 
-def test_the_time_of_a_drive_that_has_not_ended_is_all_of_it():
-    assert ended([(0.0, 0.0)] * 4, ["under way"] * 4)["time_s"] == 3.0
-
-
 def test_the_last_route_that_was_planned_counts_and_it_is_the_third():
-    spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 0.0)]
     ways = [PlannedRoute(np.array([2, 1]), "under way", 0), PlannedRoute(np.array([0, 1]), "arrived", 2), None]
-    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(3)]
-    drive = collected(ticks, [Pose(x, y, 0.0) for x, y in spots], [None, Motion(3.0, 4.0, 0.1), Motion(0.5, 0.0, 0.0)])
-    found = Navigation().step(Context("navigation"), drive, ways, CORNER).metrics.values["navigation"]
+    truth, motion = [AT_ORIGIN, (3.0, 0.0, 0.0), (3.0, 0.0, 0.0)], [None, (3.0, 4.0, 0.1), (0.5, 0.0, 0.0)]
+    found = navigated(made_drive(truth, motion=motion), ways)
     assert (found["goal"], found["routes"], found["reached"], found["time_s"]) == (1, 3, True, 1.0)
     assert (found["path_length_m"], found["shortest_m"]) == pytest.approx((5.5, 3.0))
 
 
 def test_of_a_tally_that_ends_early_the_last_entry_counts():
-    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(4)]
     tallies = [EpisodeStatistics(0, 0.5), EpisodeStatistics(0, 1.5), EpisodeStatistics(1, 2.5), None]
-    drive = collected(ticks, [Pose(0.0, 0.0, 0.0)] * 4, tallies=tallies)
-    way = PlannedRoute(PLACES, "under way", 0)
-    found = Navigation().step(Context("navigation"), drive, [way] * 4, CORNER).metrics.values["navigation"]
+    found = navigated(made_drive([AT_ORIGIN] * 4, tallies=tallies), [PlannedRoute(PLACES, "under way", 0)] * 4)
     assert (found["path_length_m"], found["collisions"]) == (2.5, 1)
 
 
@@ -135,11 +135,9 @@ def test_who_was_at_the_goal_already_has_no_ratio_and_who_has_no_route_no_goal()
     assert (there["reached_rate"], there["shortest_m"], there["reached_error_m"]) == (1.0, 0.0, 0.0)
     assert not {"path_length_ratio", "time_per_metre_s"} & there.keys()
     nowhere = PlannedRoute(np.empty(0, np.int64), "gave up", 0, "no way")
-    drive = collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)])
-    found = Navigation().step(Context("navigation"), drive, [nowhere], CORNER).metrics.values["navigation"]
+    found = navigated(made_drive([AT_ORIGIN]), [nowhere])
     assert (found["goal"], found["end_error_m"], found["shortest_m"], found["reached"]) == (None, None, None, False)
-    blind = collected([Tick(0, 0)], [None])
-    assert Navigation().step(Context("navigation"), blind, [nowhere], CORNER).metrics is None
+    assert navigated(made_drive([None]), [nowhere]) is None
 
 
 def test_a_way_along_path_images_is_as_long_as_they_lie_apart():
@@ -153,13 +151,8 @@ def test_a_way_along_path_images_is_as_long_as_they_lie_apart():
 
 def test_on_a_map_of_references_the_goal_is_a_point_beside_them():
     routes = [PlannedRoute(np.array([0, 1]), "arrived", 0, goal=GoalPoint(4.0, 1.0)) for _ in range(2)]
-    graph = ReferenceGraph(
-        np.array([(0.0, 0.0, 0.0), (4.0, 0.0, 0.0)]),
-        np.zeros((2, 1, 1), np.float32),
-        "histograms",
-        np.array([(0, 1)], np.int64),
-        "truth",
-    )
+    poses, edges = np.array([AT_ORIGIN, (4.0, 0.0, 0.0)]), np.array([(0, 1)], np.int64)
+    graph = ReferenceGraph(poses, np.zeros((2, 1, 1), np.float32), "histograms", edges, "truth")
     found = ended([(0.0, 1.0), (4.0, 0.9)], routes, driven=6.6, map=graph)
     assert found["reached"]
     assert found["end_error_m"] == pytest.approx(0.1)

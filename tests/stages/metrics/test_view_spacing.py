@@ -1,13 +1,10 @@
 import numpy as np
 import pytest
-from small_run import collected
+from measured_drives import figures, made_drive
 
-from omninav.pipeline import Context
 from omninav.stages.metrics.view_spacing import ViewSpacing, spaced
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients
-
-CTX = Context("spacing")
 
 
 def a_map(views, places):
@@ -19,9 +16,9 @@ def a_map(views, places):
     return known
 
 
-def spacing(known, **parameters):
-    view = Coefficients(np.zeros(2, np.float32), np.zeros((36, 2), np.float32))
-    return ViewSpacing(**parameters).step(CTX, collected([], []), known, view).metrics.values
+def spacing(known, turned=0.0):
+    view = Coefficients(np.zeros(2, np.float32), np.full((36, 2), turned, np.float32))
+    return figures(ViewSpacing(), made_drive([]), known, view)
 
 
 def test_each_view_is_as_far_as_its_nearest_other_one_in_views_and_in_metres():
@@ -63,8 +60,7 @@ def test_places_lie_apart_in_any_direction_and_three_views_are_enough():
 
 def test_a_view_that_was_seen_turned_is_compared_as_it_is_kept():
     known = a_map([(0, 0), (1, 0), (3, 0)], [(0, 0), (1, 0), (2, 0)])
-    turned = Coefficients(np.zeros(2, np.float32), np.full((36, 2), 3.0, np.float32))
-    found = ViewSpacing().step(CTX, collected([], []), known, turned).metrics.values["spacing"]
+    found = spacing(known, turned=3.0)["spacing"]
     assert found["between_views"]["mean"] == pytest.approx((1 + 1 + 2) / 3)
 
 
