@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -39,8 +40,19 @@ class Loop:
         self.state = ClosedLoopState()
         self.source.setup(self.ctx)
 
-    def step(self, command: Command | None = None) -> ClosedLoop.Out | None:
-        return self.source.step(self.ctx, self.state, command)
+    def step(self, command: Command | None = None, *route: PlannedRoute | PathProgress | None) -> ClosedLoop.Out | None:
+        return self.source.step(self.ctx, self.state, command, *route)
+
+    def drive(self, command: Command | None = None, ticks: int = 10**6) -> list[ClosedLoop.Out]:
+        """So many ticks with one command, or all until it ends."""
+        outs: list[ClosedLoop.Out] = []
+        while len(outs) < ticks and (out := self.step(command)) is not None:
+            outs.append(out)
+        return outs
+
+
+def route(state: Literal["under way", "arrived", "gave up"]) -> PlannedRoute:
+    return PlannedRoute(np.array([3]), state, 0)
 
 
 def flat(out: ClosedLoop.Out) -> bytes:
@@ -49,9 +61,7 @@ def flat(out: ClosedLoop.Out) -> bytes:
 
 def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
     loop = Loop(seconds=1.0)
-    ticks = []
-    while (out := loop.step()) is not None:
-        ticks.append(out)
+    ticks = loop.drive()
     assert len(ticks) == loop.source.length() == 5
     assert (ticks[0].truth.x, ticks[0].truth.y) == WORLD.routes["drive"].waypoints[0]
     assert ticks[0].motion is None
@@ -60,20 +70,28 @@ def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
     assert vars(ticks[-1].truth) == vars(ticks[0].truth)  # nobody told it to move
 
 
-@pytest.mark.parametrize("state", ["arrived", "gave up"])
-def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
+@pytest.mark.parametrize(
+    ("going", "ended"),
+    [
+        pytest.param([route("under way")], [route("arrived")], id="arrived"),
+        pytest.param([route("under way")], [route("gave up")], id="gave up"),
+        pytest.param(
+            [None, PathProgress(0, 1, 2, 1, True, False, False)],
+            [None, PathProgress(0, 2, 2, 1, True, True, True)],
+            id="a path that has been gone",
+        ),
+    ],
+)
+def test_a_way_that_has_ended_ends_the_drive_a_moment_later(going, ended):
     loop = Loop(seconds=20.0, rest_s=1.0)
-    ways = [None, *[PlannedRoute(np.array([3]), "under way", 0)] * 5, *[PlannedRoute(np.array([3]), state, 0)] * 9]
-    outs = [loop.source.step(loop.ctx, loop.state, None, way) for way in ways]
+    outs = [loop.step(None, *way) for way in [[], *[going] * 5, *[ended] * 9]]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
 
 
 def test_it_is_sent_on_from_goal_to_goal_and_ends_after_the_last():
     loop = Loop(seconds=20.0, rest_s=0.4, goals=((1.0, 2.0), (3.0, 4.0)))
-    going, ended = (PlannedRoute(np.array([3]), state, 0) for state in ("under way", "gave up"))
-    outs = [
-        loop.source.step(loop.ctx, loop.state, None, way) for way in (None, ended, going, ended, going, *[ended] * 3)
-    ]
+    going, ended = route("under way"), route("gave up")
+    outs = [loop.step(None, way) for way in (None, ended, going, ended, going, *[ended] * 3)]
     goals = [None if out is None or out.goal is None else (out.goal.x, out.goal.y) for out in outs]
     assert goals == [None, (1.0, 2.0), None, (3.0, 4.0), None, None, None, None]
     assert [out is not None for out in outs] == [True] * 7 + [False]
@@ -88,68 +106,42 @@ def test_a_goal_without_room_is_refused_and_one_that_nobody_drives_to():
         source.setup(ctx)
 
 
-def test_a_path_that_has_been_gone_ends_the_drive_a_moment_later():
-    loop = Loop(seconds=20.0, rest_s=1.0)
-    gone = [
-        None,
-        *[PathProgress(0, 1, 2, 1, True, False, False)] * 5,
-        *[PathProgress(0, 2, 2, 1, True, True, True)] * 9,
-    ]
-    outs = [loop.source.step(loop.ctx, loop.state, None, None, progress) for progress in gone]
-    assert [out is not None for out in outs] == [True] * 11 + [False] * 4
-
-
 def test_it_obeys_and_its_wheels_say_how_far_it_came():
     loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0))
-    first = loop.step()
-    outs = [loop.step(Command(0.4, 0.0)) for _ in range(25)]
-    assert first is not None
-    assert outs[-1] is not None
+    loop.step()
+    outs = loop.drive(Command(0.4, 0.0), 25)
     driven = 0.4 * 5.0 - 0.4**2 / (2 * WORLD.robot.acceleration)
     assert outs[-1].truth.x == pytest.approx(1.5 + driven, abs=0.01)
     assert outs[-1].tally.distance == pytest.approx(driven, abs=0.01)
     assert outs[-1].odometry.x == pytest.approx(driven, abs=0.01)
-    assert sum(out.motion.x for out in outs if out and out.motion) == pytest.approx(driven, abs=0.01)
+    assert sum(out.motion.x for out in outs) == pytest.approx(driven, abs=0.01)
 
 
 def test_without_a_command_it_brakes():
     loop = Loop()
-    loop.step()
-    for _ in range(5):
-        loop.step(Command(0.4, 0.0))
-    for _ in range(10):
-        last = loop.step(None)
-    assert last is not None
-    assert last.motion is not None
-    assert math.hypot(last.motion.x, last.motion.y) < 1e-6
+    loop.drive(Command(0.4, 0.0), 6)
+    last = loop.drive(None, 10)[-1].motion
+    assert math.hypot(last.x, last.y) < 1e-6
 
 
 def test_a_robot_driven_into_a_shelf_is_counted_and_stays_outside():
-    loop = Loop(start=(3.7, 1.5, math.pi / 2))
-    for _ in range(40):
-        out = loop.step(Command(0.4, 0.0))
-    assert out is not None
+    out = Loop(start=(3.7, 1.5, math.pi / 2)).drive(Command(0.4, 0.0), 40)[-1]
     assert out.tally.collisions >= 1
     world = World(WORLD, 1)
     assert world.clearance([[out.truth.x, out.truth.y]])[0] == pytest.approx(WORLD.robot.radius, abs=0.01)
 
 
 def test_its_ranges_are_those_of_the_world_around_it():
-    loop = Loop(world=replace(WORLD, ranges=Ranges(noise=0.0, dropout=0.0, beam_width=1e-6)), start=(1.2, 4.5, math.pi))
-    out = loop.step()
-    assert out is not None
-    assert out.scan.ranges[8] == pytest.approx(1.2, abs=0.05)  # the wall ahead, or the poster on it
-    assert out.scan.azimuths()[8] == pytest.approx(0.0)
+    exact = replace(WORLD, ranges=Ranges(noise=0.0, dropout=0.0, beam_width=1e-6))
+    scan = Loop(world=exact, start=(1.2, 4.5, math.pi)).drive(ticks=1)[0].scan
+    assert scan.ranges[8] == pytest.approx(1.2, abs=0.05)  # the wall ahead, or the poster on it
+    assert scan.azimuths()[8] == pytest.approx(0.0)
 
 
 def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
     loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0), kidnappings=(Kidnapping(at=1.0, to=(9.5, 7.3, 0.0)),))
-    outs = [loop.step(Command(0.2, 0.0)) for _ in range(9)]
-    before, after = outs[4], outs[5]
-    assert before is not None
-    assert after is not None
+    after = loop.drive(Command(0.2, 0.0), 6)[5]
     assert after.truth.x == 9.5
-    assert after.motion is not None
     assert abs(after.motion.x) < 0.05
 
 
@@ -157,9 +149,7 @@ def test_it_is_put_down_anywhere_every_so_many_metres_and_elsewhere_for_each_see
     put = []
     for seed in (0, 0, 1):
         loop = Loop(seed, world=EXACT, start=(1.5, 1.3, 0.0), kidnapped_every_m=0.5)
-        spots = np.array(
-            [(out.truth.x, out.truth.y) for out in (loop.step(Command(0.4, 0.0)) for _ in range(20)) if out]
-        )
+        spots = np.array([(out.truth.x, out.truth.y) for out in loop.drive(Command(0.4, 0.0), 20)])
         jumps = np.flatnonzero(np.hypot(*np.diff(spots, axis=0).T) > 0.3)
         assert 1 <= len(jumps) <= 3
         assert World(EXACT, 1).is_free(spots[jumps + 1], EXACT.robot.radius).all()
@@ -171,15 +161,13 @@ def test_it_is_put_down_anywhere_every_so_many_metres_and_elsewhere_for_each_see
 def test_its_images_are_blurred_by_its_motion_around_their_tick():
     """What it sees is the mean over where it is about to be and has just been; at rest it is one picture."""
     quiet = replace(EXACT, sensor=Sensor(noise=0.0, exposure_drift=0.0, shutter=0.1))
-    sharp, blurred = (
-        Loop(world=world, start=(1.5, 1.3, 0.0))
-        for world in (replace(quiet, sensor=replace(quiet.sensor, shutter=0.0)), quiet)
-    )
-    first = [loop.step() for loop in (sharp, blurred)]
-    assert [out is not None and out.image is not None for out in first] == [True, True]
-    np.testing.assert_array_equal(first[0].image.pixels, first[1].image.pixels)
-    last = [[loop.step(Command(0.3, 0.5)) for _ in range(8)][-1] for loop in (sharp, blurred)]
-    assert np.abs(last[0].image.pixels.astype(int) - last[1].image.pixels).mean() > 0.5
+    still = replace(quiet, sensor=replace(quiet.sensor, shutter=0.0))
+    sharp, blurred = (Loop(world=world, start=(1.5, 1.3, 0.0)) for world in (still, quiet))
+    first = [loop.drive(ticks=1)[0].image for loop in (sharp, blurred)]
+    assert first[0] is not None
+    np.testing.assert_array_equal(first[0].pixels, first[1].pixels)
+    last = [loop.drive(Command(0.3, 0.5), 8)[-1].image.pixels for loop in (sharp, blurred)]
+    assert np.abs(last[0].astype(int) - last[1]).mean() > 0.5
     state, world = blurred.state.robot, World(quiet, blurred.source.day)
     room = gather(world.obstacles, quiet.size, reach(quiet.robot))
     poses = around(state, [-0.05, 0.0, 0.05])
@@ -190,13 +178,12 @@ def test_its_images_are_blurred_by_its_motion_around_their_tick():
     steps = around(state, shutter_times(quiet.sensor, 0.0))
     rays = camera_rays(camera_of(quiet), quiet.sensor.vignetting, quiet.robot.radius)
     seen = render(world.scene, rays, steps, quiet.eye_height)
-    np.testing.assert_array_equal(last[1].image.pixels, seen)
+    np.testing.assert_array_equal(last[1], seen)
 
 
 def test_lost_images_are_absent_and_counted():
     loop = Loop(world=replace(WORLD, delivery=Delivery(dropped=0.4, late=0.3)))
-    images = [out.image for out in (loop.step() for _ in range(40)) if out]
-    lost = sum(image is None for image in images)
+    lost = sum(out.image is None for out in loop.drive(ticks=40))
     assert loop.ctx.counts["lost_image"] + loop.ctx.counts["late_image"] == lost
     assert 0.35 < lost / 40 < 0.8
 
@@ -216,10 +203,7 @@ def test_a_loop_that_is_put_to_sleep_goes_on_to_the_same_bytes():
 
 
 def test_another_seed_is_another_noise_in_the_same_world():
-    one, same, other = (Loop(seed=seed).step() for seed in (0, 0, 1))
-    assert one is not None
-    assert same is not None
-    assert other is not None
+    one, same, other = (Loop(seed=seed).drive(ticks=1)[0] for seed in (0, 0, 1))
     assert flat(one) == flat(same) != flat(other)
     assert vars(one.truth) == vars(other.truth)
 
@@ -292,14 +276,10 @@ def test_a_place_without_room_is_refused():
 
 
 def test_a_drawn_start_has_a_free_straight_way_back_and_another_for_each_seed():
-    begun = []
+    ends = []
     for seed in (0, 0, 1):
         loop = Loop(seed, start="drawn", carried_m=1.5)
-        for _ in range(5):
-            loop.step(Command(0.0, 0.0))
-        begun.append(loop)
-    ends = []
-    for loop in begun:
+        loop.drive(Command(0.0, 0.0), 5)
         first, put = np.array(loop.source._first), np.array(loop.source._kidnappings[0].to)
         assert math.dist(first[:2], put[:2]) == pytest.approx(1.5)
         way = first[:2] + np.linspace(0.0, 1.0, 30)[:, None] * (put[:2] - first[:2])
