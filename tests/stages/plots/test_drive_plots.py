@@ -9,7 +9,7 @@ from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.plots.error_over_time import ErrorOverTime
-from omninav.stages.plots.frame_by_frame import FrameByFrame
+from omninav.stages.plots.frame_by_frame import FrameByFrame, shown_frames
 from omninav.stages.plots.map_plan import MapPlot
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
@@ -97,10 +97,8 @@ def test_a_trajectory_stands_over_what_stands_on_the_floor():
 def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     run = small_run(frames=30)
     drive = dataclasses.replace(run.drive, reference=np.full(30, 7), similarity=np.full(30, 0.9))
-    figure = (
-        FrameByFrame().step(CTX, drive, list(panoramas(run)), run.beliefs, run.map, reference_thumbnails(run)).figure
-    )
-    slides = figure.slides
+    given = list(panoramas(run)), run.beliefs, run.map, reference_thumbnails(run)
+    slides = FrameByFrame().step(CTX, drive, *given).figure.slides
     assert [slide.label.split(" · ")[0] for slide in slides] == [f"frame {n}" for n in range(30)]
     facts = dict(slides[4].facts)
     wrong = np.hypot(*(drive.estimate[4] - drive.truth[4])[:2])
@@ -149,6 +147,19 @@ def test_slides_of_a_long_drive_are_at_most_sixty_at_even_steps_and_all_have_the
         assert all(is_snapshot_frame(frame) for frame in shown)
     assert len(even_frames(500)) == 32
     assert sum(map(is_snapshot_frame, range(100_000))) < 800
+
+
+@pytest.mark.parametrize(
+    ("shown", "frames", "words"),
+    [
+        (range(4), 4, "Every frame is shown."),
+        (range(0, 103, 2), 103, "Every second frame is shown."),
+        (range(0, 103, 4), 103, "Every 4th frame is shown."),
+        ([0, 2, 8], 9, "3 of 9 frames can be stepped to."),
+    ],
+)
+def test_a_caption_says_which_frames_can_be_stepped_to(shown, frames, words):
+    assert shown_frames(list(shown), frames) == words
 
 
 def test_several_logs_get_a_picture_of_the_earlier_ones():

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from made_places import made_map
-from small_run import collected
+from measured_drives import made_drive
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
@@ -25,7 +25,6 @@ from omninav.stages.values.homing import DrivingStatus, HomingTarget, HomingVect
 from omninav.stages.values.image import Image
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.thumbnails import decoded
 
 CTX = Context("view")
@@ -63,30 +62,17 @@ def snapshots(camera: HyperbolicMirror | Equirectangular) -> list:
         pixels = np.roll(looks[0].repeat(30, axis=0).repeat(30, axis=1), 3 * k, axis=1)
         kinds = np.array([1, 1, 2, 3, 0, 1])
         points = np.column_stack([np.linspace(0.3, 0.7, 6) * camera.width, np.full(6, 0.3 * camera.height_px)])
-        known = k > 0
-        nowhere = np.zeros((6, 3))
-        found.append(
-            stage.step(
-                CTX,
-                Tick(k, k * 200_000_000, 0, k, k == 0),
-                Image(pixels),
-                camera,
-                target(1) if known else None,
-                vector(k, k == 7) if known else None,
-                TrackedFeatures(1, np.arange(6), kinds, points, nowhere, nowhere) if known and k != 7 else None,
-            ).snapshot
-        )
+        tracks = TrackedFeatures(1, np.arange(6), kinds, points, np.zeros((6, 3)), np.zeros((6, 3)))
+        followed = (target(1), vector(k, k == 7), None if k == 7 else tracks) if k > 0 else ()
+        tick = Tick(k, k * 200_000_000, 0, k, k == 0)
+        found.append(stage.step(CTX, tick, Image(pixels), camera, *followed).snapshot)
     return found
 
 
 def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
-    way = PlannedRoute(np.array([0, 1, 2]), "under way", 0)
-    over = PlannedRoute(np.array([0, 1, 2]), "arrived", 0)
+    way, over = (PlannedRoute(np.array([0, 1, 2]), state, 0) for state in ("under way", "arrived"))
     return {
-        "drive": collected(
-            [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(TICKS)],
-            [Pose(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)],
-        ),
+        "drive": made_drive([(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)], every_s=0.2),
         "homing": snapshots(camera),
         "statuses": [DrivingStatus("driving")] * TICKS,
         "progress": [None if k == 0 else PathProgress(0, 1, 4, 1, False, False, False) for k in range(TICKS)],

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from small_run import collected, small_run
+from measured_drives import made_drive
+from small_run import small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
@@ -44,17 +45,6 @@ def test_thumbnails_hold_an_image_of_each_reference_and_can_be_kept() -> None:
         assert np.allclose(kept.image(n), 5 * n, atol=2)
 
 
-def test_of_windows_each_has_its_picture_and_pictures_not_taken_have_none() -> None:
-    state, stage, map = ThumbnailsState(), ReferenceSnapshot(columns=20), ReferenceGraph.empty()
-    for pose in ((0, 0, 0), (0, 0, 1), (0, 0, 2)):
-        map.insert(Pose(*pose), np.zeros((1, 4), np.float32), "histograms")
-    first = stage.step(CTX, windows(10, 100, 200), map, state).snapshots
-    assert first is not None
-    assert [round(decoded(jpeg).mean()) for jpeg in first.jpegs] == pytest.approx([10, 100, 200], abs=2)
-    assert decoded(first.jpegs[0]).shape == (15, 20, 3)
-    assert stage.step(CTX, windows(1, 2, 3), map, state).snapshots is None
-
-
 def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     # ahead, left, behind, right: as a panorama they are behind, left, ahead, right
     shot = PanoramaSnapshot().step(CTX, Tick(0, 0), windows(0, 80, 160, 240)).snapshot
@@ -62,7 +52,7 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
     assert seen == pytest.approx([160, 80, 0, 240], abs=3)
     assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
-    figure = FrameByFrame().step(CTX, collected([Tick(0, 0)], [None]), [shot]).figure
+    figure = FrameByFrame().step(CTX, made_drive([None]), [shot]).figure
     assert figure is not None
     assert "Windows" in figure.caption
 

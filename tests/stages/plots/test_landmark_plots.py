@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ from landmark_tour import mapped_room
 from small_run import reference_graph, small_run
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.plots.camera_file import CameraFile
 from omninav.stages.plots.drawing import shown_landmarks
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.landmark_matches import drawn_matches
@@ -84,7 +86,7 @@ def test_a_slide_says_how_many_matches_agree() -> None:
 
 def test_landmarks_lie_under_the_trajectory_and_under_the_map() -> None:
     run = small_run(frames=6)
-    map = replace(mapped_room())
+    map = mapped_room()
     for plot in (TrajectoryOverMap(), MapPlot()):
         plain, drawn = (plot.step(CTX, run.drive, each).figure.content for each in (reference_graph(6), map))
         assert b"<image" not in plain
@@ -110,3 +112,12 @@ def test_a_drawn_image_is_hardly_larger() -> None:
     points = np.random.default_rng(1).uniform([0, 0], [360, 80], (100, 2)).astype(np.float32)
     drawn = drawn_matches(EncodedPanorama(jpeg, (), points, np.arange(100) % 3 > 0))
     assert len(drawn) < len(jpeg) + 5000
+
+
+def test_the_camera_that_landmarks_ask_for_is_written_and_nothing_where_they_ask_for_none(tmp_path: Path) -> None:
+    map, ctx = mapped_room(), Context("camera_file", folder=tmp_path)
+    for each in (map, replace(map, landmarks=None)):
+        CameraFile().step(ctx, each)
+        assert not list(tmp_path.iterdir())
+    CameraFile().step(ctx, replace(map, landmarks=replace(map.landmarks, camera="projection: donut\n")))
+    assert (tmp_path / "camera.yaml").read_text() == "projection: donut\n"

@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 from made_places import made_map
-from small_run import collected
+from measured_drives import made_drive
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap, planned_routes
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
@@ -17,14 +17,12 @@ from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Motion, Pose
 
 CTX = Context("view")
 MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1, 2): 0, (2, 3): 2})
 PLAN = FloorPlan(np.array([[(2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0)]]), 6.0, 5.0)
-TICKS = [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(20)]
-TRUTH = [Pose(1.01 + 0.15 * k, 1.1, 0.0) for k in range(20)]
-DRIVE, BLIND = collected(TICKS, TRUTH), collected(TICKS, [None] * 20)
+TRUTH = [(1.01 + 0.15 * k, 1.1, 0.0) for k in range(20)]
+DRIVE, BLIND = made_drive(TRUTH, every_s=0.2), made_drive([None] * 20, every_s=0.2)
 
 
 def green(figure) -> int:
@@ -36,8 +34,9 @@ def green(figure) -> int:
 
 
 def drawn(contact=99, **rest):
-    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [EpisodeStatistics(int(k >= contact), 0.15 * k) for k in range(20)]
-    return TrajectoryOverMap().step(CTX, collected(TICKS, TRUTH, motion, tallies=tallies), plan=PLAN, **rest).figure
+    tallies = [EpisodeStatistics(int(k >= contact), 0.15 * k) for k in range(20)]
+    drive = made_drive(TRUTH, motion=[(0.15, 0.0, 0.0)] * 20, every_s=0.2, tallies=tallies)
+    return TrajectoryOverMap().step(CTX, drive, plan=PLAN, **rest).figure
 
 
 def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
@@ -109,7 +108,7 @@ def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
 def test_pictures_are_joined_with_the_places_believed():
     stage = TrueAndEstimatedPlace()
     figure = stage.step(CTX, DRIVE, believed(), MAP).figure
-    wrong = stage.step(CTX, collected(TICKS, TRUTH[::-1]), believed(), MAP).figure
+    wrong = stage.step(CTX, made_drive(TRUTH[::-1], every_s=0.2), believed(), MAP).figure
     assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
     assert green(figure) > 2 * green(wrong)
     assert "green, 100 % of the images" in figure.caption

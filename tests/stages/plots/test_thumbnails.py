@@ -2,7 +2,6 @@
 
 import itertools
 
-import cv2
 import numpy as np
 import pytest
 from made_places import made_map
@@ -19,7 +18,7 @@ from omninav.stages.plots.thumbnails import (
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.thumbnails import Thumbnails
+from omninav.stages.values.thumbnails import Thumbnails, decoded
 
 CTX = Context("thumbnails")
 
@@ -29,7 +28,7 @@ def grey(level: int, columns: int = 40) -> np.ndarray:
 
 
 def levels(jpegs: tuple[bytes, ...]) -> list[int]:
-    return [round(float(cv2.imdecode(np.frombuffer(jpeg, np.uint8), 1).mean())) for jpeg in jpegs]
+    return [round(float(decoded(jpeg).mean())) for jpeg in jpegs]
 
 
 def test_an_image_becomes_a_thumbnail_where_the_map_has_grown() -> None:
@@ -39,7 +38,7 @@ def test_an_image_becomes_a_thumbnail_where_the_map_has_grown() -> None:
             map.insert(Pose(0.0, 0.0, 0.0), np.ones((1, 1), np.float32), "histograms")
         found.append(stage.step(CTX, Panorama(grey(level)), map, state).snapshots)
     assert [None if each is None else levels(each.jpegs) for each in found] == [[40], None, [120]]
-    assert cv2.imdecode(np.frombuffer(found[0].jpegs[0], np.uint8), 1).shape == (10, 20, 3)
+    assert decoded(found[0].jpegs[0]).shape == (10, 20, 3)
 
 
 def test_each_window_that_became_a_reference_is_one() -> None:
@@ -47,12 +46,15 @@ def test_each_window_that_became_a_reference_is_one() -> None:
     seen = Windows(np.stack([grey(level) for level in (10, 20, 30)]), np.zeros(3), 1.0)
     for _ in range(2):
         map.insert(Pose(0.0, 0.0, 0.0), np.ones((1, 1), np.float32), "histograms")
-    snapshots = ReferenceSnapshot().step(CTX, seen, map, state).snapshots
+    stage = ReferenceSnapshot(columns=20)
+    snapshots = stage.step(CTX, seen, map, state).snapshots
     assert snapshots is not None
     assert levels(snapshots.jpegs) == [10, 20]
+    assert decoded(snapshots.jpegs[0]).shape == (10, 20, 3)
     assert state.references == 2
+    assert stage.step(CTX, seen, map, state).snapshots is None
     map.insert(Pose(0.0, 0.0, 0.0), np.ones((1, 1), np.float32), "histograms")
-    third = ReferenceSnapshot().step(CTX, seen, map, state).snapshots
+    third = stage.step(CTX, seen, map, state).snapshots
     assert third is not None
     assert levels(third.jpegs) == [10]
 
