@@ -87,16 +87,11 @@ def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
     assert blind["expected_error"] > found["expected_error"]
 
 
-def test_ellipses_hold_as_many_true_positions_as_they_say_and_fewer_where_they_are_too_small():
-    out = Calibration().step(Context("calibration"), made([None] * 400).at(np.arange(300)))
-    found = out.metrics.values["calibration"]
-    assert found["ellipse_50"] == pytest.approx(0.5, abs=0.06)
-    assert found["ellipse_95"] == pytest.approx(0.95, abs=0.03)
-    assert found["nees"] == pytest.approx(2.0, abs=0.3)
+def test_without_a_confidence_only_ellipses_are_told():
+    out = Calibration().step(Context("calibration"), made([None] * 40))
+    assert out.metrics.values["calibration"].keys() == {"ellipse_50", "ellipse_95", "nees"}
     assert out.reliability is None
     assert ReliabilityDiagram().step(Context("plot"), out.reliability).figure is None
-    assert "expected_error" not in found
-    assert measured(made([None] * 400, sigma=0.1).at(np.arange(300)))["ellipse_50"] < 0.2
 
 
 def test_squared_errors_over_covariances_are_chi_squared_and_a_flat_covariance_has_none():

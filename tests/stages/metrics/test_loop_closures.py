@@ -15,12 +15,6 @@ def test_average_precision_is_one_where_all_right_hypotheses_have_more_support_t
     assert average_precision(np.array([0.9, 0.2, 0.8]), np.array([True, False, True])) == 1.0
 
 
-def test_average_precision_worked_by_hand():
-    # accepted by falling support: right, wrong, right, wrong: (1/1 + 2/3) / 2
-    found = average_precision(np.array([0.9, 0.7, 0.5, 0.1]), np.array([True, False, True, False]))
-    assert found == pytest.approx((1.0 + 2.0 / 3.0) / 2.0)
-
-
 def test_hypotheses_of_equal_support_are_accepted_together_whatever_their_order():
     support = np.array([0.5, 0.5])
     assert average_precision(support, np.array([True, False])) == average_precision(support, np.array([False, True]))

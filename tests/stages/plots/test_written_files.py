@@ -1,28 +1,24 @@
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from measured_drives import AT_ORIGIN, made_drive
 from result_of import write_result
 from rosbags.highlevel import AnyReader
-from small_run import collected, small_run
+from small_run import small_run
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.plots.pose_messages import covariance_6x6
 from omninav.stages.plots.thin_belief import ThinBelief, thin
 from omninav.stages.plots.trajectory_file import TrajectoryFile
-from omninav.stages.values.belief import Particles, PoseEstimate, SinglePose
+from omninav.stages.values.belief import Particles, SinglePose
 from omninav.stages.values.pose import Pose
 
 
-def estimate(x, y, heading):
-    return PoseEstimate(Pose(x, y, heading), np.zeros((3, 3)), 1.0, Pose(x, y, heading))
-
-
 def test_a_trajectory_file_has_a_row_per_image_with_all_digits_of_its_stamp(tmp_path):
-    ticks = [Tick(0, 1_700_000_000_123_456_789), Tick(1, 1_700_000_001_000_000_001)]
-    estimates = [estimate(1.0, -2.5, np.pi / 2), estimate(0, 0, 0)]
-    drive = collected(ticks, [None, None], estimates=estimates)
+    drive = made_drive([None, None], [(1.0, -2.5, np.pi / 2), AT_ORIGIN])
+    drive.stamps[:] = 1_700_000_000_123_456_789, 1_700_000_001_000_000_001
     TrajectoryFile().step(Context("t", folder=tmp_path), drive)
     first, second = (tmp_path / "trajectory.tum").read_text().splitlines()
     half = "0.707106781"  # sin and cos of 45 degrees
@@ -40,12 +36,11 @@ def test_every_log_has_its_trajectory_and_the_last_has_the_plain_name(tmp_path):
 
 def test_frames_without_an_estimate_are_counted(tmp_path):
     ctx = Context("t", folder=tmp_path)
-    ticks = [Tick(0, 0), Tick(1, 10)]
-    TrajectoryFile().step(ctx, collected(ticks, [None, None], estimates=[None, estimate(0, 0, 0)]))
+    TrajectoryFile().step(ctx, made_drive([None, None], [None, AT_ORIGIN]))
     assert ctx.counts == {"frame_without_estimate": 1}
     assert len((tmp_path / "trajectory.tum").read_text().splitlines()) == 1
     assert not ctx.warnings
-    TrajectoryFile().step(ctx, collected(ticks, [None, None]))
+    TrajectoryFile().step(ctx, made_drive([None, None]))
     assert ctx.warnings[0].startswith("no image has an estimate")
 
 
@@ -53,9 +48,8 @@ def test_the_result_log_opens_with_mcaps_own_ros2_decoder(tmp_path):
     run = small_run(frames=12, logs=2)
     with write_result(tmp_path, run).open("rb") as file:
         found = {}
-        for _, channel, message, content in make_reader(
-            file, decoder_factories=[DecoderFactory()]
-        ).iter_decoded_messages():
+        decoded = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        for _, channel, message, content in decoded:
             found.setdefault(channel.topic, []).append((message.log_time, content))
     assert {topic: len(messages) for topic, messages in found.items()} == {
         "/belief": 24,
