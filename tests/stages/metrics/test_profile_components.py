@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from measured_drives import figures
 
-from omninav.pipeline import Context
 from omninav.stages.metrics.profile_components import ProfileComponents, kept
 from omninav.stages.values.local_features import VerticalSegments
 
@@ -17,10 +17,9 @@ def showing(coefficients: np.ndarray) -> VerticalSegments:
     return VerticalSegments(np.zeros(number), ends, looks, np.ones(number, np.float32), np.zeros((number, 2, 2)))
 
 
-def measured(*images: np.ndarray | None) -> dict | None:
-    shown = [None if each is None else showing(each) for each in images]
-    metrics = ProfileComponents().step(Context("profiles"), shown).metrics
-    return None if metrics is None else metrics.values["profiles"]
+def measured(*images: np.ndarray | None):
+    found = figures(ProfileComponents(), [None if each is None else showing(each) for each in images])
+    return found and found["profiles"]
 
 
 def both_ways(**lengths: float) -> np.ndarray:
@@ -34,7 +33,6 @@ def both_ways(**lengths: float) -> np.ndarray:
 def test_variance_in_falling_order_of_the_coefficients_leaves_nothing_to_gain() -> None:
     profiles = both_ways(c1=4.0, c2=3.0, c3=2.0)
     found = measured(profiles, profiles)
-    assert found is not None
     assert found["segments"] == 12
     assert found["cosine"] == pytest.approx([16 / 29, 25 / 29, 1.0, 1.0, 1.0, 1.0])
     assert found["principal"] == pytest.approx(found["cosine"])
@@ -44,7 +42,6 @@ def test_variance_in_falling_order_of_the_coefficients_leaves_nothing_to_gain() 
 def test_components_put_the_largest_first_and_the_worst_number_counts() -> None:
     profiles = both_ways(c1=3.0, c7=4.0)
     found = measured(profiles, None, profiles)
-    assert found is not None
     assert found["cosine"] == pytest.approx([9 / 25] * 6)
     assert found["principal"] == pytest.approx([16 / 25] + [1.0] * 5)
     assert found["least_ratio"] == pytest.approx(9 / 25)
@@ -52,7 +49,6 @@ def test_components_put_the_largest_first_and_the_worst_number_counts() -> None:
 
 def test_components_are_of_the_first_half_and_judged_on_the_second() -> None:
     found = measured(both_ways(c1=1.0, c2=2.0), both_ways(c1=2.0, c2=1.0))
-    assert found is not None
     assert found["cosine"][0] == pytest.approx(0.8)
     assert found["principal"][0] == pytest.approx(0.2)
 
@@ -61,7 +57,6 @@ def test_the_mean_of_the_first_half_is_no_variance() -> None:
     away = np.full(7, 5.0)
     profiles = both_ways(c1=1.0, c2=2.0)
     found = measured(profiles + away, profiles + away)
-    assert found is not None
     assert found["cosine"][0] == pytest.approx(0.2)
     assert found["principal"][0] == pytest.approx(0.8)
 
@@ -79,7 +74,6 @@ def test_profiles_that_are_all_alike_say_nothing() -> None:
 
 def test_where_components_keep_nothing_coefficients_are_no_worse() -> None:
     found = measured(both_ways(c1=3.0, c2=2.0, c3=1.0), both_ways(c2=1.0))
-    assert found is not None
     assert (found["cosine"][0], found["principal"][0]) == pytest.approx((0.0, 0.0))
     assert found["least_ratio"] == pytest.approx(1.0)
 

@@ -1,12 +1,15 @@
 import numpy as np
 import pytest
+from measured_drives import figures
 
 from omninav.pipeline import Context
 from omninav.stages.fusion.conditional_resampling import ConditionalResampling
 from omninav.stages.metrics.resampling_spread import ResamplingSpread, agreement
 from omninav.stages.values.belief import GaussianMixture, Particles
 
-CTX = Context("metric")
+
+def spread(before, hypotheses, after):
+    return figures(ResamplingSpread(), before, hypotheses, after)["resampling"]
 
 
 def cloud(sigma: float, at: float = 0.0) -> Particles:
@@ -21,16 +24,16 @@ def seen(sigma: float) -> GaussianMixture:
 def test_resampling_concentrates_where_both_agree():
     before, hypothesis = cloud(1.0), seen(1.0)
     after = ConditionalResampling().step(Context("fusion", np.random.default_rng(1)), before, hypothesis).belief
-    found = ResamplingSpread().step(CTX, [before, before], [hypothesis, None], [after, before]).metrics.values
+    found = spread([before, before], [hypothesis, None], [after, before])
     # The product of two Gaussians of equal variance has half of it.
-    assert found["resampling"]["frames"] == 1
-    assert found["resampling"]["ratio"] == pytest.approx(np.sqrt(0.5), abs=0.03)
+    assert found["frames"] == 1
+    assert found["ratio"] == pytest.approx(np.sqrt(0.5), abs=0.03)
 
 
 def test_frames_in_which_they_disagree_do_not_count():
     far = cloud(0.1, at=50.0)
     assert agreement(far, seen(1.0)) < 1e-4
-    assert ResamplingSpread().step(CTX, [far], [seen(1.0)], [far]).metrics.values == {"resampling": {"frames": 0}}
+    assert spread([far], [seen(1.0)], [far]) == {"frames": 0}
 
 
 def two(x: float, y: float, heading: float = 0.0) -> Particles:
@@ -40,10 +43,8 @@ def two(x: float, y: float, heading: float = 0.0) -> Particles:
 
 def test_spreads_are_means_over_the_frames_and_the_ratio_is_theirs():
     frames = [(two(0.3, 0.4, 0.2), two(0.0, 0.25)), (two(0.6, 0.8), two(0.6, 0.45)), (two(0.0, 0.3), two(0.2, 0.0))]
-    seen_there = [seen(1.0)] * 3
-    before, after = ([frame[k] for frame in frames] for k in (0, 1))
-    found = ResamplingSpread().step(CTX, before, seen_there, after).metrics.values["resampling"]
-    assert found == {
+    before, after = zip(*frames, strict=True)
+    assert spread(before, [seen(1.0)] * 3, after) == {
         "frames": 3,
         "before_m": pytest.approx(0.6),
         "after_m": pytest.approx(0.4),
@@ -53,8 +54,7 @@ def test_spreads_are_means_over_the_frames_and_the_ratio_is_theirs():
 
 def test_mixtures_are_not_resampled_and_a_hypothesis_counts_by_its_shape_alone():
     near = two(0.1, 0.0)
-    given = [seen(1.0), near, near], [seen(1.0)] * 3, [near, seen(1.0), near]
-    assert ResamplingSpread().step(CTX, *given).metrics.values["resampling"]["frames"] == 1
+    assert spread([seen(1.0), near, near], [seen(1.0)] * 3, [near, seen(1.0), near])["frames"] == 1
     light = GaussianMixture(np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array([0.1, 0.3]))
     assert agreement(two(0.0, 0.0), light) == pytest.approx((2 * np.pi) ** -1.5)
 
@@ -63,7 +63,7 @@ def test_they_agree_above_a_density_of_a_ten_thousandth():
     def frames(away: float) -> int:
         near = Particles(np.array([(away, 0.001, 0.0), (away, -0.001, 0.0)]), np.full(2, 0.5))
         unit = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
-        return ResamplingSpread().step(CTX, [near], [unit], [near]).metrics.values["resampling"]["frames"]
+        return spread([near], [unit], [near])["frames"]
 
     limit = np.sqrt(2 * np.log((2 * np.pi) ** -1.5 / 1e-4))
     assert [frames(limit - 0.001), frames(limit + 0.001)] == [1, 0]
@@ -72,5 +72,4 @@ def test_they_agree_above_a_density_of_a_ten_thousandth():
 def test_at_the_limit_itself_they_do_not_agree(monkeypatch: pytest.MonkeyPatch):
     near, there = two(0.1, 0.0), seen(1.0)
     monkeypatch.setattr("omninav.stages.metrics.resampling_spread.AGREE_ABOVE", agreement(near, there))
-    stage = ResamplingSpread()
-    assert stage.step(CTX, [near], [there], [near]).metrics.values["resampling"]["frames"] == 0
+    assert spread([near], [there], [near])["frames"] == 0

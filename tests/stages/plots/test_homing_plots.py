@@ -4,7 +4,6 @@ import dataclasses
 import math
 import re
 
-import cv2
 import numpy as np
 import pytest
 from made_places import made_map
@@ -82,10 +81,6 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
     }
 
 
-def jpeg_pixels(jpeg: bytes) -> np.ndarray:
-    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR).astype(int)
-
-
 @pytest.mark.parametrize("camera", [MIRROR, STRIP], ids=["mirror", "strip"])
 def test_a_frame_shows_what_is_followed_the_target_and_the_vector(camera):
     given = drive(camera)
@@ -94,7 +89,7 @@ def test_a_frame_shows_what_is_followed_the_target_and_the_vector(camera):
     first, followed, lost, *_ = (one.slides[n] for n in (0, 3, 7))
     assert [caption for caption, _ in first.photographs] == ["image"]
     assert [caption for caption, _ in followed.photographs] == ["image", "target: place 1"]
-    seen, target_view = (jpeg_pixels(jpeg) for _, jpeg in followed.photographs)
+    seen, target_view = (decoded(jpeg).astype(int) for _, jpeg in followed.photographs)
     plain = decoded(given["homing"][3].jpeg).astype(int)
     assert np.abs(seen - plain).max() > 60  # features and the vector are drawn into the image
     assert target_view.shape == seen.shape

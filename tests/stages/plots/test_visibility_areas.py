@@ -1,15 +1,15 @@
-import cv2
 import numpy as np
 import pytest
-from small_run import collected, small_run
+from measured_drives import made_drive, on_x
+from small_run import small_run
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.plots.visibility_areas import ShowVisibilityAreas, views_by_cell
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.thumbnails import decoded
 
 CTX = Context("view")
 
@@ -25,10 +25,6 @@ POSES = np.array([[1.0, 1.0, 0.3], [3.0, 1.0, 1.6], [5.0, 3.0, 3.0], [1.5, 3.3, 
 MAP = ReferenceGraph(POSES, np.zeros((4, 3, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
 
 
-def pixels(content: bytes) -> np.ndarray:
-    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-
-
 def test_views_are_counted_cell_by_cell():
     areas = visibility_areas(POSES, ROOM, axes_of(3))
     counts = sum(areas.mask(target).astype(int) for target in areas.target.ravel() if target >= 0)
@@ -37,10 +33,10 @@ def test_views_are_counted_cell_by_cell():
 
 def test_areas_are_drawn_over_the_grid_the_same_every_time(monkeypatch: pytest.MonkeyPatch):
     areas = visibility_areas(POSES, ROOM, axes_of(3))
-    driven = collected([Tick(k, k) for k in range(10)], [Pose(1.0 + 0.1 * k, 1.0, 0.0) for k in range(10)])
+    driven = made_drive(on_x((1.0 + 0.1 * k for k in range(10)), 1.0))
     monkeypatch.setattr("omninav.stages.plots.visibility_areas.EXAMPLES", 2)
     figure = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
-    assert pixels(figure.content).std() > 20
+    assert decoded(figure.content).std() > 20
     assert "2 of 4 references" in figure.caption
     assert "3 points lambda" in figure.caption
     again = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
