@@ -113,13 +113,11 @@ def test_confidence_is_plotted_where_there_is_one():
 TRUE = (3.0, -2.0, 1.0)
 
 
-def beside(
-    offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Row] | None = None, **parameters
-) -> dict:
+def beside(offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Row] | None = None) -> dict:
     """Of estimates that lie so far (m, m, degrees) from the true pose."""
     believed = np.array(offsets) * (1.0, 1.0, np.pi / 180) + TRUE
     told = [PoseConfidence(each) for each in confidences]
-    return measured(made_drive(truth or [TRUE] * len(offsets), believed, confidences=told), **parameters)
+    return measured(made_drive(truth or [TRUE] * len(offsets), believed, confidences=told))
 
 
 def test_a_frame_is_right_within_both_tolerances_and_lost_beyond_its_own():

@@ -20,7 +20,7 @@ from omninav.stages.values.pose import Motion, Pose
 
 CAMERA = read_camera(Path(__file__).resolve().parents[2] / "data" / "camera.yaml")
 TICKS = [Tick(n, 10**18 + n * 500_000_000, 0, n, n == 0) for n in range(4)]
-TRUTH = [Pose(2.0 + n, 1.0, 0.5) for n in range(4)]
+TRUTH: list[Pose | None] = [Pose(2.0 + n, 1.0, 0.5) for n in range(4)]
 MOTION = [Motion(1.0, 0.0, 0.0) if n else None for n in range(4)]
 ECHO = """
 import csv, json, sys
@@ -41,10 +41,11 @@ def images(truth: list[Pose | None]) -> RecordedImages:
     return CollectImages().step(Context("images"), TICKS, encoded, CAMERA, odometry, truth).images
 
 
-def located(tmp_path: Path, program: str, truth: list[Pose | None] | None = None) -> OutsideLocaliser.Out:
-    (tmp_path / "mine.py").write_text(program)
-    stage, given = OutsideLocaliser(command=f"python {tmp_path / 'mine.py'}"), images(TRUTH if truth is None else truth)
-    return stage.step(Context("drive", folder=tmp_path), given, images(TRUTH), TICKS, TRUTH, MOTION)
+def located(folder: Path, program: str, truth: list[Pose | None] = TRUTH, command: str = "") -> OutsideLocaliser.Out:
+    """By a program of one's own, or by a command."""
+    (folder / "mine.py").write_text(program)
+    stage = OutsideLocaliser(command=command or f"python {folder / 'mine.py'}")
+    return stage.step(Context("drive", folder=folder), images(truth), images(TRUTH), TICKS, TRUTH, MOTION)
 
 
 def test_its_poses_are_the_estimates_and_an_image_without_one_has_none(tmp_path: Path):
@@ -93,9 +94,7 @@ def test_a_map_without_poses_and_a_program_that_does_not_exist_are_refused(tmp_p
     with pytest.raises(BadInput, match="no true poses"):
         located(tmp_path, ECHO, [None] * 4)
     with pytest.raises(BadInput, match="cannot be run: No such file"):
-        OutsideLocaliser(command="no_such_localiser").step(
-            Context("drive"), images(TRUTH), images(TRUTH), TICKS, TRUTH, MOTION
-        )
+        located(tmp_path, "", command="no_such_localiser")
 
 
 @pytest.mark.parametrize(("command", "what"), [("python 'mine.py", "No closing quotation"), (" ", "no program; type")])
@@ -117,9 +116,7 @@ def test_its_program_is_part_of_what_a_result_follows_from(tmp_path: Path):
 def test_a_word_longer_than_the_name_of_a_file_is_none_and_lines_are_of_text_alone(tmp_path: Path):
     assert OutsideLocaliser(command=f"python -c '{'1;' * 200}'").inputs_digest() is None
     (tmp_path / "binary").write_bytes(b"a\n\0\n")
-    (tmp_path / "mine.py").write_text(ECHO)
-    stage = OutsideLocaliser(command=f"python {tmp_path / 'mine.py'} {tmp_path / 'binary'}")
-    out = stage.step(Context("drive", folder=tmp_path), images(TRUTH), images(TRUTH), TICKS, TRUTH, MOTION)
+    out = located(tmp_path, ECHO, command=f"python {tmp_path / 'mine.py'} {tmp_path / 'binary'}")
     assert out.metrics.values["peer"]["lines"] == len([line for line in ECHO.splitlines() if line])
 
 

@@ -37,6 +37,11 @@ def drive(
     return outs
 
 
+@pytest.fixture
+def log(tmp_path: Path) -> str:
+    return str(write_mcap(tmp_path / "log.mcap"))
+
+
 def row(value) -> np.ndarray:
     return np.array(dataclasses.astuple(value))
 
@@ -52,9 +57,9 @@ def assert_motions_chain_to_odometry(outs: list) -> None:
         np.testing.assert_allclose(pose, row(out.odometry), atol=1e-12)
 
 
-def test_every_image_is_a_tick_and_motions_chain_to_the_odometry(tmp_path: Path) -> None:
+def test_every_image_is_a_tick_and_motions_chain_to_the_odometry(log: str) -> None:
     ctx = context()
-    outs = drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap"))), ctx)
+    outs = drive(LogSource(log=log), ctx)
     assert [out.tick.index for out in outs] == [out.tick.frame for out in outs] == list(range(FRAMES))
     assert [out.tick.first_of_log for out in outs] == [True] + [False] * (FRAMES - 1)
     assert outs[0].motion is None
@@ -81,9 +86,8 @@ def test_motion_spans_images_that_cannot_be_used(tmp_path: Path) -> None:
     assert "log.mcap: image 0" in ctx.details["undecodable_image"]
 
 
-def test_several_logs_follow_each_other_with_their_boundaries_marked(tmp_path: Path) -> None:
-    path = str(write_mcap(tmp_path / "log.mcap"))
-    source = LogSource(log=(path, path), first=2, stop=12, stride=3)
+def test_several_logs_follow_each_other_with_their_boundaries_marked(log: str) -> None:
+    source = LogSource(log=(log, log), first=2, stop=12, stride=3)
     outs = drive(source)
     assert source.length() == len(outs) == 8
     assert [out.tick.log for out in outs] == [0] * 4 + [1] * 4
@@ -156,43 +160,40 @@ def test_made_up_odometry_errs_with_the_turn_and_not_when_nothing_moves() -> Non
     assert np.std(turns) == pytest.approx(0.04, rel=0.06)
 
 
-def test_a_selection_without_frames_is_refused(tmp_path: Path) -> None:
-    path = str(write_mcap(tmp_path / "log.mcap"))
+def test_a_selection_without_frames_is_refused(log: str) -> None:
     with pytest.raises(UnreadableRecording, match="leaves none of its frames"):
-        LogSource(log=path, first=500).setup(context())
+        LogSource(log=log, first=500).setup(context())
 
 
-def test_what_was_lost_at_opening_is_counted_once(tmp_path: Path) -> None:
-    path = write_mcap(tmp_path / "log.mcap")
-    data = path.read_bytes()
-    path.write_bytes(data[: len(data) // 2])
-    ctx, source = context(), LogSource(log=str(path))
+def test_what_was_lost_at_opening_is_counted_once(log: str) -> None:
+    data = Path(log).read_bytes()
+    Path(log).write_bytes(data[: len(data) // 2])
+    ctx, source = context(), LogSource(log=log)
     source.inputs_digest()
     outs = drive(source, ctx)
     assert ctx.counts["cut_file"] == 1
-    assert str(path) in ctx.details["cut_file"]
+    assert log in ctx.details["cut_file"]
     assert len(outs) == source.length()
 
 
 def test_other_code_of_a_camera_model_of_ones_own_makes_other_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    log: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Results kept of a log are not used again once the model's code has changed."""
     mine = type("Mine", (Equirectangular,), {"__module__": __name__, "projection": "mine"})
     monkeypatch.setitem(MODELS, "mine", mine)
-    path, camera = str(write_mcap(tmp_path / "log.mcap")), tmp_path / "camera.yaml"
+    camera = tmp_path / "camera.yaml"
     camera.write_text("{projection: mine, image: {width: 48, height: 16}, column_of_forward: 24}")
     digests = set()
     for code in ("first", "second"):
         monkeypatch.setattr(
             "omninav.stages.source.playback.module_version", lambda module, code=code: f"{module} {code}"
         )
-        digests.add(LogSource(log=path, camera=str(camera)).inputs_digest())
+        digests.add(LogSource(log=log, camera=str(camera)).inputs_digest())
     assert len(digests) == 2
 
 
-def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path) -> None:
-    log = str(write_mcap(tmp_path / "log.mcap"))
+def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(log: str) -> None:
     whole, carried = drive(LogSource(log=log)), drive(LogSource(log=log, cuts=((3, 6),)))
     assert [out.tick.frame for out in carried] == [0, 1, 2, *range(6, FRAMES)]
     assert [out.tick.first_of_log for out in carried] == [True] + [False] * (FRAMES - 4)
@@ -202,8 +203,7 @@ def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path
     assert_motions_chain_to_odometry(carried)
 
 
-def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log = str(write_mcap(tmp_path / "log.mcap"))
+def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("omninav.stages.source.log_parts.NEW_LOG_AFTER_S", 1.0)
     assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),)))] == [0] * (FRAMES - 3)
     monkeypatch.setattr("omninav.stages.source.log_parts.NEW_LOG_AFTER_S", 0.1)
@@ -218,9 +218,9 @@ def test_made_up_odometry_does_not_notice_a_splice_either(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("cuts", [((0, 5),), ((5, 5),), ((5, 400),), ((3, 6), (4, 8))])
-def test_a_cut_that_does_not_lead_onwards_is_refused(tmp_path: Path, cuts: tuple[tuple[int, int], ...]) -> None:
+def test_a_cut_that_does_not_lead_onwards_is_refused(log: str, cuts: tuple[tuple[int, int], ...]) -> None:
     with pytest.raises(UnreadableRecording, match="does not lead onwards"):
-        drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), cuts=cuts))
+        drive(LogSource(log=log, cuts=cuts))
 
 
 def test_a_log_of_which_no_image_can_be_used_is_refused(tmp_path: Path) -> None:
