@@ -23,8 +23,10 @@ def on_x(xs: Iterable[float | None], y: float = 0.0) -> list[Row]:
 
 def seen_at(row: Row, weight: float = 1.0) -> PoseEstimate | None:
     """An estimate whose mean is its pose, with a standard deviation of 1 in everything."""
-    pose = None if row is None else Pose(*map(float, row))
-    return pose and PoseEstimate(pose, np.eye(3), weight, pose)
+    if row is None:
+        return None
+    pose = Pose(*map(float, row))
+    return PoseEstimate(pose, np.eye(3), weight, pose)
 
 
 def made_drive(

@@ -40,8 +40,10 @@ class Loop:
         self.state = ClosedLoopState()
         self.source.setup(self.ctx)
 
-    def step(self, command: Command | None = None, *route: PlannedRoute | PathProgress | None) -> ClosedLoop.Out | None:
-        return self.source.step(self.ctx, self.state, command, *route)
+    def step(
+        self, command: Command | None = None, way: PlannedRoute | None = None, progress: PathProgress | None = None
+    ) -> ClosedLoop.Out | None:
+        return self.source.step(self.ctx, self.state, command, way, progress)
 
     def drive(self, command: Command | None = None, ticks: int = 10**6) -> list[ClosedLoop.Out]:
         """So many ticks with one command, or all until it ends."""
