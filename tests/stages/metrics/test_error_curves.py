@@ -27,14 +27,6 @@ def along_x(*xs: float) -> np.ndarray:
     return np.array(on_x(xs))
 
 
-def test_a_lap_ends_where_the_path_is_nearest_to_its_start_again():
-    start = np.zeros(3)
-    assert lap_ends(circle(3), start, 2.0) == [40, 80]
-    assert lap_ends(circle(3.5), start, 2.0) == [40, 80, 120]
-    assert lap_ends(circle(0.5), start, 2.0) == []
-    assert lap_ends(np.zeros((9, 3)), start, 2.0) == []
-
-
 def test_who_comes_back_past_the_start_to_leave_by_the_other_side_has_not_ended_a_lap():
     along = np.concatenate([np.arange(20), np.arange(20, -20, -1), np.arange(-20, 20)]).astype(float)
     there_and_back = np.stack([along, 0 * along, np.where(np.gradient(along) < 0, np.pi, 0.0)], axis=1)
@@ -45,13 +37,6 @@ def test_the_seven_laps_around_the_shelves_are_seven_though_the_first_is_driven_
     truth = SimulatedRecording(world_of("home_store_small"), "laps", 0).truth
     ends = lap_ends(truth, truth[0], 2.0)
     assert np.diff([0, *ends, len(truth)]) / len(truth) == pytest.approx([0.255, *[0.124] * 6], abs=0.002)
-
-
-def test_each_lap_has_its_own_errors():
-    laps = curves(circle(3), np.repeat([0.4, 0.2, 0.1], 40))["laps"]
-    assert [lap["frames"] for lap in laps] == [40, 40, 40]
-    assert [lap["position_error_m"]["mean"] for lap in laps] == pytest.approx([0.4, 0.2, 0.1])
-    assert [lap["odometry_error_m"]["mean"] for lap in laps] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
 def test_over_the_steps_each_entry_is_the_mean_of_its_share(monkeypatch):

@@ -70,12 +70,6 @@ def test_what_is_learned_late_is_held_against_where_it_was_seen():
     assert followed(WAY, late, [None] * 4 + [mixture((0, 1.0, 1.0)), None])["references"] == 0
 
 
-def test_points_lie_along_the_way_where_they_were_seen_however_late_they_came():
-    late = [event()] * 4 + [event([0, 1], seen=[3, 1]), event()]
-    found = followed(WAY, late, [None] * 4 + [mixture((0, 20.0, 1.0), (1, 20.0, 1.0)), None])
-    assert found["along_m"] == [0.0, 2.0]
-
-
 def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
     """A lap of 40 frames, points seen in every second one: wrong for 3 laps, a lap longer after each so many points."""
     events, mixtures = [event()] * (40 * laps), [None] * (40 * laps)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from measured_drives import AT_ORIGIN, Row, figures, made_drive, on_x
-from small_run import small_run
 
 from omninav.pipeline import Context
 from omninav.pipeline.report.key_figures import key_figures
@@ -101,12 +100,6 @@ def test_odometry_alone_is_measured_like_the_estimate():
 def test_with_several_logs_the_top_is_the_last_and_each_has_an_entry():
     found = measured(off_by(1.0, 2.0, logs=[0, 1]))
     assert means(found, *found["logs"]) == [2.0, 1.0, 2.0]
-
-
-def test_a_filter_that_finds_itself_converges():
-    found = measured(small_run(frames=60).drive)
-    assert found["converged_after_frames"] < 20
-    assert found["after_convergence"]["position_error_m"]["median"] < 0.2
 
 
 def test_the_way_is_that_of_the_true_path_in_the_plane():
