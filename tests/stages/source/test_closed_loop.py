@@ -11,7 +11,6 @@ from world_files import DEMO
 
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
-from omninav.stages.control.clearance import free_ahead, roomier_side
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
@@ -224,14 +223,6 @@ def ring(**near: float) -> Scan:
     for name, metres in near.items():
         ranges[int(name[1:])] = metres
     return Scan(ranges, -math.pi, math.pi / 8, nearest=0.0, farthest=4.0)
-
-
-def test_free_way_is_the_nearest_echo_within_the_robots_width():
-    scan = ring(_8=2.0, _9=0.6, _12=0.3, _0=0.3)
-    ranges = np.minimum(scan.ranges, 4.0)
-    assert free_ahead(ranges, scan.azimuths(), 0.25, 0.15) == pytest.approx(0.6 * math.cos(math.pi / 8) - 0.25)
-    assert free_ahead(ranges, scan.azimuths(), 0.20, 0.0) == pytest.approx(2.0 - 0.20)
-    assert roomier_side(ranges, scan.azimuths()) < 0
 
 
 def test_the_driver_goes_on_where_there_is_room_and_turns_on_the_spot_where_there_is_none():
