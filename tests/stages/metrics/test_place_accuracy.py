@@ -12,7 +12,6 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.place_prior import PlacePrior
 from omninav.stages.metrics.place_accuracy import PlaceAccuracy
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.pose import Pose
 
 ROW = made_map([(0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (6.0, 0.0)], {(0, 1): 0, (1, 2): 0, (2, 3): 0})
 UPDATES = "omninav.stages.metrics.place_accuracy.UPDATES"
@@ -78,22 +77,6 @@ def test_places_beside_each_other_are_near_in_any_direction():
     assert found["place_distance_m"] == pytest.approx((np.hypot(2.0, 0.1) + np.hypot(1.9, 1.9)) / 2)
 
 
-def started(index: int = 0, truth: Pose | None = None, **parameters) -> PlaceBelief | None:
-    return PlacePrior(**parameters).step(Context("start"), Tick(index, index, 0, index, index == 0), ROW, truth).belief
-
-
-def test_a_robot_may_be_kidnapped_again_and_again():
-    begun = [started(index, restart_after=3) is not None for index in range(7)]
-    assert begun == [True, False, False, True, False, False, True]
-
-
-@pytest.mark.parametrize(("at", "place"), [("truth", 2), ("origin", 0), ((5.5, 0.0, 0.0, 0.1, 0.1), 3)])
-def test_a_start_is_the_place_closest_to_it(at, place):
-    belief = started(truth=Pose(4.4, 1.0, 0.0), at=at)
-    assert belief is not None
-    assert belief.probabilities.tolist() == np.eye(4)[place].tolist()
-
-
 def test_a_start_at_the_truth_needs_one():
     with pytest.raises(BadInput, match="start=uniform"):
-        started(at="truth")
+        PlacePrior(at="truth").step(Context("start"), Tick(0, 0, first_of_log=True), ROW)
