@@ -17,6 +17,10 @@ def vector(direction, turn=0.0, inliers=10, state="tracking"):
     return HomingVector(0, direction, turn, 1.0, 1.0, 1.0, None, inliers, state)
 
 
+def degrees(angle):
+    return pytest.approx(math.degrees(angle))
+
+
 def at(arrived):
     return PathProgress(path=0, at=0, of=1, target=0, last=True, docking=False, arrived=arrived)
 
@@ -36,22 +40,24 @@ def homing(path=PATH, vectors=VECTORS, arrived=(True, False, False, True, True),
     return found and found["homing"]
 
 
-def test_the_error_at_the_end_is_that_of_the_last_pose_however_close_it_came_before():
-    found = homing()
-    assert found["end_error_m"] == pytest.approx(0.5)
-    assert found["end"] == {"error_m": {"mean": pytest.approx(0.5), "std": 0.0}, "frames": 1}
-    assert found["end_turn_deg"] == pytest.approx(math.degrees(0.1))
-
-
-def test_it_begins_where_it_was_carried_to():
-    found = homing()
-    assert found["start_m"] == pytest.approx(4.0)
-    assert (found["arrived"], found["time_s"]) == (1, 4.0)
-    assert found["first"] == {
-        "direction_error_deg": pytest.approx(math.degrees(0.2)),
-        "turn_error_deg": pytest.approx(math.degrees(0.3)),
-        "inliers": 30,
+def test_it_begins_where_it_was_carried_to_and_ends_with_its_last_pose_however_close_it_came_before(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    assert homing() == {
+        "start_m": pytest.approx(4.0),
+        "reached": 1,
+        "arrived": 1,
+        "end_error_m": pytest.approx(0.5),
+        "end": {"error_m": {"mean": pytest.approx(0.5), "std": 0.0}, "frames": 1},
+        "end_turn_deg": degrees(0.1),
+        "time_s": 4.0,
+        "lost_rate": pytest.approx(1 / 4),
+        "direction_error_deg": {"median": degrees(0.3), "p90": degrees(0.38), "max": degrees(0.4)},
+        "inliers": 14.0,
+        "first": {"direction_error_deg": degrees(0.2), "turn_error_deg": degrees(0.3), "inliers": 30},
     }
+    monkeypatch.setattr(f"{MODULE}.FROM_M", 0.1)
+    assert homing()["direction_error_deg"]["max"] > 60.0
 
 
 def test_a_robot_that_drives_on_away_from_home_begins_where_it_was_put_down():
@@ -62,20 +68,10 @@ def test_a_robot_that_drives_on_away_from_home_begins_where_it_was_put_down():
     assert found["first"]["direction_error_deg"] == pytest.approx(180.0)
 
 
-def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_from_m(monkeypatch: pytest.MonkeyPatch):
-    found = homing()
-    assert found["lost_rate"] == pytest.approx(1 / 4)
-    assert found["inliers"] == 14.0
-    degrees = [math.degrees(error) for error in (0.3, 0.38, 0.4)]
-    assert list(found["direction_error_deg"].values()) == pytest.approx(degrees)
-    monkeypatch.setattr(f"{MODULE}.FROM_M", 0.1)
-    assert homing()["direction_error_deg"]["max"] > 60.0
-
-
 def test_a_vector_at_from_m_itself_is_not_measured(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(f"{MODULE}.FROM_M", 0.5)
     found = homing(on_x([0.0, 4.0, 0.5]), [None, vector(math.pi + 0.1), vector(math.pi + 0.7)], (False,) * 3)
-    assert found["direction_error_deg"]["max"] == pytest.approx(math.degrees(0.1))
+    assert found["direction_error_deg"]["max"] == degrees(0.1)
 
 
 def test_who_never_says_that_it_arrived_has_not():
@@ -125,4 +121,4 @@ def test_angles_are_compared_the_short_way_around():
     vectors = [None, *[vector(ahead + off - 2 * math.pi, 6.0 - 0.5) for off in (0.0, 0.0, 0.9)]]
     found = homing(path, vectors, (False,) * 4)
     assert found["direction_error_deg"]["median"] == pytest.approx(0.0, abs=1e-6)
-    assert found["first"]["turn_error_deg"] == pytest.approx(math.degrees(0.5))
+    assert found["first"]["turn_error_deg"] == degrees(0.5)
