@@ -25,11 +25,6 @@ def own(values, at=HERE, poses=POSES, candidates=None):
     return DescriptorContrast().step(Context("own"), similarities, at and Pose(*at), graph).likeness
 
 
-def test_each_reference_counts_by_where_it_was_taken() -> None:
-    found = own([0.9, 0.7, 0.99, 0.5, 0.3, 1.0])
-    assert (found.own, found.nearby, found.average, found.most) == pytest.approx((0.9, 0.7, 0.4, 0.5))
-
-
 def test_a_panorama_is_compared_at_the_robots_heading_and_elsewhere_at_the_best() -> None:
     values = np.full((6, 4), 0.1)
     values[0, 1], values[0, 2], values[3, 3] = 0.8, 0.95, 0.6  # the robot stands turned left by a quarter: column 1
