@@ -27,12 +27,6 @@ def test_errors_are_those_of_the_odometry_of_the_first_visit(kept: float, monkey
     }
 
 
-def test_a_place_is_visited_again_once_the_robot_has_been_away():
-    # Away by 3 m of path: still the same visit. By 6 m: another. A new log begins others everywhere.
-    cells, ways = np.array([0, 1, 1, 0, 1, 1, 0, 0]), np.array([np.inf, 1, 1, 1, 3, 1, 2, np.inf])
-    assert visit_numbers(cells, ways, 5.0).tolist() == [1, 1, 1, 1, 1, 1, 2, 3]
-
-
 def test_each_number_of_visits_has_its_own_mean(monkeypatch: pytest.MonkeyPatch):
     drive = there_and_back(2, 0.1, 1.0)
     drive.estimate[20:, 1] += 1.0  # the second time
