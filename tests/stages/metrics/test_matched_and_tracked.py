@@ -65,16 +65,12 @@ class Run:
         return found and found["pairs"]
 
 
-def test_exact_pairs_are_all_right_and_have_no_noise():
+def test_exact_pairs_are_all_right_without_noise_and_of_the_images_they_are_said_to_be():
     found = Run().judged()
     for kind in ("matched", "tracked"):
         assert found[kind]["used"] == found[kind]["right"] == N
         assert found[kind]["noise_deg"] == pytest.approx(0.0, abs=1e-6)
     assert (found["maps"], found["kept"]) == (1, 1.0)
-
-
-def test_pairs_are_of_the_images_they_are_said_to_be():
-    found = Run().judged()
     assert found["matched"]["apart_m"] == pytest.approx(3.0)
     assert found["tracked"]["apart_m"] == pytest.approx(math.hypot(*between(AWAY, NEAR)[:2]))
 
