@@ -29,8 +29,7 @@ class Case:
     `difference` is ours less the other side; `interval` its 95 % interval over `scenarios` and the seeds in each. Of a
     largest figure there is none: `kept` of the `repetitions` keep to the limit, and the interval of that share decides.
     `holds` is None where a condition has no results, and where the repetitions cannot decide. `judged` of `repetitions`
-    have a figure (steps until converged are those of the ones that converged): with fewer than all a claim may fail and
-    does not hold. `ratio`: the figures are ratios of means.
+    have a figure: steps until converged are those of the ones that converged. `ratio`: the figures are ratios of means.
     """
 
     where: str
@@ -152,7 +151,7 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     interval = low - limit, high - limit
     judged, scenarios = len(ours), _scenarios(ours)
     few = ratio and scenarios < MIN_GROUPS
-    holds = None if few else decided(side, interval, measure.margin_beside(limit), scenarios, survivors=judged < ran)
+    holds = None if few else decided(side, interval, measure.margin_beside(limit), scenarios)
     return Case(where, found, limit, against, found - limit, interval, holds, judged, ran, ratio, scenarios)
 
 
@@ -180,23 +179,20 @@ def _against_samples(
     mean = float(np.mean(list(differences.values())))
     ours_mean = float(np.mean([ours[each] for each in both]))
     judged, scenarios = len(both), _scenarios(differences)
-    holds = decided(side, interval, measure.margin_beside(ours_mean - mean), scenarios, survivors=judged < ran)
+    holds = decided(side, interval, measure.margin_beside(ours_mean - mean), scenarios)
     return Case(where, ours_mean, ours_mean - mean, against, mean, interval, holds, judged, ran, scenarios=scenarios)
 
 
-def decided(
-    side: Side, interval: tuple[float, float], margin: float, scenarios: int, survivors: bool = False
-) -> bool | None:
+def decided(side: Side, interval: tuple[float, float], margin: float, scenarios: int) -> bool | None:
     """Judges a comparison by the whole interval of the difference: true, false, or None where that leaves it open.
 
-    One scenario says nothing of the next one, and nor do equal figures of fewer than six. With `survivors`, runs
-    without a figure, it may fail and does not hold.
+    One scenario says nothing of the next one, and nor do equal figures of fewer than six.
     """
     low, high = interval
     if scenarios < 2 or (scenarios < MIN_GROUPS and low == high):
         return None
     if _keeps(side, low, margin) and _keeps(side, high, margin):
-        return None if survivors else True
+        return True
     return None if _keeps(side, low, margin) or _keeps(side, high, margin) else False
 
 
