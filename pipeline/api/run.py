@@ -11,7 +11,7 @@ from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.problems import BadInput, suggest
-from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline.graph.small_files import read_mapping
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.key_figures import key_figures
 from omninav.pipeline.report.progress import Progress
@@ -69,7 +69,7 @@ class Run:
     @property
     def settings(self) -> dict[str, Any]:
         """Its whole configuration."""
-        return dict(read_yaml(self.folder / CONFIG))
+        return read_mapping(self.folder / CONFIG)
 
     @property
     def metrics(self) -> Figures:

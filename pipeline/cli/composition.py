@@ -126,7 +126,10 @@ def complete(config: Any) -> dict[str, Any]:
 
 
 def _refuse_no_mappings(config: Any) -> None:
-    """Raise `ProblemsFound` where a part of the graph is no mapping of names."""
+    """Raise `ProblemsFound` where a part of the graph is no mapping of names, or a variant has none of them."""
+    if isinstance(config.get("variant"), DictConfig):
+        hint = "begin the variant's file with the line `# @package _global_`"
+        raise ProblemsFound([Problem("variant", "what its file says stands below `variant`", hint)])
     parts = {part: config.get(part) for part in ("nodes", "wires", "artifacts")}
     wrong = [part for part, given in parts.items() if not isinstance(given, DictConfig | None)]
     if wrong:

@@ -19,6 +19,7 @@ import importlib.util
 import inspect
 import os
 import pkgutil
+import re
 import shlex
 import sys
 from collections.abc import Collection, Iterator
@@ -39,6 +40,8 @@ from .value import Value
 BUILT_IN = "omninav.stages"
 ENVIRONMENT = "OMNINAV_STAGES"
 ENTRY_POINTS = "omninav.stages"
+SETTING = re.compile(r"[+~]*[\w./]+=")
+"""The beginning of a word that sets something."""
 
 
 class UnknownStage(Exception):
@@ -101,8 +104,12 @@ _TYPED: ContextVar[Collection[str] | None] = ContextVar("typed", default=None)
 def only_listed(typed: Collection[str]) -> Iterator[None]:
     """Resolve only names of stages that are listed (`is_listed`), and those whose module or file the user `typed`.
 
-    For configurations from elsewhere, as in a run's folder: their code is not imported unasked.
+    For configurations from elsewhere, as in a run's folder: their code is not imported unasked. Raises `BadInput` for a
+    setting, which would change nothing.
     """
+    for word in typed:
+        if SETTING.match(word):
+            raise BadInput(f"{cut(word)}: a run that was started keeps its settings; leave it away, or start another")
     token = _TYPED.set(typed)
     try:
         yield

@@ -47,6 +47,14 @@ def read_yaml(path: Path) -> Any:
     return parse_yaml(read_small(path), str(path))
 
 
+def read_mapping(path: Path) -> dict[str, Any]:
+    """Reads a YAML file of names and values. Raises `BadInput`, also where there is nothing in it."""
+    found = read_yaml(path)
+    if not isinstance(found, dict):
+        raise BadInput(f"{path}: expected names and values, found {'nothing' if found is None else repr(found)[:60]}")
+    return found
+
+
 def parse_yaml(content: bytes | str, where: str) -> Any:
     """Reads a YAML text as `read_yaml` does. `where` names it in messages.
 

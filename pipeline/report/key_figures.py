@@ -33,8 +33,9 @@ def key_figures(metrics: Metrics, timing: Mapping[str, Any]) -> list[KeyFigure]:
     """The headlines that the stages state, else their first figures; then how fast the run was (of timing.json)."""
     known = {path: number for path, number in numbers(metrics).items() if number.entry.has_figure(number.value)}
     first = [known[path] for path in headlines([metrics]) if path in known] or _plain(known, metrics)
-    speed = _speed(timing)
-    return [_figure(number) for number in first[: MAX_FIGURES - len(speed)]] + speed
+    ends, logs = _speed(timing), len(metrics.values.get("logs") or ())
+    begins = [KeyFigure("Log", f"the last of {logs}; of each, `logs` in metrics.json")] if logs > 1 else []
+    return [*begins, *map(_figure, first[: MAX_FIGURES - len(begins) - len(ends)]), *ends]
 
 
 def _figure(number: Number) -> KeyFigure:

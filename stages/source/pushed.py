@@ -30,8 +30,8 @@ from .outputs import DriveOutputs, motion_of, pose_of
 Row = npt.NDArray[np.float64]
 INTERVAL_NS = 100_000_000
 """Time between images that come without a time stamp, ns."""
-MAX_STAMP_NS = 1 << 62
-"""A stamp lies within 146 years of 1970."""
+MAX_STAMP_NS = 10**9 << 31
+"""Nanoseconds since 1970 below which a stamp lies: ROS counts seconds in 31 bits."""
 MAX_NUMBER = 1e8
 """Largest accepted coordinate of a pose (m, rad)."""
 MAX_READINGS = 100_000
@@ -116,8 +116,10 @@ class PushedSource(Source):
         pixels = _pixels(image)
         if stamp is not None and (isinstance(stamp, bool) or not isinstance(stamp, int | np.integer)):
             raise BadInput(f"step: stamp={cut(stamp)}, expected whole nanoseconds; seconds are int(seconds * 1e9)")
-        if stamp is not None and abs(int(stamp)) > MAX_STAMP_NS:
-            raise BadInput(f"step: stamp={cut(stamp)}, expected nanoseconds within {MAX_STAMP_NS} of 1970")
+        if stamp is not None and not 0 <= int(stamp) < MAX_STAMP_NS:
+            raise BadInput(
+                f"step: stamp={cut(stamp)}, expected nanoseconds since 1970, 0 or more and below {MAX_STAMP_NS}"
+            )
         if not isinstance(new_log, bool | np.bool_):
             raise BadInput(f"step: new_log={cut(new_log)}, expected True or False")
         scan = _sound_scan(scan)

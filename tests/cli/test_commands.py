@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -278,6 +279,11 @@ def test_compare_and_report_print_tables(omninav, demo: Path, tmp_path: Path):
     assert "What happened, stretch by stretch" in (demo / "report.html").read_text()
     assert omninav("compare", str(demo)).returncode == 2
     assert omninav("report", str(tmp_path)).returncode == 2
+    for command, word in (("report", "lost_m=1"), ("resume", "seed=3")):
+        assert "keeps its settings" in omninav(command, str(demo), word).stderr
+    cut_off = shutil.copytree(demo, tmp_path / "cut_off")
+    (cut_off / "config.yaml").write_text("")
+    assert "cut_off/config.yaml: expected names and values" in omninav("compare", str(demo), str(cut_off)).stderr
 
 
 def test_the_latest_runs_map_gives_the_same_run_as_its_tour_and_another_seed_another_run(

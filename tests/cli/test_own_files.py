@@ -2,13 +2,15 @@
 
 from pathlib import Path
 
+import pytest
 from hydra import initialize
 from hydra._internal.core_plugins.importlib_resources_config_source import ImportlibResourcesConfigSource
 from hydra.core.global_hydra import GlobalHydra
 
-from omninav.pipeline.cli.composition import composed
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.cli.config_groups import group_options, listed_groups
 from omninav.pipeline.cli.config_sources import OwnFiles
+from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.graph.registry import is_role, of_role
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
@@ -28,6 +30,17 @@ def test_a_stage_is_an_option_of_its_role_without_a_file():
     with composed(["variant=omniview_mcl", "match=l2"]) as config:
         assert config.nodes.match._target_ == "omninav.stages.match.l2.L2Match"
         assert config.wires.match.map == "artifacts.map"  # the wires are the variant's
+
+
+def test_a_variant_without_its_first_line_is_told_so(tmp_path: Path):
+    (tmp_path / "variant").mkdir()
+    for content in ("nodes: {match: {headings: 3}}", ""):
+        (tmp_path / "variant" / "mine.yaml").write_text(content)
+        with (
+            composed(["--config-dir", str(tmp_path), "variant=mine"]) as config,
+            pytest.raises(ProblemsFound, match="# @package _global_"),
+        ):
+            complete(config)
 
 
 def test_every_stage_of_a_group_is_among_its_options():

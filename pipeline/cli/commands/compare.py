@@ -4,7 +4,7 @@ from pathlib import Path
 
 from omninav.pipeline.cli.terminal import show
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline.graph.small_files import read_mapping
 from omninav.pipeline.report.terminal_tables import compare_table
 from omninav.pipeline.run.metrics_files import read_metrics
 
@@ -17,8 +17,8 @@ def command(arguments: list[str]) -> int:
     for word in (run for given in arguments for run in runs_in(given)):
         folder = Path(word)
         metrics = read_metrics(folder)
-        config = read_yaml(folder / "config.yaml")
-        manifest = read_yaml(folder / "manifest.json")
+        config = read_mapping(folder / "config.yaml")
+        manifest = read_mapping(folder / "manifest.json")
         runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
     show(compare_table(runs))
     return 0

@@ -19,10 +19,10 @@ def command(arguments: list[str]) -> int:
     plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
     named = [word for word in arguments if not word.startswith("plots=")]
     folder = Path(named[0] if named else "runs/latest").absolute()
-    if plots:
-        from omninav.pipeline.run.redraw import redraw
+    with only_listed(named[1:]), Progress() as progress:
+        if plots:
+            from omninav.pipeline.run.redraw import redraw
 
-        with only_listed(named[1:]), Progress() as progress:
             redraw(folder, plots[-1], progress)
     if (folder / "sweep.html").is_file():
         show_sweep(folder)

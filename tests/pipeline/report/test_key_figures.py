@@ -38,6 +38,14 @@ def test_a_share_is_off_below_its_least():
     assert found == [True, False, False]
 
 
+def test_figures_of_one_of_several_logs_say_so():
+    assert shown(Metrics({"b": 3, "logs": [{}, {}]}, headlines=("b",))) == [
+        ("Log", "the last of 2; of each, `logs` in metrics.json"),
+        ("B", "3"),
+    ]
+    assert shown(Metrics({"b": 3, "logs": [{}]}, headlines=("b",))) == [("B", "3")]
+
+
 def test_what_has_no_figure_has_no_line():
     assert shown(Metrics({"a": None, "b": 3}, headlines=("a", "b", "c"))) == [("B", "3")]
 
