@@ -89,7 +89,7 @@ class InputConflicts(Stage):
 
     Motion seen in the images (turns between panoramas, and whether anything changes) is compared with odometry's, over
     the last `WINDOW` images; the track of single images' best matches in the map, without any belief, with odometry's
-    track and with the estimate. A finding needs two judgements in a row, is said once, as a warning, with what to
+    track and with the estimate. A finding but that of a frozen camera needs two judgements in a row, is said once, as a warning, with what to
     check, and stands until two judgements in a row do not find it. Where nothing measured the motion, nothing is said
     of it. Which conflicts are noticed after how many images, where the limits are from, and what cannot be noticed:
     docs/conflicts.md.
@@ -129,6 +129,8 @@ class InputConflicts(Stage):
             if similarities is not None and map is not None and min(similarities.values.shape) > 1:
                 match = best_place(similarities, map)
                 recent.rows[-1, 4:7], recent.rows[-1, 7] = match, lies_at(match, estimate, metres)
+            if recent.rows[-1, 10] and (sentence := frozen(Watched(recent.rows), metres)):
+                self._say(ctx, recent, "frozen", sentence)  # what is equal to the last bit needs no second judgement
             recent.judged += 1
             if not recent.judged % EVERY:
                 compare_strips(recent)
@@ -216,6 +218,7 @@ def remember(recent: InputConflictsState, stamp: int, pixels: Floats) -> None:
         recent.strips = []
     elif recent.strips[-1].shape == pixels.shape:
         row[0, 0] = recent.rows[-1, 0] + (stamp - recent.stamp) / 1e9
+        row[0, 10] = float((recent.strips[-1] == pixels).all())
     recent.rows = np.concatenate((recent.rows, row))[-WINDOW:]
     recent.strips.append(pixels)
     recent.stamp = stamp
@@ -228,8 +231,7 @@ def compare_strips(recent: InputConflictsState) -> None:
         strips = np.stack(list(run))
         first, end = end, end + len(strips)
         if len(strips) > 1:
-            same = (strips[1:] == strips[:-1]).all(axis=(1, 2))
-            recent.rows[first + 1 : end or None, 8:] = np.column_stack([*turns_and_correlations(strips), same])
+            recent.rows[first + 1 : end or None, 8:10] = np.column_stack(turns_and_correlations(strips))
     recent.strips = recent.strips[-1:]
 
 
@@ -238,7 +240,7 @@ MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
 LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)
 """A robot that drives on does at least so much between two images (m), and lies at most this share of it and this angle
 (rad) off from where the last step repeated leads."""
-MIN_FROZEN, FROZEN_M, FROZEN_RAD = 8, 1.0, 1.0
+MIN_FROZEN, FROZEN_M, FROZEN_RAD = 3, 0.5, 0.5
 """Images that are equal to the last bit while odometry drives so far (m) or turns so much (rad) are one image."""
 MIN_BLIND, BLIND_CORRELATION = 16, 0.15
 """Images that have less in common than this with the ones before show nothing, or noise."""
