@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
+from omninav.stages.geometry.arrays import Array, Ints
 
 
 @dataclass(frozen=True)
 class Tiling:
     """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
 
-    tiles: I64
+    tiles: Ints
     width: float
     height: float
 
@@ -37,7 +35,7 @@ class Box:
     faces: Coverings
 
 
-def box_array(boxes: Sequence[Box]) -> F64:
+def box_array(boxes: Sequence[Box]) -> Array:
     """Boxes (B, 9): centre x, y, cosine, sine of the yaw, half length, half depth, lower, upper z, squared radius."""
     rows = [
         (*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high, b.half[0] ** 2 + b.half[1] ** 2)

@@ -4,16 +4,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
 from omninav.stages.recordings.camera_yaml import camera_from
 from omninav.stages.recordings.recording import UnreadableRecording
 
 from .config import Sensor, WorldConfig
-
-F64 = npt.NDArray[np.float64]
-
 
 RAYS_PER_WEDGE = 200
 """About how many rays share one look around: fewer looks for more rays cost less, but each finds more bodies."""
@@ -32,14 +29,14 @@ class Rays:
     """
 
     shape: tuple[int, int]
-    pixels: npt.NDArray[np.int32]
-    directions: npt.NDArray[np.float32]
-    footprint: npt.NDArray[np.float32]
-    gain: npt.NDArray[np.float32]
-    wedge_start: npt.NDArray[np.int32]
-    wedges: F64
-    ray_of: npt.NDArray[np.int32]
-    own: npt.NDArray[np.float32]
+    pixels: Shorts
+    directions: Floats
+    footprint: Floats
+    gain: Floats
+    wedge_start: Shorts
+    wedges: Array
+    ray_of: Shorts
+    own: Floats
 
 
 def camera_of(world: WorldConfig) -> Camera:
@@ -50,11 +47,11 @@ def camera_of(world: WorldConfig) -> Camera:
     return camera
 
 
-def shutter_times(sensor: Sensor, at: float) -> F64:
+def shutter_times(sensor: Sensor, at: float) -> Array:
     """Moments (s) of the sub-exposures of an image taken at a time: they lie evenly around it."""
     if sensor.shutter == 0.0:
         return np.array([at])
-    parts: F64 = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)
+    parts: Array = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)
     return parts
 
 
@@ -106,7 +103,7 @@ def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0
     )
 
 
-def leaning(rays: Rays, rotation: F64) -> Rays:
+def leaning(rays: Rays, rotation: Array) -> Rays:
     """The rays of a camera that leans: `rotation` (3, 3) brings its frame to that of the level robot.
 
     The robot's own image stays as it is.
@@ -128,7 +125,7 @@ def leaning(rays: Rays, rotation: F64) -> Rays:
     )
 
 
-def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
+def _own_body(directions: Array, radius: float, camera: Camera) -> Array:
     """Colours (..., 3), blue-green-red, of the robot along rays (..., 3) from its camera; NaN where they pass it.
 
     It is a round deck with a mark in front, and under a mirror the camera that looks up at it.
@@ -152,7 +149,7 @@ def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
     return colours
 
 
-def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32], F64]:
+def _wedges(directions: Array) -> tuple[Ints, Shorts, Array]:
     """Rays (N, 3) by azimuth: the order that brings wedges together and lower rays first, and `Rays`' two arrays."""
     azimuth = np.arctan2(directions[:, 1], directions[:, 0])
     level = np.hypot(directions[:, 0], directions[:, 1])
@@ -167,9 +164,7 @@ def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int3
     return _gathered(np.mod(number.astype(np.int64), count), azimuth[0] + number * around, azimuth, slope)
 
 
-def _gathered(
-    number: npt.NDArray[np.int64], middle: F64, azimuth: F64, slope: F64
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32], F64]:
+def _gathered(number: Ints, middle: Array, azimuth: Array, slope: Array) -> tuple[Ints, Shorts, Array]:
     """Rays (N,) in the order of their wedges' numbers, and the wedges; `middle` is the azimuth of each ray's wedge."""
     order = np.lexsort((slope, number))
     _, start = np.unique(number[order], return_index=True)
@@ -181,7 +176,7 @@ def _gathered(
     return order, np.append(start, len(order)).astype(np.int32), wedges
 
 
-def _pixel_angles(directions: F64) -> tuple[F64, F64]:
+def _pixel_angles(directions: Array) -> tuple[Array, Array]:
     """Angles between neighbouring rays along rows and along columns, each (rows, columns)."""
     across = np.linalg.norm(np.gradient(directions, axis=1), axis=-1)
     down = np.linalg.norm(np.gradient(directions, axis=0), axis=-1)

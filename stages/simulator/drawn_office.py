@@ -6,16 +6,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.arrays import Array
 
 from .config import Door, Kidnapping, Point, Room, Route, Side, WallPanel, WorldConfig
 from .mirrored import Mirrored
 from .standing_room import standing_room, within
 from .streams import stream
 
-F64 = npt.NDArray[np.float64]
 FEW_ROOMS = 8
 """Below this number of rooms the corridor has neither branches nor a core."""
 MIN_FRONT_M = 3.5
@@ -319,7 +318,7 @@ def _spot(
 # Routes
 
 
-def _led(route: Route, listed: WorldConfig, drawn: WorldConfig, hall: Room, places: F64) -> Route:
+def _led(route: Route, listed: WorldConfig, drawn: WorldConfig, hall: Room, places: Array) -> Route:
     """A listed route through the same rooms: each point keeps its place relative to its room's walls and door.
 
     Where something stands there it is moved to the nearest of the `places` (N, 2) in the room.

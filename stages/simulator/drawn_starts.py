@@ -3,20 +3,19 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.recording import UnreadableRecording
 
 from .streams import stream
 from .world import World
 
-F64 = npt.NDArray[np.float64]
 CLEARANCE_M = 0.1
 """Between the robot's body and everything, where it starts."""
 TRIES = 10_000
 
 
-def drawn_pose(world: World, rng: np.random.Generator) -> F64:
+def drawn_pose(world: World, rng: np.random.Generator) -> Array:
     """A pose (x, y, heading): uniform over a world's free floor, any heading.
 
     Raises `UnreadableRecording` where the world has no free floor.
@@ -24,7 +23,7 @@ def drawn_pose(world: World, rng: np.random.Generator) -> F64:
     return drawn_way_back(world, rng, 0.0)[0]
 
 
-def drawn_way_back(world: World, rng: np.random.Generator, metres: float) -> tuple[F64, F64]:
+def drawn_way_back(world: World, rng: np.random.Generator, metres: float) -> tuple[Array, Array]:
     """Such a pose, and one `metres` away from which the straight way back is free; both face anywhere.
 
     Raises `UnreadableRecording` where the world has no room for that.

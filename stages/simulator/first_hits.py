@@ -7,13 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 
 from .bodies import Box, box_array
 
-F64 = npt.NDArray[np.float64]
 
-
-def first_hits(boxes: Sequence[Box], ceiling: float, eye: npt.ArrayLike, directions: npt.ArrayLike) -> F64:
+def first_hits(boxes: Sequence[Box], ceiling: float, eye: npt.ArrayLike, directions: npt.ArrayLike) -> Array:
     """Metres (N,) from a point `eye` (3,) of the map along unit vectors (N, 3) to the floor, the ceiling or a body.
 
     Every ray is tested against every body, by slabs in the body's own frame. A body around the eye is left out.
@@ -24,7 +23,7 @@ def first_hits(boxes: Sequence[Box], ceiling: float, eye: npt.ArrayLike, directi
 
 
 @compiled(error_model="numpy")
-def _hits(boxes: F64, ceiling: float, eye: F64, rays: F64) -> F64:
+def _hits(boxes: Array, ceiling: float, eye: Array, rays: Array) -> Array:
     nearest = np.full(len(rays), math.inf)
     for i in range(len(rays)):
         dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 
 from .config import Day, Lamp, WallPanel, WorldConfig
 from .streams import stream
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 
 LIGHT_RANGE_M = 12.0
 """Distance (m) beyond which a light adds nothing: what little would come from there is part of the ambient light."""
@@ -111,12 +108,12 @@ def lamps_on(lamps: Sequence[Lamp], config: WorldConfig, number: int) -> list[bo
 def light_map(
     lights: Sequence[Light],
     ambient: float,
-    boxes: F64,
+    boxes: Array,
     height: float,
-    corner: F64,
+    corner: Array,
     size: tuple[float, float],
     step: float,
-) -> F32:
+) -> Floats:
     """Irradiance (5, rows, columns, 3) of faces that look up, +x, -x, +y, -y, at points `step` m apart from `corner`.
 
     It falls with the square of the distance, and with the angles at the light and at the face. What is as high as the
@@ -143,16 +140,16 @@ def light_map(
     return lit
 
 
-def contact_map(boxes: F64, corner: F64, size: tuple[float, float], step: float) -> F32:
+def contact_map(boxes: Array, corner: Array, size: tuple[float, float], step: float) -> Floats:
     """What bodies that stand on the floor leave of its light (rows, columns): 0.6 beside them, 1 some way off."""
     columns, rows = (math.ceil((extent - 2 * c) / step) + 2 for extent, c in zip(size, corner, strict=True))
     distance = np.full((rows, columns), 1e3, dtype=np.float32)
     _near(boxes[boxes[:, 6] < 0.3], corner, step, 6.0 * CONTACT_SHADOW_M, distance)
-    left: F32 = (1.0 - 0.4 * np.exp(-distance / CONTACT_SHADOW_M)).astype(np.float32)
+    left: Floats = (1.0 - 0.4 * np.exp(-distance / CONTACT_SHADOW_M)).astype(np.float32)
     return left
 
 
-def _blocking(boxes: F64, x: F64, y: F64, height: float) -> npt.NDArray[np.bool_]:
+def _blocking(boxes: Array, x: Array, y: Array, height: float) -> Bools:
     """Points (rows, columns) inside a body that leaves no way for light under the ceiling."""
     blocking = np.zeros((len(y), len(x)), dtype=np.bool_)
     tall = boxes[(boxes[:, 6] < 0.3) & (boxes[:, 7] > height - 0.3)]
@@ -161,7 +158,7 @@ def _blocking(boxes: F64, x: F64, y: F64, height: float) -> npt.NDArray[np.bool_
 
 
 @compiled()
-def _cover(boxes: F64, x: F64, y: F64, covered: npt.NDArray[np.bool_]) -> None:
+def _cover(boxes: Array, x: Array, y: Array, covered: Bools) -> None:
     """Mark the points that lie in a box, or no further from it than half a step: no wall is too thin to be met."""
     step = x[1] - x[0]
     for b in range(len(boxes)):
@@ -180,15 +177,15 @@ def _cover(boxes: F64, x: F64, y: F64, covered: npt.NDArray[np.bool_]) -> None:
 
 @compiled(error_model="numpy", parallel=True)
 def _shine(
-    lights: F64,
-    blocking: npt.NDArray[np.bool_],
-    x: F64,
-    y: F64,
+    lights: Array,
+    blocking: Bools,
+    x: Array,
+    y: Array,
     height: float,
-    heights: F64,
-    faces: F64,
-    lit: F32,
-    full: F32,
+    heights: Array,
+    faces: Array,
+    lit: Floats,
+    full: Floats,
 ) -> None:
     """Add each light's irradiance to `lit` (5, rows, columns, 3), and to `full` (rows, columns) as if all were on."""
     step = x[1] - x[0]
@@ -224,7 +221,7 @@ def _shine(
 
 @compiled(error_model="numpy")
 def _sees(
-    blocking: npt.NDArray[np.bool_],
+    blocking: Bools,
     x: float,
     y: float,
     away_x: float,
@@ -246,7 +243,7 @@ def _sees(
 
 
 @compiled()
-def _near(boxes: F64, corner: F64, step: float, reach: float, distance: F32) -> None:
+def _near(boxes: Array, corner: Array, step: float, reach: float, distance: Floats) -> None:
     """Lower distances (rows, columns) to those of the boxes within `reach` m."""
     rows, columns = distance.shape
     for b in range(len(boxes)):

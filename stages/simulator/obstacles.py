@@ -5,13 +5,10 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Shorts
 from omninav.stages.geometry.plane.grid_rays import cells_along
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 CELL = 1.0
 """Size (m) of the cells in which boxes are looked up."""
@@ -36,9 +33,9 @@ class Obstacles(NamedTuple):
     `depth`: of the floor; what lies beyond is no room to drive.
     """
 
-    boxes: F64
-    start: I32
-    members: I32
+    boxes: Array
+    start: Shorts
+    members: Shorts
     rows: int
     columns: int
     width: float
@@ -66,7 +63,7 @@ def gather(bodies: Sequence[Body], size: tuple[float, float], reach: float) -> O
 
 
 @compiled(error_model="numpy")
-def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[float, float, float]:
+def nearest(obstacles: Obstacles, people: Array, x: float, y: float) -> tuple[float, float, float]:
     """Distance (m) of a point to the nearest obstacle, at most `reach`, and the direction x, y that leads away from it.
 
     `people` (M, 3): x, y, radius of round bodies. Inside an obstacle the distance is negative; the direction there
@@ -110,7 +107,7 @@ def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[floa
 
 
 @compiled(error_model="numpy")
-def distances(obstacles: Obstacles, points: F64) -> F64:
+def distances(obstacles: Obstacles, points: Array) -> Array:
     """Distances (N,) of points (N, 2) to the nearest obstacle, at most `reach`; 0 inside one or beyond the floor."""
     nobody = np.zeros((0, 3))
     found = np.empty(len(points))
@@ -120,7 +117,7 @@ def distances(obstacles: Obstacles, points: F64) -> F64:
 
 
 @compiled(error_model="numpy")
-def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: float, farthest: float) -> float:
+def beam(obstacles: Obstacles, people: Array, x: float, y: float, dx: float, dy: float, farthest: float) -> float:
     """Distance (m) along a unit direction to the first box or person, infinite beyond `farthest`."""
     best = np.inf
     for k in range(len(people)):
@@ -153,7 +150,7 @@ def _first_box(obstacles: Obstacles, row: int, column: int, x: float, y: float, 
 
 
 @compiled(error_model="numpy")
-def _enter(box: F64, x: float, y: float, dx: float, dy: float) -> float:
+def _enter(box: Array, x: float, y: float, dx: float, dy: float) -> float:
     """Distance at which a ray enters a box; 0 inside, infinite where it misses."""
     cos, sin = box[2], box[3]
     u, v = cos * (x - box[0]) + sin * (y - box[1]), cos * (y - box[1]) - sin * (x - box[0])

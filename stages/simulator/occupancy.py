@@ -4,9 +4,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.files import write_whole
+from omninav.stages.geometry.arrays import Bools
 
 from .world import World
 
@@ -14,7 +14,7 @@ FREE, OCCUPIED = 254, 0
 """Grey levels that map_server writes."""
 
 
-def occupancy(world: World, resolution: float = 0.05) -> tuple[npt.NDArray[np.bool_], tuple[float, float]]:
+def occupancy(world: World, resolution: float = 0.05) -> tuple[Bools, tuple[float, float]]:
     """Occupied cells (rows, columns), row 0 at the lowest y, and the map position (m) of the grid's lower left corner.
 
     A cell is occupied where an obstacle comes closer to its centre than half a cell.

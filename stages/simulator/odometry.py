@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.odometry_noise import add_odometry_noise
 from omninav.stages.geometry.plane.se2 import between, chain, wrap
 
 from .config import OdometryNoise
-
-F64 = npt.NDArray[np.float64]
 
 DRAWS = 6
 """Normal random numbers per increment."""
@@ -35,7 +34,7 @@ def draw_bias(noise: OdometryNoise, rng: np.random.Generator) -> Bias:
     )
 
 
-def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.random.Generator) -> F64:
+def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.random.Generator) -> Array:
     """True increments of motion (N, 3) as the wheels measure them.
 
     Each increment is split into rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4), and each part
@@ -62,7 +61,7 @@ def odometry(
     bias: Bias,
     rng: np.random.Generator,
     rolled_to: npt.ArrayLike | None = None,
-) -> F64:
+) -> Array:
     """Odometry poses (N, 3), the first at 0, 0, 0, of a drive through true poses (N, 3).
 
     `rolled_to` (N, 3): where the wheels brought the robot, where that was not where it went on from (it was lifted).
@@ -73,8 +72,8 @@ def odometry(
     return np.concatenate([np.zeros((1, 3)), chain(motions)])
 
 
-def _misjudged(rotation: F64, length: F64, noise: OdometryNoise, half: F64, bias: Bias, drawn: F64) -> F64:
+def _misjudged(rotation: Array, length: Array, noise: OdometryNoise, half: Array, bias: Bias, drawn: Array) -> Array:
     """Rotations as the wheels say, each with its half of what drifts over the metres."""
     sigma = np.sqrt(noise.rotation**2 * np.abs(rotation) + half)
-    seen: F64 = rotation * (1.0 + bias.rotation) + 0.5 * bias.turn * length + sigma * drawn
+    seen: Array = rotation * (1.0 + bias.rotation) + 0.5 * bias.turn * length + sigma * drawn
     return seen

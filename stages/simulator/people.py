@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools, Shorts
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .bodies import Coverings, Tiling
 from .streams import stream
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 OUTFITS = 16
 """Number of different outfits."""
@@ -103,7 +100,7 @@ def coverings(texture: Callable[[str, str], int], look: int) -> tuple[Coverings,
     )
 
 
-def figures(people: Sequence[Person], looks: I32) -> tuple[F64, I32]:
+def figures(people: Sequence[Person], looks: Shorts) -> tuple[Array, Shorts]:
     """Boxes (P, 9) of people's parts, as `bodies.box_array` has them, and their surfaces (P, 6) from `Scene.looks`."""
     if not people or not len(looks):
         return np.zeros((0, 9)), np.zeros((0, 6), dtype=np.int32)
@@ -132,7 +129,7 @@ def figures(people: Sequence[Person], looks: I32) -> tuple[F64, I32]:
     return boxes.reshape(-1, 9), looks[[person.look % len(looks) for person in people]].reshape(-1, 6)
 
 
-Clearance = Callable[[F64], F64]
+Clearance = Callable[[Array], Array]
 """Distance (m) of points (N, 2) to the nearest obstacle."""
 
 
@@ -187,8 +184,8 @@ class Walker:
 class Track(NamedTuple):
     """Where the robot was: times (N,) in seconds, ascending, and poses (N, 3)."""
 
-    times: F64
-    poses: F64
+    times: Array
+    poses: Array
 
 
 class Companion:
@@ -203,7 +200,7 @@ class Companion:
         self._phase = float(rng.uniform(0.0, 1.0))
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
-    def desired_place(self, seconds: float, track: Track, others: F64) -> F64 | None:
+    def desired_place(self, seconds: float, track: Track, others: Array) -> Array | None:
         """Where (2,) this person would like to be, from where the robot was up to then; None: no room but `others`'."""
         poses = track.poses[-2000:]
         x, y = poses[-1, :2]
@@ -226,7 +223,7 @@ class Companion:
             places = [*((1.0 - part) * beside + part * followed), *places]
         return next((place for place in places if self._has_room(place, x, y, others)), None)
 
-    def _has_room(self, place: F64, x: float, y: float, others: F64) -> bool:
+    def _has_room(self, place: Array, x: float, y: float, others: Array) -> bool:
         """Whether a place is free and, if near the robot at (x, y), has a free line to it."""
         if math.hypot(place[0] - x, place[1] - y) < MIN_ROBOT_DISTANCE_M:
             return False
@@ -237,10 +234,10 @@ class Companion:
         return bool(clear[0] and (clear[1] or math.dist(place, (x, y)) > 2.0))
 
 
-def _back_along(poses: F64, gait: F64, distance: float) -> F64:
+def _back_along(poses: Array, gait: Array, distance: float) -> Array:
     """The point of the robot's path `distance` m back along it, or its start."""
     found = int(np.searchsorted(gait, distance))
-    point: F64 = poses[max(0, len(poses) - 2 - found), :2]
+    point: Array = poses[max(0, len(poses) - 2 - found), :2]
     return point
 
 
@@ -269,7 +266,7 @@ class Crowd:
                 start = (float(free[0, 0]), float(free[0, 1]))
                 self._walkers.append(Walker(stream(seed, "walker", day, number), start, clearance))
         self._everybody: list[Walker | Companion] = [*self._walkers, *self._companions]
-        self._known: tuple[Track, list[F64]] | None = None
+        self._known: tuple[Track, list[Array]] | None = None
 
     def at(self, seconds: float, track: Track | None = None) -> tuple[Person, ...]:
         """All people at a time in seconds; companions only if the robot's track is known."""
@@ -297,14 +294,14 @@ class Crowd:
         ]
         return self.visible(state, seconds, strolls)
 
-    def initial_state(self, track: Track) -> F64:
+    def initial_state(self, track: Track) -> Array:
         """State of all people at the start of a drive (P, 5), walkers first."""
         now = float(track.times[0])
         state = np.zeros((len(self._everybody), 5))
         state[:, GONE] = now - MIN_ABSENCE_S
         return self._advanced(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
 
-    def advanced(self, state: F64, seconds: float, until: float, track: Track) -> F64:
+    def advanced(self, state: Array, seconds: float, until: float, track: Track) -> Array:
         """State (P, 5) at time `until`, from the robot's track up to `seconds` alone."""
         steps = math.ceil((until - seconds) / STEP_S - 1e-9)
         last = max(1, int(np.searchsorted(track.times, seconds + 1e-9, side="right")))
@@ -315,7 +312,7 @@ class Crowd:
             seconds = end
         return state
 
-    def visible(self, state: F64, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
+    def visible(self, state: Array, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
         """The people who are present; `strolls`: walkers whom nothing keeps from their own path."""
         people = []
         for number, (row, who) in enumerate(zip(state, self._everybody, strict=True)):
@@ -330,7 +327,7 @@ class Crowd:
                     people.append(Person(at, float(row[HEADING]), RADIUS_M, who.height, who.look, stride))
         return tuple(people)
 
-    def _advanced(self, before: F64, now: float, took: float, track: Track, begins: bool = False) -> F64:
+    def _advanced(self, before: Array, now: float, took: float, track: Track, begins: bool = False) -> Array:
         """State one step later: each person in turn moves towards the desired place, avoiding others and the robot."""
         state = before.copy()
         robot = _expected(track, now)
@@ -339,7 +336,7 @@ class Crowd:
             there[number] = False
             if isinstance(who, Walker):
                 there[: len(self._walkers)] = False  # walkers pass one another
-                desired_place: F64 | None = np.array(who.at(max(0.0, now)).position)
+                desired_place: Array | None = np.array(who.at(max(0.0, now)).position)
             else:
                 desired_place = who.desired_place(now, track, state[there, :2])
             row = state[number]
@@ -360,7 +357,9 @@ class Crowd:
                     row[HEADING] = math.atan2(robot[1] - row[Y], robot[0] - row[X])
         return state
 
-    def _reappear(self, row: F64, desired_place: F64 | None, now: float, robot: F64, others: F64, away: float) -> None:
+    def _reappear(
+        self, row: Array, desired_place: Array | None, now: float, robot: Array, others: Array, away: float
+    ) -> None:
         """Let an absent person reappear, far from the robot and from others."""
         if (
             desired_place is None
@@ -372,7 +371,7 @@ class Crowd:
             row[[X, Y]], row[GONE] = desired_place, -1.0
             row[HEADING] = math.atan2(robot[1] - desired_place[1], robot[0] - desired_place[0])
 
-    def _walk(self, row: F64, goal: F64, now: float, took: float, robot: F64, others: F64) -> None:
+    def _walk(self, row: Array, goal: Array, now: float, took: float, robot: Array, others: Array) -> None:
         """A step towards the desired place, or aside if others or the robot are in the way."""
         place = row[:2].copy()
         if _has_given_up(row, goal, robot):
@@ -404,40 +403,40 @@ class Crowd:
         if gone > 1e-6:
             row[HEADING] = math.atan2(step[1] - place[1], step[0] - place[0])
 
-    def _passable(self, places: F64, start: F64, others: F64) -> npt.NDArray[np.bool_]:
+    def _passable(self, places: Array, start: Array, others: Array) -> Bools:
         """Which of the places (N, 2) can be reached from `start` without touching obstacles or others."""
         room = min(0.8 * RADIUS_M, float(self._clearance(start[None])[0]))
-        free: npt.NDArray[np.bool_] = self._clearance(places) >= room
+        free: Bools = self._clearance(places) >= room
         if len(others):
             gaps = np.hypot(*(places[:, None] - others).transpose(2, 0, 1))
             free &= (gaps >= np.minimum(MIN_PERSON_DISTANCE_M, np.hypot(*(others - start).T))).all(axis=1)
         return free
 
 
-def _has_given_up(row: F64, goal: F64, robot: F64) -> bool:
+def _has_given_up(row: Array, goal: Array, robot: Array) -> bool:
     """Whether a person is too far from the desired place, out of the robot's sight."""
     return math.dist(goal, row[:2]) > GIVE_UP_DISTANCE_M and math.dist(row[:2], robot) > OUT_OF_SIGHT_M
 
 
-def _out_of_sight(path: F64, robot: F64) -> F64 | None:
+def _out_of_sight(path: Array, robot: Array) -> Array | None:
     """The last point of the robot's path (N, 2) that is out of its sight."""
     far = np.flatnonzero(np.hypot(*(path - robot).T) >= OUT_OF_SIGHT_M)
     return path[far[-1]] if len(far) else None
 
 
-def _expected(track: Track, now: float) -> F64:
+def _expected(track: Track, now: float) -> Array:
     """Predicted position (2,) of the robot at constant velocity; its last one if the velocity is unknown."""
-    at: F64 = track.poses[-1, :2]
+    at: Array = track.poses[-1, :2]
     if len(track.times) < 2:
         return at
     took = float(track.times[-1] - track.times[-2])
-    speed: F64 = (at - track.poses[-2, :2]) / took
+    speed: Array = (at - track.poses[-2, :2]) / took
     return at if float(np.hypot(*speed)) > MAX_SPEED else at + speed * (now - float(track.times[-1]))
 
 
-def _ahead_on_track(path: F64, place: F64) -> F64:
+def _ahead_on_track(path: Array, place: Array) -> Array:
     """The point of the robot's path (N, 2) some 0.8 m on from where it comes nearest to a place."""
     nearest = int(np.argmin(((path - place) ** 2).sum(axis=1)))
     gone = np.cumsum(np.hypot(*np.diff(path[nearest:], axis=0).T))
-    point: F64 = path[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(path) - 1)]
+    point: Array = path[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(path) - 1)]
     return point

@@ -7,12 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 
 from .config import Ranges
 from .obstacles import Obstacles, beam
 from .people import Person
-
-F64 = npt.NDArray[np.float64]
 
 RAYS_PER_CONE = 5
 """Rays that sample a cone."""
@@ -23,12 +22,12 @@ def azimuths(ring: Ranges) -> tuple[float, float]:
     return -math.pi, 2 * math.pi / ring.readings
 
 
-def round_bodies(people: Sequence[Person]) -> F64:
+def round_bodies(people: Sequence[Person]) -> Array:
     """People as a ring and a robot's bumper know them: (M, 3) x, y, radius."""
     return np.array([(*person.position, person.radius) for person in people]).reshape(-1, 3)
 
 
-def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rng: np.random.Generator) -> F64:
+def measure(room: Obstacles, people: Array, poses: npt.ArrayLike, ring: Ranges, rng: np.random.Generator) -> Array:
     """Turns of the ring at poses (N, 3): (N, readings) metres from the robot's middle, infinite without an echo.
 
     `people` (N, M, 3): x, y and radius of who is about at each.
@@ -41,7 +40,7 @@ def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rn
 
 
 @compiled(error_model="numpy")
-def _echoes(room: Obstacles, people: F64, poses: F64, readings: int, opening: float, farthest: float) -> F64:
+def _echoes(room: Obstacles, people: Array, poses: Array, readings: int, opening: float, farthest: float) -> Array:
     """The nearest hit within each cone, (N, readings)."""
     echoes = np.full((len(poses), readings), np.inf)
     for n in range(len(poses)):

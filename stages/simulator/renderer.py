@@ -16,16 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints, Shorts
 
 from .cameras import Rays
 from .people import Person, figures
 
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-I64 = npt.NDArray[np.int64]
-U8 = npt.NDArray[np.uint8]
-U32 = npt.NDArray[np.uint32]
+Texels = npt.NDArray[np.uint32]
 
 FACES = 6
 """Faces of a box, in its own frame: -x, +x, -y, +y, bottom, top."""
@@ -43,8 +39,8 @@ class Bodies(NamedTuple):
     `faces` (B, 6): the surface of each face.
     """
 
-    boxes: F64
-    faces: I32
+    boxes: Array
+    faces: Shorts
 
 
 class Scene(NamedTuple):
@@ -61,26 +57,26 @@ class Scene(NamedTuple):
     the surfaces of people, by look and part of the body.
     """
 
-    boxes: F64
-    faces: I32
-    surface_table: I32
-    surface_size: F64
-    tiles: I32
-    texels: U32
-    level_start: I64
+    boxes: Array
+    faces: Shorts
+    surface_table: Shorts
+    surface_size: Array
+    tiles: Shorts
+    texels: Texels
+    level_start: Ints
     side: int
-    glow: F32
-    cell_start: I32
-    cell_boxes: I32
-    grid: F64
+    glow: Floats
+    cell_start: Shorts
+    cell_boxes: Shorts
+    grid: Array
     rows: int
     columns: int
-    light: F32
+    light: Floats
     light_step: float
-    contact: F32
+    contact: Floats
     contact_step: float
     height: float
-    looks: I32
+    looks: Shorts
 
 
 def render(
@@ -92,7 +88,7 @@ def render(
     noise: float = 0.0,
     key: int = 0,
     people: Sequence[Person] = (),
-) -> U8:
+) -> Bytes:
     """The image (rows, columns, 3), uint8 blue-green-red, from a robot's pose (x, y, heading).
 
     Several poses (N, 3) over the time the shutter is open give their mean: motion blur. `eye_height` (m): of the
@@ -113,11 +109,11 @@ def render(
     return image
 
 
-def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
+def _light_on_deck(scene: Scene, x: float, y: float) -> Floats:
     """Light (3,) that falls on the robot at a point of the map."""
     column, row = (round((at - corner) / scene.light_step) for at, corner in zip((x, y), scene.grid, strict=False))
     _, rows, columns, _ = scene.light.shape
-    here: F32 = scene.light[0, min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)]
+    here: Floats = scene.light[0, min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)]
     return here
 
 
@@ -125,16 +121,16 @@ def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
 def _trace(
     scene: Scene,
     moving: Bodies,
-    directions: F32,
-    footprint: F32,
-    wedge_start: I32,
-    wedges: F64,
+    directions: Floats,
+    footprint: Floats,
+    wedge_start: Shorts,
+    wedges: Array,
     x: float,
     y: float,
     heading: float,
     z: float,
     weight: float,
-    lit: F32,
+    lit: Floats,
 ) -> None:
     """Add colours (N, 3) of rays (N, 3), 0 to 255 times `weight`, before the chip."""
     chunks = min(CHUNKS, len(wedges))
@@ -147,7 +143,7 @@ def _trace(
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
-def _bearings(boxes: F64, x: float, y: float) -> F64:
+def _bearings(boxes: Array, x: float, y: float) -> Array:
     """Where boxes are seen from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
     seen = np.empty((len(boxes), 3))
     for b in range(len(boxes)):
@@ -163,17 +159,17 @@ def _bearings(boxes: F64, x: float, y: float) -> F64:
 def _chunk(
     scene: Scene,
     moving: Bodies,
-    bearings: F64,
-    directions: F32,
-    footprint: F32,
-    wedge_start: I32,
-    wedges: F64,
+    bearings: Array,
+    directions: Floats,
+    footprint: Floats,
+    wedge_start: Shorts,
+    wedges: Array,
     x: float,
     y: float,
     heading: float,
     z: float,
     weight: float,
-    lit: F32,
+    lit: Floats,
     chunk: int,
     chunks: int,
 ) -> None:
@@ -310,10 +306,10 @@ def _chunk(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _boxes_in_wedge(
-    boxes: F64,
-    cell_start: I32,
-    cell_boxes: I32,
-    grid: F64,
+    boxes: Array,
+    cell_start: Shorts,
+    cell_boxes: Shorts,
+    grid: Array,
     rows: int,
     columns: int,
     ceiling: float,
@@ -325,11 +321,11 @@ def _boxes_in_wedge(
     low: float,
     high: float,
     steepest: float,
-    seen_in: I32,
+    seen_in: Shorts,
     mark: int,
-    found_box: I32,
-    found: F64,
-    occluders: F64,
+    found_box: Shorts,
+    found: Array,
+    occluders: Array,
 ) -> tuple[int, float, bool]:
     """Note the boxes that rays between two azimuths of the map may meet, nearest first.
 
@@ -442,9 +438,9 @@ def _boxes_in_wedge(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _store_box(
-    found: F64,
+    found: Array,
     number: int,
-    boxes: F64,
+    boxes: Array,
     box: int,
     x: float,
     y: float,
@@ -470,7 +466,7 @@ def _store_box(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _first_hit(
-    found: F64, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
+    found: Array, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
     """Distance, note and face of what a ray meets first; note -1 is the floor (face 5) or the ceiling (face 4)."""
     distance, which, face = 1e9, -1, 5
@@ -507,7 +503,7 @@ def _first_hit(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _first_hit_in_column(
-    found: F64, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
+    found: Array, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
     """As `_first_hit`, for a ray in a wedge of one azimuth, where the found say how far off boxes begin and end."""
     slope = dz / max(ahead, 1e-9)
@@ -587,7 +583,7 @@ def _unpacked(texel: Any) -> Any:
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _sample(
-    texels: U32, level_start: I64, levels: int, finest: int, texture: int, level: float, u: float, v: float
+    texels: Texels, level_start: Ints, levels: int, finest: int, texture: int, level: float, u: float, v: float
 ) -> tuple[float, float, float]:
     """Colour of a texture at (u, v) in [0, 1]: linear between texels, and between the two levels nearest in size."""
     level = min(max(level, 0.0), levels - 1.001)
@@ -606,7 +602,7 @@ def _sample(
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
-def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: float, weight: float) -> Any:
+def _bilinear(texels: Texels, start: int, side: int, texture: int, u: float, v: float, weight: float) -> Any:
     """The three colours at (u, v), 21 bits apart, times a weight."""
     column, row = max(u * side - 0.5, 0.0), max(v * side - 0.5, 0.0)
     left, above = int(column), int(row)
@@ -626,7 +622,7 @@ def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: flo
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
-def _light(light: F32, side: int, column: float, row: float) -> tuple[float, float, float]:
+def _light(light: Floats, side: int, column: float, row: float) -> tuple[float, float, float]:
     """Light that falls at a point of the light map on a face that looks one of five ways, linear between samples."""
     column = min(max(column, 0.0), light.shape[2] - 1.001)
     row = min(max(row, 0.0), light.shape[1] - 1.001)
@@ -651,7 +647,7 @@ def _light(light: F32, side: int, column: float, row: float) -> tuple[float, flo
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
-def _contact(contact: F32, column: float, row: float) -> float:
+def _contact(contact: Floats, column: float, row: float) -> float:
     """What bodies beside a point of the floor leave of its light, linear between samples."""
     column = min(max(column, 0.0), contact.shape[1] - 1.001)
     row = min(max(row, 0.0), contact.shape[0] - 1.001)
@@ -670,13 +666,13 @@ def _mixed(number: np.uint64) -> np.uint64:
     return number ^ (number >> np.uint64(31))
 
 
-def _gaussian_quantiles(count: int) -> F32:
+def _gaussian_quantiles(count: int) -> Floats:
     """Middles of `count` equally likely parts of a Gaussian, scaled to a standard deviation of 1."""
     from statistics import NormalDist
 
     quantile = NormalDist().inv_cdf
     values = np.array([quantile((k + 0.5) / count) for k in range(count)])
-    scaled: F32 = (values / values.std()).astype(np.float32)
+    scaled: Floats = (values / values.std()).astype(np.float32)
     return scaled
 
 
@@ -685,7 +681,14 @@ QUANTILES = _gaussian_quantiles(4096)
 
 @compiled(error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _expose(
-    lit: F32, ray_of: I32, gain: F32, exposure: float, noise: float, key: np.uint64, quantiles: F32, image: U8
+    lit: Floats,
+    ray_of: Shorts,
+    gain: Floats,
+    exposure: float,
+    noise: float,
+    key: np.uint64,
+    quantiles: Floats,
+    image: Bytes,
 ) -> None:
     """The chip: light times exposure and vignetting, plus noise that follows from key, pixel and colour alone."""
     start = _mixed(key)

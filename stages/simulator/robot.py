@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import compose
 
 from .config import Kidnapping, Robot
 from .obstacles import Obstacles, gather, nearest
-
-F64 = npt.NDArray[np.float64]
 
 STEP_S = 0.01
 """Seconds of one step of the simulation."""
@@ -23,7 +22,7 @@ CONTACT_RELEASE_M = 0.02
 """Metres from an obstacle at which a contact has ended; the next one counts again."""
 REJOIN_TOLERANCE_M = 0.5
 """Metres within which two stretches of a route count as equally near to a place."""
-NO_PEOPLE: F64 = np.zeros((0, 3))
+NO_PEOPLE: Array = np.zeros((0, 3))
 """No people in the way."""
 
 X, Y, HEADING, SPEED, TURNING, IN_CONTACT, COLLISIONS, DISTANCE = range(8)
@@ -38,21 +37,21 @@ class SimulatedDrive:
     those that took place before the end of the drive, each with its row.
     """
 
-    times: F64
-    poses: F64
-    rolled_to: F64
+    times: Array
+    poses: Array
+    rolled_to: Array
     collisions: int
     kidnappings: tuple[tuple[int, Kidnapping], ...]
 
 
-def at_rest(pose: npt.ArrayLike) -> F64:
+def at_rest(pose: npt.ArrayLike) -> Array:
     """The state (8,) of a robot that stands at a pose."""
     state = np.zeros(8)
     state[:3] = pose
     return state
 
 
-def limits(robot: Robot) -> F64:
+def limits(robot: Robot) -> Array:
     """Limits of a robot's motion, (6,): radius, speed, turning, both accelerations, and 1 if it slides."""
     slides = float(robot.contact == "slide")
     return np.array([robot.radius, robot.speed, robot.turn_speed, robot.acceleration, robot.turn_acceleration, slides])
@@ -64,7 +63,7 @@ def reach(robot: Robot) -> float:
 
 
 def steer(
-    state: F64, speed: float, turning: float, robot: F64, seconds: float, room: Obstacles, people: F64 = NO_PEOPLE
+    state: Array, speed: float, turning: float, robot: Array, seconds: float, room: Obstacles, people: Array = NO_PEOPLE
 ) -> None:
     """Drive on for some time under one command (m/s, rad/s): `state` (8,) changes, within the `limits` (6,) of a robot.
 
@@ -75,13 +74,15 @@ def steer(
 
 
 @compiled(error_model="numpy")
-def _steer(state: F64, speed: float, turning: float, robot: F64, steps: int, room: Obstacles, people: F64) -> None:
+def _steer(
+    state: Array, speed: float, turning: float, robot: Array, steps: int, room: Obstacles, people: Array
+) -> None:
     for _ in range(steps):
         _step(state, speed, turning, robot, room, people)
 
 
 @compiled(error_model="numpy")
-def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles, people: F64) -> None:
+def _step(state: Array, speed: float, turning: float, robot: Array, room: Obstacles, people: Array) -> None:
     wanted = _within(speed, robot[1])
     state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP_S)
     state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * STEP_S)
@@ -97,7 +98,7 @@ def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles,
 
 
 @compiled(error_model="numpy")
-def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, people: F64) -> tuple[float, float]:
+def _kept_off(state: Array, dx: float, dy: float, robot: Array, room: Obstacles, people: Array) -> tuple[float, float]:
     """A small motion, reduced by contact with obstacles."""
     now, away_x, away_y = nearest(room, people, state[X], state[Y])
     then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
@@ -152,7 +153,7 @@ def drive(
     capacity = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
     poses = np.empty((capacity, 3))
     poses[0] = state[:3]
-    rolled_to: dict[int, F64] = {}
+    rolled_to: dict[int, Array] = {}
     kidnapped: list[tuple[int, Kidnapping]] = []
     done, along = 1, 0.0
     for kidnapping in [*sorted(kidnappings, key=lambda kidnapping: kidnapping.at), None]:
@@ -176,7 +177,7 @@ def drive(
     return SimulatedDrive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(kidnapped))
 
 
-def around(state: F64, seconds: npt.ArrayLike) -> F64:
+def around(state: Array, seconds: npt.ArrayLike) -> Array:
     """Poses (N, 3) of a robot some moments before and after now, with the motion that its `state` (8,) has."""
     offset = np.asarray(seconds, dtype=np.float64)
     middle = state[HEADING] + 0.5 * state[TURNING] * offset
@@ -185,13 +186,13 @@ def around(state: F64, seconds: npt.ArrayLike) -> F64:
     return np.stack([x, y, state[HEADING] + state[TURNING] * offset], axis=-1)
 
 
-def teleport(state: F64, kidnapping: Kidnapping) -> None:
+def teleport(state: Array, kidnapping: Kidnapping) -> None:
     """Teleport a robot: its `state` (8,) is at rest afterwards, and no distance is counted."""
     state[:3] = compose(state[:3] if kidnapping.to is None else kidnapping.to, (0.0, 0.0, kidnapping.turn))
     state[SPEED] = state[TURNING] = state[IN_CONTACT] = 0.0
 
 
-def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:
+def _legs(waypoints: npt.ArrayLike) -> tuple[Array, Array]:
     """Points of a line of straight legs without repetitions, and their distances along it."""
     points = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
     keep = np.concatenate([[True], (np.diff(points, axis=0) != 0.0).any(axis=1)])
@@ -199,7 +200,7 @@ def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:
     return points, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _nearest_along(points: F64, ends: F64, at: F64, along: float = 0.0) -> float:
+def _nearest_along(points: Array, ends: Array, at: Array, along: float = 0.0) -> float:
     """Distance along the line of the point nearest to a place; of several that are about as near, the first ahead."""
     if len(points) == 1:
         return 0.0
@@ -215,7 +216,7 @@ def _nearest_along(points: F64, ends: F64, at: F64, along: float = 0.0) -> float
 
 
 @compiled(error_model="numpy")
-def _point(points: F64, ends: F64, along: float) -> tuple[float, float]:
+def _point(points: Array, ends: Array, along: float) -> tuple[float, float]:
     """The point `along` metres from the start of a line."""
     if len(points) == 1:
         return points[0, 0], points[0, 1]
@@ -228,21 +229,21 @@ def _point(points: F64, ends: F64, along: float) -> tuple[float, float]:
 
 
 @compiled(error_model="numpy")
-def _leg(ends: F64, along: float) -> int:
+def _leg(ends: Array, along: float) -> int:
     return np.searchsorted(ends, along)  # type: ignore[return-value]
 
 
 @compiled(error_model="numpy")
 def _pursue(
-    points: F64,
-    ends: F64,
+    points: Array,
+    ends: Array,
     along: float,
-    state: F64,
-    robot: F64,
+    state: Array,
+    robot: Array,
     look_ahead: float,
     every: int,
     room: Obstacles,
-    poses: F64,
+    poses: Array,
 ) -> tuple[int, float, bool]:
     """Follow a line until `poses` (N, 3) is full or the robot is there: rows filled, metres along, whether it is."""
     length = ends[-1]

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.values.image import Pixels
 
@@ -18,8 +18,6 @@ from .config import WorldConfig
 from .people import Person
 from .renderer import Scene, render
 from .streams import stream
-
-F64 = npt.NDArray[np.float64]
 
 FOCAL_LENGTHS = ("focal_x", "focal_y", "focal_px")
 CENTRE = ("centre_x", "centre_y")
@@ -40,7 +38,7 @@ class RobotCamera:
         self._ramps_begin = self._drawn("ramps").uniform(0, world.ramps.period_m)
         self._true = self._with_errors()
 
-    def image(self, scene: Scene, poses: F64, seconds: float, key: int, people: Sequence[Person] = ()) -> Pixels:
+    def image(self, scene: Scene, poses: Array, seconds: float, key: int, people: Sequence[Person] = ()) -> Pixels:
         """The image (rows, columns, 3) that is taken of a scene `seconds` into the drive.
 
         `poses` (N, 3): where the robot is at the `shutter_times`. `key`: of the sensor's noise.
@@ -65,13 +63,13 @@ class RobotCamera:
         stops = self._drawn("exposure", *self._drive, int(seconds // sensor.exposure_hold_s)).normal()
         return steady * float(2.0 ** (sensor.exposure_jumps * stops))
 
-    def _rays_at(self, pose: F64) -> Rays:
+    def _rays_at(self, pose: Array) -> Rays:
         """The rays of the camera in the frame of a robot that stands level."""
         if self._world.ramps.slope_deg == 0.0:
             return self._rays
         return leaning(self._rays, self._slope(float(pose[0]), float(pose[2])))
 
-    def _slope(self, x: float, heading: float) -> F64:
+    def _slope(self, x: float, heading: float) -> Array:
         """How a robot leans on the ramps (3, 3): backwards along x where the floor rises."""
         ramps = self._world.ramps
         wave = 2.0 * math.sin(2 * math.pi * (x - self._ramps_begin) / ramps.period_m)
@@ -110,9 +108,9 @@ class RobotCamera:
         return stream(self._world.draw_seed, "camera", *purpose)
 
 
-def lean(angle: float, towards: float) -> F64:
+def lean(angle: float, towards: float) -> Array:
     """The rotation (3, 3) that tips the vertical by `angle` (rad) to the azimuth `towards` (Rodrigues' formula)."""
     x, y = -math.sin(towards), math.cos(towards)
     cross = np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]])
-    rotation: F64 = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
+    rotation: Array = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
     return rotation

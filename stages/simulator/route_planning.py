@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array
+
 from .config import Point, Route
 from .layout import Aisle
 from .streams import stream
@@ -18,7 +20,6 @@ from .world import World
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-F64 = npt.NDArray[np.float64]
 
 CLEARANCE_M = 0.1
 """Minimum distance (m) of a path from obstacles beyond the robot's radius."""
@@ -36,7 +37,7 @@ class UnreachableRoute(Exception):
     """A route that cannot be driven on this day; the message says why."""
 
 
-def plan(world: World, route: Route) -> F64:
+def plan(world: World, route: Route) -> Array:
     """The points (W, 2) of a route around what stands in the world on its day, rounded with smoothed corners.
 
     Where the world `drives_backwards`, laps go round the other way from the same first point, a lead-in too; all other
@@ -67,7 +68,7 @@ def plan(world: World, route: Route) -> F64:
     return _cut(space.smooth(np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])), route.length)
 
 
-def jittered(world: World, line: F64, spread: float, rng: np.random.Generator) -> F64:
+def jittered(world: World, line: Array, spread: float, rng: np.random.Generator) -> Array:
     """A line (W, 2) as it is driven on one day: every 2.5 m it is drawn aside, Gaussian with `spread` m in x and in y.
 
     Draws are cut off at two standard deviations, and the drift is linear in between: over the whole path its root mean
@@ -85,7 +86,7 @@ def jittered(world: World, line: F64, spread: float, rng: np.random.Generator) -
     for factor in (0.5, 0.5, 0.5, 0.5, 0.0):
         tight = world.clearance(points + share[:, None] * drift) < needed
         share[np.convolve(tight, np.ones(5))[2:-2] > 0] *= factor  # with the neighbours, so that the line stays smooth
-    jittered_line: F64 = points + share[:, None] * drift
+    jittered_line: Array = points + share[:, None] * drift
     return jittered_line
 
 
@@ -224,7 +225,7 @@ class _FreeSpace:
         columns, rows = (math.ceil(extent / self._step) for extent in world.config.size)
         x, y = self._step * (np.arange(columns) + 0.5), self._step * (np.arange(rows) + 0.5)
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        self._clearance_map: F64 = world.clearance(points).reshape(rows, columns)
+        self._clearance_map: Array = world.clearance(points).reshape(rows, columns)
         radius = world.config.robot.radius
         self._free = self._clearance_map > radius + CLEARANCE_M
         count, parts = cv2.connectedComponents(self._free.astype(np.uint8), connectivity=8)
@@ -267,9 +268,9 @@ class _FreeSpace:
             f"world '{self._world.config.name}': no room for the robot near ({x:g}, {y:g}) on this day"
         )
 
-    def _middle(self, cells: npt.NDArray[np.int_]) -> F64:
+    def _middle(self, cells: npt.NDArray[np.int_]) -> Array:
         rows, columns = np.divmod(cells, self._free.shape[1])
-        middle: F64 = self._step * (np.stack([columns, rows], axis=-1) + 0.5)
+        middle: Array = self._step * (np.stack([columns, rows], axis=-1) + 0.5)
         return middle
 
     def reachable(self, goals: Iterator[Point]) -> Iterator[Point]:
@@ -283,7 +284,7 @@ class _FreeSpace:
                 continue
             yield goal
 
-    def between(self, start: F64, end: F64) -> F64:
+    def between(self, start: Array, end: Array) -> Array:
         """Points (N, 2) of a path between two points, straight where nothing is near."""
         if _straight(self._world, np.stack([start, end]), self._world.config.robot.radius + 2 * CLEARANCE_M):
             return _resampled(np.stack([start, end]), POINT_SPACING_M)
@@ -309,7 +310,7 @@ class _FreeSpace:
             path[-1] = end
         return _resampled(path, POINT_SPACING_M)
 
-    def smooth(self, line: F64) -> F64:
+    def smooth(self, line: Array) -> Array:
         """A line without its corners: each point drawn to the middle of its neighbours while there is room."""
         points = _resampled(line, POINT_SPACING_M)
         needed = np.minimum(self._clearance(points), self._world.config.robot.radius + 2 * CLEARANCE_M)
@@ -325,10 +326,10 @@ class _FreeSpace:
             points[inner] = np.where(allowed[:, None], drawn, points[inner])
         return points
 
-    def _clearance(self, points: F64) -> F64:
+    def _clearance(self, points: Array) -> Array:
         at = (points / self._step - 0.5).astype(np.float32)
         clear = self._clearance_map.astype(np.float32)
-        looked_up: F64 = np.concatenate(
+        looked_up: Array = np.concatenate(
             [  # a remapped image has fewer than 32768 rows
                 cv2.remap(clear, part[:, 0], part[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
                 for part in np.array_split(at, len(at) // 16384 + 1)
@@ -336,14 +337,14 @@ class _FreeSpace:
         ).astype(np.float64)
         return looked_up
 
-    def distances(self, start: F64) -> F64:
+    def distances(self, start: Array) -> Array:
         """Costs of the space from a point to all cells; infinite where there is none."""
         from scipy.sparse.csgraph import dijkstra
 
-        cost: F64 = dijkstra(self._graph, directed=False, indices=self._cell(start))
+        cost: Array = dijkstra(self._graph, directed=False, indices=self._cell(start))
         return cost
 
-    def cost_at(self, costs: F64, point: Point) -> float:
+    def cost_at(self, costs: Array, point: Point) -> float:
         """The cost at a point."""
         return float(costs[self._cell(point)])
 
@@ -373,16 +374,16 @@ class _FreeSpace:
 # Lines
 
 
-def _straight(world: World, points: F64, room: float) -> bool:
+def _straight(world: World, points: Array, room: float) -> bool:
     """Whether straight lines from point to point keep as much room."""
     return bool(world.is_free(_resampled(points, 0.1), room).all())
 
 
-def _length(points: F64) -> float:
+def _length(points: Array) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
-def _resampled(points: Sequence[Point] | F64, spacing: float) -> F64:
+def _resampled(points: Sequence[Point] | Array, spacing: float) -> Array:
     """A line with points no more than `spacing` apart; its corners stay."""
     corners = np.asarray(points, dtype=np.float64)
     pieces = [corners[:1]]
@@ -393,7 +394,7 @@ def _resampled(points: Sequence[Point] | F64, spacing: float) -> F64:
     return np.concatenate(pieces)
 
 
-def _cut(points: F64, length: float | None) -> F64:
+def _cut(points: Array, length: float | None) -> Array:
     """The first `length` m of a line."""
     if length is None:
         return points

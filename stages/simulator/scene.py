@@ -7,16 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Bytes, Ints, Shorts
 
 from . import textures
 from .bodies import Box, Coverings, Tiling, box_array
 from .lighting import Light, contact_map, light_map
 from .renderer import Scene
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-I64 = npt.NDArray[np.int64]
-U8 = npt.NDArray[np.uint8]
 
 CELL = 0.5
 """Size (m) of the cells by which boxes are found."""
@@ -32,7 +28,7 @@ def build_scene(
     ceiling: Tiling,
     size: tuple[float, float],
     height: float,
-    images: Sequence[U8],
+    images: Sequence[Bytes],
     glow: Sequence[float],
     lights: Sequence[Light],
     ambient: float,
@@ -79,13 +75,13 @@ def build_scene(
     )
 
 
-def packed(texels: U8) -> npt.NDArray[np.uint32]:
+def packed(texels: Bytes) -> npt.NDArray[np.uint32]:
     """Blue-green-red texels (..., 3) as numbers (...,): blue in the lowest byte."""
     wide = texels.astype(np.uint32)
     return (wide @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)).astype(np.uint32, copy=False)
 
 
-def cells(boxes: F64, grid: F64, rows: int, columns: int) -> tuple[I32, I32]:
+def cells(boxes: Array, grid: Array, rows: int, columns: int) -> tuple[Shorts, Shorts]:
     """Which boxes touch which cell, by their bounding rectangles: where each begins (cells + 1,), and boxes."""
     cos, sin = np.abs(boxes[:, 2]), np.abs(boxes[:, 3])
     reach = np.stack([cos * boxes[:, 4] + sin * boxes[:, 5], sin * boxes[:, 4] + cos * boxes[:, 5]], axis=1)
@@ -96,7 +92,7 @@ def cells(boxes: F64, grid: F64, rows: int, columns: int) -> tuple[I32, I32]:
 
 
 @compiled()
-def _cells(low: I64, high: I64, rows: int, columns: int) -> tuple[I32, I32]:
+def _cells(low: Ints, high: Ints, rows: int, columns: int) -> tuple[Shorts, Shorts]:
     start = np.zeros(rows * columns + 1, dtype=np.int32)
     for box in range(len(low)):
         for row in range(low[box, 1], high[box, 1] + 1):

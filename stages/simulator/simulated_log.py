@@ -9,16 +9,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.mcap.writer import LogWriter
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.rooms_yaml import ROOMS, write_rooms
 
 from .simulated_recording import SimulatedRecording
 from .world_rooms import rooms_of
-
-F64 = npt.NDArray[np.float64]
 
 ODOMETRY_LATENCY_NS, SCAN_LATENCY_NS = 2_000_000, 5_000_000
 """Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
@@ -111,7 +109,7 @@ def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arr
     log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, image, arrival)
 
 
-def _pose(pose: F64) -> dict[str, Any]:
+def _pose(pose: Array) -> dict[str, Any]:
     """A pose (x, y, heading) as the fields of a geometry_msgs/Pose."""
     x, y, heading = (float(value) for value in pose)
     turned = {"z": float(np.sin(heading / 2)), "w": float(np.cos(heading / 2))}

@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.code_version import module_version, surroundings
 from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import camera, simulator
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane import odometry_noise, se2
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.stamps import ascending
@@ -32,9 +32,6 @@ from .robot import NO_PEOPLE, SimulatedDrive, drive, reach
 from .robot_camera import RobotCamera
 from .streams import stream
 from .world import World
-
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
 
 DAY_0_NS = 1_767_571_200 * 10**9
 """Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
@@ -106,11 +103,11 @@ class SimulatedRecording:
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
         unwrapped = np.column_stack([self.true_poses[:, :2], np.unwrap(self.true_poses[:, 2])])
         self._stays = np.append(self._true_seconds, np.inf), np.concatenate([unwrapped, unwrapped[-1:]])
-        self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
-        self.carried: I64 = put + np.arange(len(put))
+        self.true_times: Ints = np.insert(self.times, put, self.times[put] - 1)
+        self.carried: Ints = put + np.arange(len(put))
         """Steps from a true pose to the next one in which the robot was carried, not driven."""
 
-    def _without_contact(self, planned: F64) -> SimulatedDrive:
+    def _without_contact(self, planned: Array) -> SimulatedDrive:
         """The drive along a planned path (W, 2), off it by the day's jitter, by less where it touches anything."""
         robot, rate = self.world.robot, self.world.timing.odometry
         for share in JITTER_SHARES:
@@ -140,8 +137,8 @@ class SimulatedRecording:
             self.dropped["backward_stamp"] = len(overtaken)
             stamp = self.sent[overtaken[0]][1]
             self.details["backward_stamp"] = f"{self.name}: an image was overtaken by a later one, stamp {stamp} ns"
-        self._received: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
-        self.stamps: I64 = stamps[self._received]
+        self._received: Ints = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
+        self.stamps: Ints = stamps[self._received]
         self.truth = self._true(self._shots[self._received])
         self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._received])
 
@@ -152,16 +149,16 @@ class SimulatedRecording:
         """Stamps (ns) of all range scans."""
         self._ring_key = int(self._stream("ranges").integers(2**62))
 
-    def _stamps(self, seconds: F64) -> I64:
-        stamps: I64 = self._start + np.round(seconds * 1e9).astype(np.int64)
+    def _stamps(self, seconds: Array) -> Ints:
+        stamps: Ints = self._start + np.round(seconds * 1e9).astype(np.int64)
         return stamps
 
-    def _true(self, seconds: F64) -> F64:
+    def _true(self, seconds: Array) -> Array:
         """Where the robot was, (N, 3), at times (N,); `se2.interpolate` would go through the whole drive each time."""
         times, poses = self._stays  # at the end, for ever
         row = np.maximum(times.searchsorted(seconds, side="right") - 1, 0)
         speed = (poses[row + 1] - poses[row]) / (times[row + 1] - times[row])[:, None]
-        found: F64 = speed * np.maximum(seconds - times[row], 0.0)[:, None] + poses[row]
+        found: Array = speed * np.maximum(seconds - times[row], 0.0)[:, None] + poses[row]
         found[:, 2] = se2.wrap(found[:, 2])
         return found
 
@@ -272,7 +269,7 @@ def simulation_digest(world: WorldConfig) -> str:
     return digest_text(described, *known, *(digest_file(path) for path in code))
 
 
-def scan_value(world: WorldConfig, metres: F64) -> Scan:
+def scan_value(world: WorldConfig, metres: Array) -> Scan:
     """A range scan as the value that travels on wires."""
     first, step = azimuths(world.ranges)
     return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.max_range)

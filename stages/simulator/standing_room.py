@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
+
+from omninav.stages.geometry.arrays import Array
 
 from .config import Point, Room, WorldConfig
 from .layout import expand
@@ -16,7 +17,6 @@ ROOM_M = 0.15
 """Metres between the robot's body and everything at such a place, so that furniture may move a little."""
 DRIVEN_UNDER_M = 1.4
 """Least height (m) of the underside of bodies that are in nobody's way."""
-F64 = npt.NDArray[np.float64]
 
 
 class _Body(NamedTuple):
@@ -25,7 +25,7 @@ class _Body(NamedTuple):
     yaw: float
 
 
-def standing_room(world: WorldConfig) -> F64:
+def standing_room(world: WorldConfig) -> Array:
     """Places (N, 2) on a grid of 0.1 m with room for the robot on day 0, all connected."""
     blocks = [block for block in expand(world).blocks if block.bottom_z < DRIVEN_UNDER_M]
     bodies = [_Body(block.centre, (block.size[0] / 2, block.size[1] / 2), block.yaw) for block in blocks]
@@ -36,12 +36,12 @@ def standing_room(world: WorldConfig) -> F64:
     _, parts = cv2.connectedComponents(free.reshape(rows, columns).astype(np.uint8), connectivity=8)
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0
-    reached: F64 = points[parts.ravel() == sizes.argmax()]
+    reached: Array = points[parts.ravel() == sizes.argmax()]
     return reached
 
 
-def within(places: F64, room: Room) -> F64:
+def within(places: Array, room: Room) -> Array:
     """Those of the places (N, 2) that lie in a room."""
     low, high = np.array(room.corner), np.add(room.corner, room.size)
-    inside: F64 = places[((places > low) & (places < high)).all(axis=1)]
+    inside: Array = places[((places > low) & (places < high)).all(axis=1)]
     return inside

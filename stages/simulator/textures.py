@@ -9,10 +9,9 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-U8 = npt.NDArray[np.uint8]
-F32 = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Bytes, Floats
+
 Colour = tuple[float, float, float]
 
 SIDE = 128
@@ -21,7 +20,7 @@ DRAWN = 2 * SIDE
 """Pixels along a side while a texture is drawn."""
 
 
-def draw(material: str, rng: np.random.Generator) -> U8:
+def draw(material: str, rng: np.random.Generator) -> Bytes:
     """One texture (SIDE, SIDE, 3) of a material. Raises `KeyError` that lists the materials for a name that is none."""
     if material not in MATERIALS:
         raise KeyError(f"no material '{material}'; there are: {', '.join(sorted(MATERIALS))}")
@@ -41,7 +40,7 @@ def extent(material: str) -> tuple[float, float]:
     return EXTENTS.get(material, (math.inf, math.inf))
 
 
-def mip_levels(textures: U8) -> list[U8]:
+def mip_levels(textures: Bytes) -> list[Bytes]:
     """Levels of textures (N, S, S, 3), S a power of two: each the mean of 2 x 2 texels of the one before, down to 1."""
     levels, exact = [textures], textures.astype(np.float32)
     while exact.shape[1] > 1:
@@ -62,30 +61,30 @@ def scaled(colour: Colour, factor: float) -> Colour:
     return (colour[0] * factor, colour[1] * factor, colour[2] * factor)
 
 
-def blank(colour: Colour) -> F32:
+def blank(colour: Colour) -> Floats:
     """A canvas of one colour."""
     return np.broadcast_to(np.array(colour, dtype=np.float32), (DRAWN, DRAWN, 3)).copy()
 
 
-def cloud(rng: np.random.Generator, cells: int, strength: float) -> F32:
+def cloud(rng: np.random.Generator, cells: int, strength: float) -> Floats:
     """Smooth noise (DRAWN, DRAWN, 1) around 0, `cells` bumps along a side."""
     coarse = rng.normal(0.0, strength, (cells + 1, cells + 1)).astype(np.float32)
-    smooth: F32 = cv2.resize(coarse, (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC).astype(np.float32)
+    smooth: Floats = cv2.resize(coarse, (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC).astype(np.float32)
     return smooth[..., None]
 
 
-def grain(rng: np.random.Generator, strength: float) -> F32:
+def grain(rng: np.random.Generator, strength: float) -> Floats:
     """Fine noise (DRAWN, DRAWN, 1) around 0."""
     return rng.normal(0.0, strength, (DRAWN, DRAWN, 1)).astype(np.float32)
 
 
-def box(canvas: F32, left: float, top: float, right: float, bottom: float, colour: Colour) -> None:
+def box(canvas: Floats, left: float, top: float, right: float, bottom: float, colour: Colour) -> None:
     """A filled rectangle, in parts of the canvas (0 to 1)."""
     corners = [round(DRAWN * part) for part in (left, top, right, bottom)]
     cv2.rectangle(canvas, (corners[0], corners[1]), (corners[2] - 1, corners[3] - 1), colour, -1)
 
 
-def _wall(rng: np.random.Generator) -> F32:
+def _wall(rng: np.random.Generator) -> Floats:
     base = vivid(rng, (0.05, 0.3))
     level = 225.0 / max(base)
     canvas = blank(scaled(base, level)) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
@@ -97,11 +96,11 @@ def _wall(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _concrete(rng: np.random.Generator) -> F32:
+def _concrete(rng: np.random.Generator) -> Floats:
     return blank((150, 155, 158)) + cloud(rng, 4, 12.0) + cloud(rng, 16, 7.0) + grain(rng, 6.0)
 
 
-def _stripes(rng: np.random.Generator) -> F32:
+def _stripes(rng: np.random.Generator) -> Floats:
     canvas = blank((225, 225, 225)) + grain(rng, 4.0)
     colour = vivid(rng)
     for k in range(0, 8, 2):
@@ -109,7 +108,7 @@ def _stripes(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _floor(rng: np.random.Generator) -> F32:
+def _floor(rng: np.random.Generator) -> Floats:
     canvas = blank((0, 0, 0))
     tone = np.array([148.0, 158.0, 165.0]) + rng.normal(0.0, 3.0, 3)
     for row in range(2):
@@ -123,7 +122,7 @@ def _floor(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _ceiling(rng: np.random.Generator) -> F32:
+def _ceiling(rng: np.random.Generator) -> Floats:
     canvas = blank((205, 208, 208)) + grain(rng, 5.0) + cloud(rng, 3, 3.0)
     box(canvas, 0, 0, 1, 0.02, (150, 152, 152))
     box(canvas, 0, 0, 0.02, 1, (150, 152, 152))
@@ -134,19 +133,19 @@ def _ceiling(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _lamp(rng: np.random.Generator) -> F32:
+def _lamp(rng: np.random.Generator) -> Floats:
     canvas = blank((255, 255, 255))
     for k in (0.0, 0.48, 0.96):
         box(canvas, 0, k, 1, k + 0.04, (190, 195, 195))
     return canvas
 
 
-def _unlit(rng: np.random.Generator) -> F32:
+def _unlit(rng: np.random.Generator) -> Floats:
     """A lamp that is off."""
     return 0.55 * _lamp(rng)
 
 
-def _wood(rng: np.random.Generator) -> F32:
+def _wood(rng: np.random.Generator) -> Floats:
     rings = cv2.resize(rng.normal(0.0, 1.0, (2, 40)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC)
     canvas = blank((95, 140, 185)) * (1.0 + 0.08 * rings[..., None].astype(np.float32)) + grain(rng, 4.0)
     for k in (0.25, 0.5, 0.75):
@@ -154,7 +153,7 @@ def _wood(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _mat(rng: np.random.Generator) -> F32:
+def _mat(rng: np.random.Generator) -> Floats:
     colour = vivid(rng, (0.5, 0.8))
     canvas = blank(scaled(colour, 0.5)) + grain(rng, 14.0)
     for edge, factor in ((0.06, 0.85), (0.12, 0.5), (0.3, 0.7), (0.36, 0.5)):
@@ -162,7 +161,7 @@ def _mat(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 8.0)
 
 
-def _counter(rng: np.random.Generator) -> F32:
+def _counter(rng: np.random.Generator) -> Floats:
     colour = vivid(rng, (0.6, 0.9))
     canvas = blank((205, 205, 200)) + grain(rng, 3.0)
     box(canvas, 0, 0, 1, 0.1, (60, 62, 64))
@@ -171,7 +170,7 @@ def _counter(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _door(rng: np.random.Generator) -> F32:
+def _door(rng: np.random.Generator) -> Floats:
     colour = scaled(vivid(rng, (0.2, 0.7)), rng.uniform(0.5, 0.9))
     canvas = blank(scaled(colour, 0.45))
     box(canvas, 0.06, 0.03, 0.94, 1.0, colour)
@@ -185,10 +184,10 @@ def _door(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 3.0)
 
 
-def _window(rng: np.random.Generator) -> F32:
+def _window(rng: np.random.Generator) -> Floats:
     rows = np.linspace(0.0, 1.0, DRAWN, dtype=np.float32)[:, None, None]
     sky, ground = np.array((250, 235, 215), dtype=np.float32), np.array((120, 190, 150), dtype=np.float32)
-    canvas: F32 = np.where(rows < rng.uniform(0.5, 0.7), sky - 40 * rows, ground) + cloud(rng, 6, 10.0)
+    canvas: Floats = np.where(rows < rng.uniform(0.5, 0.7), sky - 40 * rows, ground) + cloud(rng, 6, 10.0)
     canvas = np.ascontiguousarray(canvas, dtype=np.float32)
     for k in (0.0, 0.475, 0.95):
         box(canvas, k, 0, k + 0.05, 1, (235, 235, 235))
@@ -196,7 +195,7 @@ def _window(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _poster(rng: np.random.Generator) -> F32:
+def _poster(rng: np.random.Generator) -> Floats:
     ground = vivid(rng, (0.3, 0.95))
     canvas = blank(ground)
     style = rng.integers(4)
@@ -227,7 +226,7 @@ def _poster(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 3.0)
 
 
-def _carton(rng: np.random.Generator) -> F32:
+def _carton(rng: np.random.Generator) -> Floats:
     canvas = blank((95, 140, 180)) * rng.uniform(0.8, 1.15) + cloud(rng, 6, 5.0) + grain(rng, 5.0)
     box(canvas, 0.46, 0, 0.54, 1, (130, 175, 205))
     if rng.uniform() < 0.7:
@@ -236,7 +235,7 @@ def _carton(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _plaster(rng: np.random.Generator) -> F32:
+def _plaster(rng: np.random.Generator) -> Floats:
     base = vivid(rng, (0.04, 0.28))
     canvas = blank(scaled(base, rng.uniform(190.0, 230.0) / max(base))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
     if rng.uniform() < 0.3:
@@ -245,7 +244,7 @@ def _plaster(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _brick(rng: np.random.Generator) -> F32:
+def _brick(rng: np.random.Generator) -> Floats:
     canvas = blank((165, 172, 178))
     tone = np.array([62.0, 82.0, 158.0]) * rng.uniform(0.7, 1.2) + rng.normal(0.0, 8.0, 3)
     for row in range(12):
@@ -256,7 +255,7 @@ def _brick(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 6.0)
 
 
-def _facade(rng: np.random.Generator) -> F32:
+def _facade(rng: np.random.Generator) -> Floats:
     """A storey of an outer wall: render or brick around a window."""
     colour = vivid(rng, (0.08, 0.45))
     canvas = (_brick(rng) if rng.uniform() < 0.4 else blank(scaled(colour, 0.8))) + cloud(rng, 5, 5.0)
@@ -271,12 +270,12 @@ def _facade(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 4.0)
 
 
-def _carpet(rng: np.random.Generator) -> F32:
+def _carpet(rng: np.random.Generator) -> Floats:
     colour = scaled(vivid(rng, (0.15, 0.5)), 0.6)
     return blank(colour) + cloud(rng, 20, 5.0) + grain(rng, 14.0)
 
 
-def _parquet(rng: np.random.Generator) -> F32:
+def _parquet(rng: np.random.Generator) -> Floats:
     canvas = blank((60, 95, 130))
     tone = np.array([85.0, 128.0, 172.0]) * rng.uniform(0.7, 1.1)
     for row in range(8):
@@ -294,17 +293,17 @@ def _parquet(rng: np.random.Generator) -> F32:
     return canvas + cloud(rng, 30, 4.0) + grain(rng, 4.0)
 
 
-def _linoleum(rng: np.random.Generator) -> F32:
+def _linoleum(rng: np.random.Generator) -> Floats:
     base = vivid(rng, (0.1, 0.4))
     canvas = blank(scaled(base, rng.uniform(120.0, 185.0) / max(base)))
     return canvas + cloud(rng, 12, 8.0) + cloud(rng, 48, 6.0) + grain(rng, 4.0)
 
 
-def _asphalt(rng: np.random.Generator) -> F32:
+def _asphalt(rng: np.random.Generator) -> Floats:
     return blank((92, 92, 92)) + cloud(rng, 6, 6.0) + grain(rng, 16.0)
 
 
-def _paving(rng: np.random.Generator) -> F32:
+def _paving(rng: np.random.Generator) -> Floats:
     canvas = blank((105, 112, 116))
     tone = np.array([160.0, 166.0, 172.0]) * rng.uniform(0.85, 1.1)
     for row in range(4):
@@ -314,7 +313,7 @@ def _paving(rng: np.random.Generator) -> F32:
     return canvas + cloud(rng, 16, 5.0) + grain(rng, 6.0)
 
 
-def _grass(rng: np.random.Generator) -> F32:
+def _grass(rng: np.random.Generator) -> Floats:
     green = np.array([58.0, 112.0, 88.0], dtype=np.float32) * rng.uniform(0.85, 1.15)
     canvas = blank(tuple(green)) * (1.0 + cloud(rng, 8, 0.1) + cloud(rng, 40, 0.12)) + grain(rng, 14.0)
     for x, y in rng.uniform(0.0, DRAWN, (int(rng.integers(0, 14)), 2)):
@@ -322,7 +321,7 @@ def _grass(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _leaves(rng: np.random.Generator) -> F32:
+def _leaves(rng: np.random.Generator) -> Floats:
     tone = np.array([40.0, 105.0, 62.0]) * rng.uniform(0.75, 1.25) + np.array([0.0, 0.0, rng.uniform(0.0, 45.0)])
     canvas = blank(tuple(0.5 * tone))
     for x, y, size, shade in zip(*rng.uniform(0, 1, (4, 260)), strict=True):
@@ -331,28 +330,30 @@ def _leaves(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 8.0)
 
 
-def _hedge(rng: np.random.Generator) -> F32:
+def _hedge(rng: np.random.Generator) -> Floats:
     return _leaves(rng) * 0.85 + cloud(rng, 30, 8.0)
 
 
-def _bark(rng: np.random.Generator) -> F32:
+def _bark(rng: np.random.Generator) -> Floats:
     furrows = cv2.resize(
         rng.normal(0.0, 1.0, (5, 28)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC
     )
     return blank((58, 78, 96)) * (1.0 + 0.25 * furrows[..., None].astype(np.float32)) + grain(rng, 8.0)
 
 
-def _sky(rng: np.random.Generator) -> F32:
+def _sky(rng: np.random.Generator) -> Floats:
     return blank((238, 214, 190)) + cloud(rng, 3, 3.0)
 
 
-def _curtain(rng: np.random.Generator) -> F32:
+def _curtain(rng: np.random.Generator) -> Floats:
     colour = vivid(rng, (0.25, 0.7))
-    folds: F32 = 1.0 + np.float32(0.16) * np.sin(np.linspace(0.0, 22.0 * np.pi, DRAWN, dtype=np.float32))[None, :, None]
+    folds: Floats = (
+        1.0 + np.float32(0.16) * np.sin(np.linspace(0.0, 22.0 * np.pi, DRAWN, dtype=np.float32))[None, :, None]
+    )
     return blank(scaled(colour, 0.85)) * folds + grain(rng, 4.0)
 
 
-def _books(rng: np.random.Generator) -> F32:
+def _books(rng: np.random.Generator) -> Floats:
     """A bookcase: boards with backs of books and files."""
     canvas = blank((48, 66, 84))
     for shelf in range(5):
@@ -368,7 +369,7 @@ def _books(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 4.0)
 
 
-def _cabinet(rng: np.random.Generator) -> F32:
+def _cabinet(rng: np.random.Generator) -> Floats:
     base = vivid(rng, (0.05, 0.6))
     colour = scaled(base, rng.uniform(150.0, 235.0) / max(base))
     canvas = blank(scaled(colour, 0.6))
@@ -383,7 +384,7 @@ def _cabinet(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 3.0)
 
 
-def _steel(rng: np.random.Generator) -> F32:
+def _steel(rng: np.random.Generator) -> Floats:
     brushed = cv2.resize(rng.normal(0.0, 5.0, (DRAWN, 3)).astype(np.float32), (DRAWN, DRAWN))
     canvas = blank((188, 186, 182)) + brushed[..., None].astype(np.float32) + grain(rng, 3.0)
     canvas = np.ascontiguousarray(canvas, dtype=np.float32)
@@ -392,11 +393,11 @@ def _steel(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _fabric(rng: np.random.Generator) -> F32:
+def _fabric(rng: np.random.Generator) -> Floats:
     return blank(scaled(vivid(rng, (0.4, 0.9)), 0.75)) + cloud(rng, 10, 7.0) + grain(rng, 9.0)
 
 
-def _screen(rng: np.random.Generator) -> F32:
+def _screen(rng: np.random.Generator) -> Floats:
     canvas = blank((30, 28, 28))
     box(canvas, 0.05, 0.07, 0.95, 0.93, scaled(vivid(rng, (0.2, 0.8)), 0.7))
     for row in range(int(rng.integers(3, 8))):
@@ -405,7 +406,7 @@ def _screen(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _board(rng: np.random.Generator) -> F32:
+def _board(rng: np.random.Generator) -> Floats:
     """A white board with writing."""
     canvas = blank((240, 240, 238)) + cloud(rng, 4, 3.0)
     for _ in range(int(rng.integers(4, 12))):
@@ -419,7 +420,7 @@ def _board(rng: np.random.Generator) -> F32:
     return canvas
 
 
-def _goods(rng: np.random.Generator) -> F32:
+def _goods(rng: np.random.Generator) -> Floats:
     """One compartment of a shelf: what stands on a board, its price rail below, an upright at the left edge."""
     canvas = blank((52, 50, 48)) + cloud(rng, 4, 5.0)
     FILLINGS[int(rng.integers(len(FILLINGS)))](canvas, rng)
@@ -432,7 +433,7 @@ def _goods(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 4.0)
 
 
-def _packets(canvas: F32, rng: np.random.Generator) -> None:
+def _packets(canvas: Floats, rng: np.random.Generator) -> None:
     count = int(rng.integers(3, 8))
     brands = [vivid(rng) for _ in range(int(rng.integers(1, 4)))]
     height = rng.uniform(0.45, 0.85)
@@ -445,7 +446,7 @@ def _packets(canvas: F32, rng: np.random.Generator) -> None:
         box(canvas, left + 0.02, 0.9 - 0.35 * height, right - 0.02, 0.9 - 0.15 * height, (235, 235, 235))
 
 
-def _cans(canvas: F32, rng: np.random.Generator) -> None:
+def _cans(canvas: Floats, rng: np.random.Generator) -> None:
     count, layers = int(rng.integers(4, 9)), int(rng.integers(1, 4))
     brands = [vivid(rng) for _ in range(2)]
     height = rng.uniform(0.24, 0.28) if layers == 3 else rng.uniform(0.3, 0.8 / layers)
@@ -464,7 +465,7 @@ def _cans(canvas: F32, rng: np.random.Generator) -> None:
             patch *= shade[None, : patch.shape[1], None]
 
 
-def _bottles(canvas: F32, rng: np.random.Generator) -> None:
+def _bottles(canvas: Floats, rng: np.random.Generator) -> None:
     count = int(rng.integers(6, 12))
     liquid, label = vivid(rng), vivid(rng)
     for k in range(count):
@@ -476,7 +477,7 @@ def _bottles(canvas: F32, rng: np.random.Generator) -> None:
         box(canvas, left, top + 0.35, left + width, top + 0.55, label)
 
 
-def _tools(canvas: F32, rng: np.random.Generator) -> None:
+def _tools(canvas: Floats, rng: np.random.Generator) -> None:
     canvas[:] = np.array(scaled(vivid(rng, (0.05, 0.5)), 0.85), dtype=np.float32)
     handle = vivid(rng)
     for k in range(int(rng.integers(5, 10))):
@@ -488,7 +489,7 @@ def _tools(canvas: F32, rng: np.random.Generator) -> None:
             box(canvas, left - 0.03, 0.1, left + 0.05, 0.16, (150, 150, 155))
 
 
-def _rolls(canvas: F32, rng: np.random.Generator) -> None:
+def _rolls(canvas: Floats, rng: np.random.Generator) -> None:
     columns, rows = int(rng.integers(3, 7)), int(rng.integers(2, 5))
     colours = [vivid(rng) for _ in range(3)]
     radius = 0.42 * min(0.94 / columns, 0.85 / rows) * DRAWN
@@ -502,7 +503,7 @@ def _rolls(canvas: F32, rng: np.random.Generator) -> None:
             cv2.circle(canvas, at, int(0.35 * radius), (60, 60, 60), -1)
 
 
-def _plants(canvas: F32, rng: np.random.Generator) -> None:
+def _plants(canvas: Floats, rng: np.random.Generator) -> None:
     for k in range(int(rng.integers(3, 6))):
         left = 0.06 + 0.19 * k
         box(canvas, left, 0.68, left + 0.13, 0.9, (60, 95, 185))
@@ -513,7 +514,7 @@ def _plants(canvas: F32, rng: np.random.Generator) -> None:
             cv2.circle(canvas, (int((left + 0.06) * DRAWN), int(0.4 * DRAWN)), 9, vivid(rng), -1)
 
 
-def _cases(canvas: F32, rng: np.random.Generator) -> None:
+def _cases(canvas: Floats, rng: np.random.Generator) -> None:
     left = 0.03
     while left < 0.9:
         width, height = rng.uniform(0.15, 0.4), rng.uniform(0.3, 0.8)
@@ -524,7 +525,7 @@ def _cases(canvas: F32, rng: np.random.Generator) -> None:
         left = right + 0.015
 
 
-def _coat(rng: np.random.Generator) -> F32:
+def _coat(rng: np.random.Generator) -> Floats:
     """Clothes above the waist: plain, striped, checked or with a print, open or closed in the middle."""
     colour, other = scaled(vivid(rng, (0.1, 0.9)), rng.uniform(0.3, 1.0)), vivid(rng, (0.2, 0.9))
     canvas = blank(colour) + cloud(rng, 5, 9.0)
@@ -545,7 +546,7 @@ def _coat(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 4.0)
 
 
-def _trousers(rng: np.random.Generator) -> F32:
+def _trousers(rng: np.random.Generator) -> Floats:
     colour = scaled(vivid(rng, (0.05, 0.6)), rng.uniform(0.2, 0.7))
     canvas = blank(colour) + cloud(rng, 4, 8.0)
     box(canvas, 0.46, 0, 0.54, 1, scaled(colour, 0.8))
@@ -556,7 +557,7 @@ def _trousers(rng: np.random.Generator) -> F32:
 SKINS: tuple[Colour, ...] = ((172, 200, 236), (150, 182, 226), (105, 145, 200), (72, 105, 155), (48, 66, 98))
 
 
-def _face(rng: np.random.Generator) -> F32:
+def _face(rng: np.random.Generator) -> Floats:
     skin = SKINS[int(rng.integers(len(SKINS)))]
     hair = scaled((60, 90, 130), rng.uniform(0.2, 1.6))
     canvas = blank(skin) + cloud(rng, 4, 4.0)
@@ -568,7 +569,7 @@ def _face(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 3.0)
 
 
-def _hair(rng: np.random.Generator) -> F32:
+def _hair(rng: np.random.Generator) -> Floats:
     canvas = blank(scaled((60, 90, 130), rng.uniform(0.2, 1.7))) + cloud(rng, 6, 10.0)
     if rng.uniform() < 0.3:  # a cap
         box(canvas, 0, 0, 1, 0.4, vivid(rng))
@@ -576,11 +577,11 @@ def _hair(rng: np.random.Generator) -> F32:
     return canvas + grain(rng, 8.0)
 
 
-FILLINGS: tuple[Callable[[F32, np.random.Generator], None], ...] = (
+FILLINGS: tuple[Callable[[Floats, np.random.Generator], None], ...] = (
     _packets, _cans, _bottles, _tools, _rolls, _plants, _cases
 )  # fmt: skip
 
-MATERIALS: dict[str, Callable[[np.random.Generator], F32]] = {
+MATERIALS: dict[str, Callable[[np.random.Generator], Floats]] = {
     "wall": _wall, "concrete": _concrete, "stripes": _stripes, "floor": _floor, "ceiling": _ceiling, "lamp": _lamp,
     "wood": _wood, "mat": _mat, "counter": _counter, "door": _door, "window": _window, "poster": _poster,
     "carton": _carton, "goods": _goods, "plaster": _plaster, "brick": _brick, "facade": _facade, "carpet": _carpet,

@@ -7,6 +7,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Ints
+
 from . import people, textures
 from .bodies import Box, Tiling
 from .config import Block, Lamp, Room, Shelf, WallPanel, WorldConfig
@@ -17,9 +19,6 @@ from .obstacles import Obstacles, distances, gather
 from .renderer import Scene
 from .scene import build_scene
 from .streams import stream
-
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
 
 WALL_THICKNESS_M = 0.2
 """Thickness (m) of the outer walls."""
@@ -32,7 +31,7 @@ HEADROOM_M = 1.4
 
 
 @lru_cache(maxsize=1024)
-def _drawn(seed: int, material: str, name: str) -> npt.NDArray[np.uint8]:
+def _drawn(seed: int, material: str, name: str) -> Bytes:
     """A texture, drawn once for all days of a world."""
     texture = textures.draw(material, stream(seed, "texture", material, name))
     texture.flags.writeable = False
@@ -127,7 +126,7 @@ class World:
         body = Box("shelf", shelf.centre, half, shelf.yaw, 0.0, shelf.height, (*sides, cap, cap))  # type: ignore[arg-type]
         return [body, *self._stock(shelf, number)] if shelf.stock else [body]
 
-    def goods_on(self, shelf: Shelf, number: int) -> list[I64]:
+    def goods_on(self, shelf: Shelf, number: int) -> list[Ints]:
         """Textures (levels, compartments) on each of a shelf's four sides, about one compartment a metre."""
         rng = stream(self.config.draw_seed, "goods", number)
         here = self._assortment(shelf.department)
@@ -143,7 +142,7 @@ class World:
                 side[changed] = here[anew.integers(len(here), size=int(changed.sum()))]
         return sides
 
-    def _assortment(self, department: str) -> I64:
+    def _assortment(self, department: str) -> Ints:
         """Textures of the goods that a department has."""
         count = min(self.config.assortment, self.config.goods)
         chosen = stream(self.config.draw_seed, "assortment", department).permutation(self.config.goods)[:count]
@@ -262,7 +261,7 @@ class World:
         """What a robot cannot drive over or under."""
         return [box for box in self.boxes if box.high > MAX_DRIVABLE_HEIGHT_M and box.low < HEADROOM_M]
 
-    def clearance(self, points: npt.ArrayLike) -> F64:
+    def clearance(self, points: npt.ArrayLike) -> Array:
         """Distance (m) of points (N, 2) of the map to the nearest obstacle or wall; 0 inside one."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         reach = 2.0
@@ -277,12 +276,12 @@ class World:
             self._gathered[reach] = gather(self.obstacles, self.config.size, reach)
         return self._gathered[reach]
 
-    def is_free(self, points: npt.ArrayLike, radius: float) -> npt.NDArray[np.bool_]:
+    def is_free(self, points: npt.ArrayLike, radius: float) -> Bools:
         """Whether a disc of `radius` m has room at points (N, 2)."""
         return self.clearance(points) > radius
 
 
-def outline(box: Box) -> F64:
+def outline(box: Box) -> Array:
     """The four corners (4, 2) of a box on the floor."""
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * np.array(box.half)
     return np.array([_place(box.centre, box.yaw, along, across) for along, across in corners])
