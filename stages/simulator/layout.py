@@ -42,9 +42,9 @@ def expand(config: WorldConfig, day: int = 0) -> Layout:
         lamps += _lamp_grid(config.lamp_grid, (0.0, 0.0), config.size)
     wall_panels, today, cuts = list(config.wall_panels), config.day(day), openings(config)
     for room in config.rooms:
-        lamps += _room_lamps(config, room)
+        lamps += _room_lamps(room)
         if room.walls:
-            blocks += walls(config, room, cuts) + roof(config, room) + doors(config, room, today, day)
+            blocks += walls(config, room, cuts) + roof(room) + doors(config, room, today, day)
             wall_panels += windows(room)
         fittings = furnish(config, room, cuts, today, day)
         blocks += fittings.blocks
@@ -118,7 +118,7 @@ def _lamp_grid(grid: LampGrid, corner: Point, size: Point) -> list[Lamp]:
     ]
 
 
-def _room_lamps(config: WorldConfig, room: Room) -> list[Lamp]:
+def _room_lamps(room: Room) -> list[Lamp]:
     """Lamps of a room, switched by its name."""
     if not room.lamps:
         return []

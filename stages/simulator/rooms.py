@@ -1,9 +1,9 @@
 """Rooms as single bodies: walls cut by doors, windows, furniture along the walls and in the middle, trees outside."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from .streams import stream
 
 INNER_WALL_M = 0.12
 """Thickness (m) of an inner wall."""
+SIDES: tuple[Side, ...] = get_args(Side)
 DOOR_HEIGHT_M = 2.1
 DOOR_CLEARANCE_M = 0.7
 """Metres that furniture keeps from both sides of a door."""
@@ -24,6 +25,42 @@ class Opening(NamedTuple):
     line: float
     middle: float
     width: float
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Where it begins and ends along the wall."""
+        return self.middle - self.width / 2, self.middle + self.width / 2
+
+
+class _Wall(NamedTuple):
+    """A side of a room: whether it runs along x, where it lies across that, and where it begins and ends.
+
+    `inward`: 1 where the room lies on the side of greater x or y, else -1.
+    """
+
+    along_x: bool
+    line: float
+    low: float
+    high: float
+    inward: int
+
+    def inside(self, inset: float) -> float:
+        """Where a line across it lies that is so many metres inside the room."""
+        return self.line + self.inward * inset
+
+    def on_map(self, along: float, across: float) -> Point:
+        """A place, or a size, given along the wall and across."""
+        return (along, across) if self.along_x else (across, along)
+
+    def cut_by(self, cuts: Sequence[Opening]) -> list[Opening]:
+        """The openings that lead through it."""
+        return [
+            cut
+            for cut in cuts
+            if cut.along_x == self.along_x
+            and abs(cut.line - self.line) < 3 * INNER_WALL_M
+            and self.low < cut.middle < self.high
+        ]
 
 
 @dataclass(frozen=True)
@@ -88,19 +125,15 @@ def openings(config: WorldConfig) -> list[Opening]:
 
 
 def _opening(room: Room, door: Door) -> Opening:
-    along_x, line, low, _ = _wall(room, door.side)
-    return Opening(along_x, line, low + door.at, door.width)
+    wall = _wall(room, door.side)
+    return Opening(wall.along_x, wall.line, wall.low + door.at, door.width)
 
 
-def _wall(room: Room, side: Side) -> tuple[bool, float, float, float]:
-    """Whether a side runs along x, where it lies across that, and where it begins and ends."""
+def _wall(room: Room, side: Side) -> _Wall:
     (x, y), (width, depth) = room.corner, room.size
     if side in ("north", "south"):
-        return True, y + depth if side == "north" else y, x, x + width
-    return False, x + width if side == "east" else x, y, y + depth
-
-
-INWARD: dict[Side, int] = {"east": -1, "west": 1, "north": -1, "south": 1}
+        return _Wall(True, y + depth if side == "north" else y, x, x + width, -1 if side == "north" else 1)
+    return _Wall(False, x + width if side == "east" else x, y, y + depth, -1 if side == "east" else 1)
 
 
 def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
@@ -111,36 +144,24 @@ def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
         layers.append((-INNER_WALL_M / 2, room.facade, f"{room.name} facade", INNER_WALL_M))
     blocks = []
     for inset, material, look, overlap in layers:
-        for side in ("east", "north", "west", "south"):
-            along_x, line, low, high = _wall(room, side)
-            at = line + INWARD[side] * inset
-            here = sorted((c for c in cuts if _cuts(c, along_x, line, low, high)), key=lambda c: c.middle)
-            ends = [low - overlap, *(e for c in here for e in (c.middle - c.width / 2, c.middle + c.width / 2))]
-            for begin, end in zip(ends[::2], [*ends[1::2], high + overlap], strict=True):
-                if end - begin > 0.02:
-                    blocks.append(_piece_of_wall(along_x, at, begin, end, 0.0, height, material, look))
-            for cut in here:
-                begin, end = cut.middle - cut.width / 2, cut.middle + cut.width / 2
-                if height > DOOR_HEIGHT_M + 0.05:
-                    blocks.append(_piece_of_wall(along_x, at, begin, end, DOOR_HEIGHT_M, height, material, look))
+        for side in SIDES:
+            wall = _wall(room, side)
+            gaps = [cut.ends for cut in sorted(wall.cut_by(cuts), key=lambda cut: cut.middle)]
+            edges = [wall.low - overlap, *(end for gap in gaps for end in gap), wall.high + overlap]
+            pieces = [
+                (*piece, 0.0) for piece in zip(edges[::2], edges[1::2], strict=True) if piece[1] - piece[0] > 0.02
+            ]
+            if height > DOOR_HEIGHT_M + 0.05:
+                pieces += [(*gap, DOOR_HEIGHT_M) for gap in gaps]
+            for begin, end, bottom_z in pieces:
+                centre = wall.on_map((begin + end) / 2, wall.inside(inset))
+                size = wall.on_map(end - begin, INNER_WALL_M)
+                tall = height - bottom_z
+                blocks.append(Block(centre, size, tall, material, "concrete", bottom_z, look=look, kind="wall"))
     return blocks
 
 
-def _cuts(cut: Opening, along_x: bool, line: float, low: float, high: float) -> bool:
-    return cut.along_x == along_x and abs(cut.line - line) < 3 * INNER_WALL_M and low < cut.middle < high
-
-
-def _piece_of_wall(
-    along_x: bool, at: float, begin: float, end: float, bottom_z: float, top_z: float, material: Material, look: str
-) -> Block:
-    middle = (begin + end) / 2
-    centre, size = (
-        ((middle, at), (end - begin, INNER_WALL_M)) if along_x else ((at, middle), (INNER_WALL_M, end - begin))
-    )
-    return Block(centre, size, top_z - bottom_z, material, "concrete", bottom_z, look=look, kind="wall")
-
-
-def roof(config: WorldConfig, room: Room) -> list[Block]:
+def roof(room: Room) -> list[Block]:
     """A ceiling of its own over a room that is lower than the hall."""
     if room.height is None or not room.walls:
         return []
@@ -158,18 +179,14 @@ def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]
     for k, door in enumerate(room.doors):
         if not door.leaf:
             continue
-        along_x, line, low, _ = _wall(room, door.side)
-        at, inward = line + INWARD[door.side] * INNER_WALL_M / 2, INWARD[door.side]
-        middle = low + door.at
-        is_open = stream(config.draw_seed, "door", room.name, k, "day", number).uniform() < day.doors
+        wall = _wall(room, door.side)
+        along, across = wall.low + door.at, wall.inside(INNER_WALL_M / 2)
+        is_open = bool(stream(config.draw_seed, "door", room.name, k, "day", number).uniform() < day.doors)
         if is_open:
-            along, across, turned = middle - door.width / 2, at + inward * (door.width / 2 + INNER_WALL_M / 2), True
-        else:
-            along, across, turned = middle, at, False
-        centre = (along, across) if along_x else (across, along)
-        yaw = 0.0 if along_x != turned else math.pi / 2
-        look = f"{room.name} door"
-        leaves.append(Block(centre, (door.width, 0.05), DOOR_HEIGHT_M, "door", "wood", yaw=yaw, look=look, kind="door"))
+            along, across = along - door.width / 2, across + wall.inward * (door.width / 2 + INNER_WALL_M / 2)
+        yaw = 0.0 if wall.along_x != is_open else math.pi / 2
+        centre, size, look = wall.on_map(along, across), (door.width, 0.05), f"{room.name} door"
+        leaves.append(Block(centre, size, DOOR_HEIGHT_M, "door", "wood", yaw=yaw, look=look, kind="door"))
     return leaves
 
 
@@ -177,30 +194,23 @@ def windows(room: Room) -> list[WallPanel]:
     """Rows of windows on the named sides, where no door is."""
     panes = []
     for side in room.windows:
-        along_x, line, low, high = _wall(room, side)
-        count = max(1, math.floor((high - low) / 1.8))
+        wall = _wall(room, side)
+        count = max(1, math.floor((wall.high - wall.low) / 1.8))
         for k in range(count):
-            along = low + (high - low) * (k + 0.5) / count
-            if any(d.side == side and abs(low + d.at - along) < (d.width + 1.3) / 2 for d in room.doors):
+            along = wall.low + (wall.high - wall.low) * (k + 0.5) / count
+            if any(d.side == side and abs(wall.low + d.at - along) < (d.width + 1.3) / 2 for d in room.doors):
                 continue
-            panes.append(_on_wall(room, side, along, 1.3, 0.9, 1.2, "window", along_x, line))
+            panes.append(_on_wall(room, side, along, 1.3, 0.9, 1.2, "window"))
     return panes
 
 
 def _on_wall(
-    room: Room,
-    side: Side,
-    along: float,
-    width: float,
-    low: float,
-    height: float,
-    material: Material,
-    along_x: bool,
-    line: float,
+    room: Room, side: Side, along: float, width: float, low: float, height: float, material: Material
 ) -> WallPanel:
-    at = line + INWARD[side] * (INNER_WALL_M if room.walls else 0.0)
+    wall = _wall(room, side)
+    centre = wall.on_map(along, wall.inside(INNER_WALL_M if room.walls else 0.0))
     facing = {"east": math.pi, "north": -math.pi / 2, "west": 0.0, "south": math.pi / 2}[side]
-    return WallPanel((along, at) if along_x else (at, along), facing, width, low, height, material)
+    return WallPanel(centre, facing, width, low, height, material)
 
 
 class Fittings(NamedTuple):
@@ -213,36 +223,31 @@ class Fittings(NamedTuple):
 def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, number: int) -> Fittings:
     """Furniture of a room, by its kind and the seed; on each day every piece is shifted along its wall a little."""
     if room.furniture in ("trees", "park"):
-        return Fittings(_planted(config, room), [])
+        return Fittings(list(_planted(config, room)), [])
     rng = stream(config.draw_seed, "furniture", room.name)
     moved = stream(config.draw_seed, "furniture", room.name, "day", number)
     blocks: list[Block] = []
     wall_panels: list[WallPanel] = []
     pieces = CATALOGUE[room.furniture]
-    for side in ("east", "north", "west", "south"):
-        if not room.walls:
-            break
-        along_x, line, low, high = _wall(room, side)
+    for side in SIDES if room.walls else ():
+        wall = _wall(room, side)
         corner = 1.0 if side in ("east", "west") else 0.2
-        free = [
-            (c.middle - c.width / 2 - DOOR_CLEARANCE_M, c.middle + c.width / 2 + DOOR_CLEARANCE_M)
-            for c in cuts
-            if _cuts(c, along_x, line, low, high)
-        ]
-        for piece, along in _placed_along(rng, pieces, room.furniture_density, low + corner, high - corner, free):
+        begin, end = wall.low + corner, wall.high - corner
+        free = [(low - DOOR_CLEARANCE_M, high + DOOR_CLEARANCE_M) for low, high in (c.ends for c in wall.cut_by(cuts))]
+        for piece, along in _placed_along(rng, pieces, room.furniture_density, begin, end, free):
             shift = float(np.clip(moved.normal(0.0, 1.0), -2, 2)) * day.furniture
             if piece.depth == 0.0:
                 if not any(w == side for w in room.windows):
                     low_z, width = rng.uniform(0.9, 1.2), rng.uniform(0.6, 1.2)
                     kind: Material = "board" if room.furniture in ("meeting", "lab") else "poster"
                     tall = 1.0 if kind == "board" else rng.uniform(0.7, 1.2)
-                    wall_panels.append(_on_wall(room, side, along, width, low_z, tall, kind, along_x, line))
+                    wall_panels.append(_on_wall(room, side, along, width, low_z, tall, kind))
                 continue
             if side in room.windows and piece.height > 1.4:
                 continue
-            along = min(max(along + shift, low + corner + piece.length / 2), high - corner - piece.length / 2)
-            blocks += _against_wall(room, side, along_x, line, along, piece, float(moved.normal()) * day.furniture)
-    blocks += _table(config, room, float(moved.normal()) * day.furniture)
+            along = min(max(along + shift, begin + piece.length / 2), end - piece.length / 2)
+            blocks += _against_wall(room, wall, along, piece, float(moved.normal()) * day.furniture)
+    blocks += _table(room, float(moved.normal()) * day.furniture)
     return Fittings(blocks, wall_panels)
 
 
@@ -269,17 +274,12 @@ def _placed_along(
         at = last + gap
 
 
-def _against_wall(
-    room: Room, side: Side, along_x: bool, line: float, along: float, piece: _Piece, turn: float
-) -> Iterator[Block]:
+def _against_wall(room: Room, wall: _Wall, along: float, piece: _Piece, turn: float) -> Iterator[Block]:
     """A piece of furniture with its back to the wall, what stands on it, and the chair in front."""
-    inward = INWARD[side]
 
     def body(part: _Piece, depth_at: float, yaw: float = 0.0, look: str = "") -> Block:
-        across = line + inward * (INNER_WALL_M + 0.01 + depth_at)
-        centre, size = (
-            ((along, across), (part.length, part.depth)) if along_x else ((across, along), (part.depth, part.length))
-        )
+        centre = wall.on_map(along, wall.inside(INNER_WALL_M + 0.01 + depth_at))
+        size = wall.on_map(part.length, part.depth)
         name = look or f"{room.name} {part.material}"
         return Block(
             centre, size, part.height, part.material, part.top, part.bottom_z, yaw, look=name, kind="furniture"
@@ -293,7 +293,7 @@ def _against_wall(
         yield body(chair, piece.depth + 0.3, 0.3 * turn + 0.2, f"{room.name} chair")
 
 
-def _table(config: WorldConfig, room: Room, shift: float) -> Iterator[Block]:
+def _table(room: Room, shift: float) -> Iterator[Block]:
     """The table in the middle with its chairs, where a robot gets around it."""
     if room.furniture not in TABLES:
         return
@@ -306,19 +306,19 @@ def _table(config: WorldConfig, room: Room, shift: float) -> Iterator[Block]:
     middle = room.corner[0] + width / 2 + max(-0.2, min(0.2, shift)), room.corner[1] + height / 2
     yield Block(middle, (length, depth), 0.74, material, "wood", look=f"{room.name} table", kind="furniture")
     long_side = max(length, depth)
-    for k in range(max(1, round(long_side / 0.9))):
+    chairs = max(1, round(long_side / 0.9))
+    for k in range(chairs):
         for across in (-1, 1):
-            along = (k + 0.5) / max(1, round(long_side / 0.9)) * long_side - long_side / 2
+            along = (k + 0.5) / chairs * long_side - long_side / 2
             off = across * (min(length, depth) / 2 + 0.2)
             centre = (middle[0] + along, middle[1] + off) if length >= depth else (middle[0] + off, middle[1] + along)
             yield Block(centre, (0.45, 0.45), 0.88, "fabric", "fabric", look=f"{room.name} chair", kind="furniture")
 
 
-def _planted(config: WorldConfig, room: Room) -> list[Block]:
+def _planted(config: WorldConfig, room: Room) -> Iterator[Block]:
     """Trees (and in a park hedges and benches) scattered over a rectangle, apart from each other."""
     rng = stream(config.draw_seed, "planted", room.name)
     (x, y), (width, depth) = room.corner, room.size
-    blocks: list[Block] = []
     columns, rows = max(1, round(width / 4.0)), max(1, round(depth / 4.0))
     for row in range(rows):
         for column in range(columns):
@@ -333,16 +333,11 @@ def _planted(config: WorldConfig, room: Room) -> list[Block]:
                 continue
             if room.furniture == "park" and what < 0.4:
                 hedge = (min(rng.uniform(1.5, 3.0), width), 0.6)
-                blocks.append(
-                    Block(at, hedge, rng.uniform(0.8, 1.4), "hedge", "hedge", yaw=yaw, look=look, kind="plant")
-                )
+                yield Block(at, hedge, rng.uniform(0.8, 1.4), "hedge", "hedge", yaw=yaw, look=look, kind="plant")
             elif room.furniture == "park" and what < 0.5:
-                blocks.append(
-                    Block(at, (min(1.6, width), 0.5), 0.5, "wood", "wood", yaw=yaw, look="bench", kind="furniture")
-                )
+                yield Block(at, (min(1.6, width), 0.5), 0.5, "wood", "wood", yaw=yaw, look="bench", kind="furniture")
             else:
                 low = rng.uniform(1.7, 2.3)
-                blocks.append(Block(at, (trunk, trunk), low + 0.2, "bark", "bark", yaw=yaw, look=look, kind="plant"))
+                yield Block(at, (trunk, trunk), low + 0.2, "bark", "bark", yaw=yaw, look=look, kind="plant")
                 tall = rng.uniform(1.5, 2.4)
-                blocks.append(Block(at, (crown, crown), tall, "leaves", "leaves", low, yaw, "leaves", look, "plant"))
-    return blocks
+                yield Block(at, (crown, crown), tall, "leaves", "leaves", low, yaw, "leaves", look, "plant")

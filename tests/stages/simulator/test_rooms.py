@@ -55,8 +55,8 @@ def test_windows_are_on_their_side_and_beside_its_doors():
 
 
 def test_only_a_room_lower_than_the_hall_has_a_ceiling_of_its_own():
-    assert roof(WORLD, KITCHEN) == []
-    (ceiling,) = roof(WORLD, replace(KITCHEN, height=2.5))
+    assert roof(KITCHEN) == []
+    (ceiling,) = roof(replace(KITCHEN, height=2.5))
     assert ceiling.bottom_z == 2.5
     assert extent(ceiling) == pytest.approx((2.0, 3.0, 6.0, 8.0))
 
