@@ -76,9 +76,9 @@ def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0
     own = _own_body(directions, robot_radius, camera)
     is_own = disc & np.isfinite(own).all(axis=-1)
     seen &= ~is_own
-    across, down_angle = _pixel_angles(directions)
+    across, down = (np.linalg.norm(np.gradient(directions, axis=axis), axis=-1) for axis in (1, 0))
     with np.errstate(invalid="ignore"):
-        footprint = np.sqrt(across * down_angle)
+        footprint = np.sqrt(across * down)  # angles between neighbouring rays
     corner = math.hypot(camera.width / 2, camera.height_px / 2)
     rim = np.hypot(grid[..., 0] + 0.5 - camera.width / 2, grid[..., 1] + 0.5 - camera.height_px / 2) / corner
     if camera.wraps:
@@ -174,10 +174,3 @@ def _gathered(number: Ints, middle: Array, azimuth: Array, slope: Array) -> tupl
     steepest = np.maximum.reduceat(slope[order], start)
     wedges = np.stack([around + lowest - 1e-6, around + highest + 1e-6, steepest], axis=1)
     return order, np.append(start, len(order)).astype(np.int32), wedges
-
-
-def _pixel_angles(directions: Array) -> tuple[Array, Array]:
-    """Angles between neighbouring rays along rows and along columns, each (rows, columns)."""
-    across = np.linalg.norm(np.gradient(directions, axis=1), axis=-1)
-    down = np.linalg.norm(np.gradient(directions, axis=0), axis=-1)
-    return across, down
