@@ -85,7 +85,7 @@ def drawn_store(world: WorldConfig) -> WorldConfig:
     count = len(listed) + int(rng.integers(3) if len(listed) >= LARGE_STORE else rng.integers(2))
     inset = rng.uniform(0.0, 0.08) * around
     parts, aisles = _divided(bounds.grown(-inset), count, around * rng.uniform(0.85, 1.15), rng)
-    blocks, rooms = tuple(map(over.block, world.blocks)), tuple(map(over.room, world.rooms))
+    blocks, rooms = tuple(map(over.body, world.blocks)), tuple(map(over.room, world.rooms))
     standing = [_part(room) for room in rooms] + [_footprint(block) for block in blocks]
     parts = {number: _kept_from(part, standing) for number, part in parts.items()}
     twins = aisles[-1][-2:] if aisles and any(_is_comb(route, listed) for route in world.routes.values()) else ()
@@ -107,7 +107,7 @@ def drawn_store(world: WorldConfig) -> WorldConfig:
         aisle_blocks=tuple(shelved.values()),
         blocks=blocks,
         rooms=rooms,
-        shelves=tuple(map(over.shelf, world.shelves)),
+        shelves=tuple(map(over.body, world.shelves)),
         wall_panels=tuple(_moved_along(over.panel(panel), world.size, rng) for panel in world.wall_panels),
         lamps=tuple(replace(lamp, centre=over.point(lamp.centre)) for lamp in world.lamps),
         lamp_grid=grid and replace(grid, spacing=(rng.uniform(0.8, 1.2) * grid.spacing[0], grid.spacing[1])),

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from .config import Block, Door, Point, Room, Shelf, Side, WallPanel
 
+Body = TypeVar("Body", Block, Shelf)
 OPPOSITE: dict[Side, Side] = {"east": "west", "west": "east", "north": "south", "south": "north"}
 EXCHANGED: dict[Side, Side] = {"east": "north", "north": "east", "west": "south", "south": "west"}
 
@@ -58,10 +60,6 @@ class Mirrored:
         """A wall panel."""
         return replace(panel, centre=self.point(panel.centre), facing=self.heading(panel.facing))
 
-    def block(self, block: Block) -> Block:
-        """A box on the floor."""
-        return replace(block, centre=self.point(block.centre), yaw=self.heading(block.yaw))
-
-    def shelf(self, shelf: Shelf) -> Shelf:
-        """A shelf."""
-        return replace(shelf, centre=self.point(shelf.centre), yaw=self.heading(shelf.yaw))
+    def body(self, body: Body) -> Body:
+        """A box or a shelf on the floor."""
+        return replace(body, centre=self.point(body.centre), yaw=self.heading(body.yaw))
