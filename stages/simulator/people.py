@@ -89,15 +89,9 @@ def coverings(texture: Callable[[str, str], int], look: int) -> tuple[Coverings,
         flank = Tiling(np.full((1, 1), sides), deep, tall)
         return (end, before, flank, flank, Tiling(over, deep, wide), Tiling(over, deep, wide))
 
-    leg, trunk, arm, head = PARTS[0], PARTS[2], PARTS[3], PARTS[5]
-    return (
-        covered(leg, trousers, trousers, trousers),
-        covered(leg, trousers, trousers, trousers),
-        covered(trunk, coat, coat, coat),
-        covered(arm, coat, coat, coat),
-        covered(arm, coat, coat, coat),
-        covered(head, hair, face, hair),
-    )
+    legs, trunk, arms, head = (trousers,) * 3, (coat,) * 3, (coat,) * 3, (hair, face, hair)
+    looks = (legs, legs, trunk, arms, arms, head)
+    return tuple(covered(part, *look) for part, look in zip(PARTS, looks, strict=True))
 
 
 def figures(people: Sequence[Person], looks: Shorts) -> tuple[Array, Shorts]:
