@@ -159,7 +159,7 @@ class World:
                 across = rng.uniform(-0.15, 0.15)
                 at = _place(shelf.centre, shelf.yaw, along + length / 2 - 0.15, across)
                 yaw = shelf.yaw + rng.uniform(-0.15, 0.15)
-                carton = self._texture("carton", f"carton {rng.integers(12)}")
+                carton = "carton", f"carton {rng.integers(12)}"
                 boxes.append(self._solid("stock", at, (length, depth), yaw, shelf.height, height, carton, carton))
             along += length + rng.uniform(0.1, 0.5)
         return boxes
@@ -172,29 +172,28 @@ class World:
         yaw: float,
         low: float,
         height: float,
-        side: int,
-        top: int,
-        extent: tuple[float, float] = (math.inf, math.inf),
+        side: tuple[str, str],
+        top: tuple[str, str],
+        bottom: tuple[str, str] | None = None,
     ) -> Box:
-        ends, fronts = self._plain(side, size[1], height, extent), self._plain(side, size[0], height, extent)
-        cap = self._plain(top, size[0], size[1], extent)
+        """A body with textures, by material and name, of its sides, its top and its underside (or there its top's)."""
+
+        def face(look: tuple[str, str], width: float, height: float) -> Tiling:
+            return self._plain(self._texture(*look), width, height, textures.extent(look[0]))
+
+        ends, fronts = (face(side, width, height) for width in size[::-1])
+        above = face(top, *size)
+        below = above if bottom is None else face(bottom, *size)
         half = (size[0] / 2, size[1] / 2)
-        return Box(kind, centre, half, yaw, low, low + height, (ends, ends, fronts, fronts, cap, cap))
+        return Box(kind, centre, half, yaw, low, low + height, (ends, ends, fronts, fronts, below, above))
 
     def _block(self, block: Block, number: int) -> Box:
         look = block.look or f"block {number}"
-        side = self._texture(block.material, look)
-        ends, fronts = (
-            self._plain(side, width, block.height, textures.extent(block.material)) for width in block.size[::-1]
+        side, top = (block.material, look), (block.top, f"{look} top")
+        bottom = None if block.bottom is None else (block.bottom, f"{look} bottom")
+        return self._solid(
+            block.kind, block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, bottom
         )
-        top = self._plain(self._texture(block.top, f"{look} top"), *block.size, textures.extent(block.top))
-        bottom = top
-        if block.bottom is not None:
-            under = self._texture(block.bottom, f"{look} bottom")
-            bottom = self._plain(under, *block.size, textures.extent(block.bottom))
-        half = (block.size[0] / 2, block.size[1] / 2)
-        faces = (ends, ends, fronts, fronts, bottom, top)
-        return Box(block.kind, block.centre, half, block.yaw, block.bottom_z, block.bottom_z + block.height, faces)
 
     def _wall_panel(self, hanging: WallPanel, number: int) -> Box:
         front = self._plain(self._texture(hanging.material, f"hanging {number}"), hanging.width, hanging.height)
@@ -211,10 +210,10 @@ class World:
         )
 
     def _lamp(self, lamp: Lamp, is_on: bool) -> Box:
-        texture = self._texture("lamp", f"lamp {lamp.light}") if is_on else self._texture("unlit", "lamp")
-        self._tints[texture] = lamp.light
+        look = ("lamp", f"lamp {lamp.light}") if is_on else ("unlit", "lamp")
+        self._tints[self._texture(*look)] = lamp.light
         low = (self.config.height if lamp.z is None else lamp.z) - 0.08
-        return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, texture, texture)
+        return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, look, look)
 
     # As arrays for the renderer
 
