@@ -5,7 +5,7 @@ Colours are blue-green-red. Each texture is drawn larger than it is kept and ave
 
 import colorsys
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -25,9 +25,8 @@ def draw(material: str, rng: np.random.Generator) -> Bytes:
     if material not in MATERIALS:
         raise KeyError(f"no material '{material}'; there are: {', '.join(sorted(MATERIALS))}")
     canvas = MATERIALS[material](rng)
-    return cv2.resize(np.clip(canvas, 0, 255).astype(np.uint8), (SIDE, SIDE), interpolation=cv2.INTER_AREA).astype(
-        np.uint8, copy=False
-    )
+    pixels = np.clip(canvas, 0, 255).astype(np.uint8)
+    return cv2.resize(pixels, (SIDE, SIDE), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def glow(material: str) -> float:
@@ -66,9 +65,19 @@ def blank(colour: Colour) -> Floats:
     return np.broadcast_to(np.array(colour, dtype=np.float32), (DRAWN, DRAWN, 3)).copy()
 
 
+def lit_to(colour: Colour, level: float) -> Colour:
+    """A colour of the same hue whose greatest part is `level`."""
+    return scaled(colour, level / max(colour))
+
+
 def cloud(rng: np.random.Generator, cells: int, strength: float) -> Floats:
     """Smooth noise (DRAWN, DRAWN, 1) around 0, `cells` bumps along a side."""
-    coarse = rng.normal(0.0, strength, (cells + 1, cells + 1)).astype(np.float32)
+    return _bumps(rng, (cells + 1, cells + 1), strength)
+
+
+def _bumps(rng: np.random.Generator, shape: tuple[int, int], strength: float) -> Floats:
+    """Smooth noise (DRAWN, DRAWN, 1) around 0 between so many rows and columns of random numbers."""
+    coarse = rng.normal(0.0, strength, shape).astype(np.float32)
     smooth: Floats = cv2.resize(coarse, (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC).astype(np.float32)
     return smooth[..., None]
 
@@ -84,10 +93,15 @@ def box(canvas: Floats, left: float, top: float, right: float, bottom: float, co
     cv2.rectangle(canvas, (corners[0], corners[1]), (corners[2] - 1, corners[3] - 1), colour, -1)
 
 
+def _bars(canvas: Floats, places: Sequence[float], width: float, colour: Colour) -> None:
+    """Bars from edge to edge that begin at the same places from the left and from above."""
+    for at in places:
+        box(canvas, at, 0, at + width, 1, colour)
+        box(canvas, 0, at, 1, at + width, colour)
+
+
 def _wall(rng: np.random.Generator) -> Floats:
-    base = vivid(rng, (0.05, 0.3))
-    level = 225.0 / max(base)
-    canvas = blank(scaled(base, level)) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
+    canvas = blank(lit_to(vivid(rng, (0.05, 0.3)), 225.0)) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
     if rng.uniform() < 0.6:
         stripe = vivid(rng, (0.4, 0.8))
         height = rng.uniform(0.62, 0.75)
@@ -116,16 +130,13 @@ def _floor(rng: np.random.Generator) -> Floats:
             tile = tone * (1.0 + rng.normal(0.0, 0.05)) * (0.86 if (row + column) % 2 else 1.0)
             box(canvas, column / 2, row / 2, (column + 1) / 2, (row + 1) / 2, tuple(tile))
     canvas += cloud(rng, 24, 7.0) + grain(rng, 5.0)
-    for k in (0.0, 0.5):
-        box(canvas, k, 0, k + 0.012, 1, (92, 98, 104))
-        box(canvas, 0, k, 1, k + 0.012, (92, 98, 104))
+    _bars(canvas, (0.0, 0.5), 0.012, (92, 98, 104))
     return canvas
 
 
 def _ceiling(rng: np.random.Generator) -> Floats:
     canvas = blank((205, 208, 208)) + grain(rng, 5.0) + cloud(rng, 3, 3.0)
-    box(canvas, 0, 0, 1, 0.02, (150, 152, 152))
-    box(canvas, 0, 0, 0.02, 1, (150, 152, 152))
+    _bars(canvas, (0.0,), 0.02, (150, 152, 152))
     if rng.uniform() < 0.08:
         box(canvas, 0.3, 0.3, 0.7, 0.7, (120, 122, 122))
         for k in range(6):
@@ -146,8 +157,7 @@ def _unlit(rng: np.random.Generator) -> Floats:
 
 
 def _wood(rng: np.random.Generator) -> Floats:
-    rings = cv2.resize(rng.normal(0.0, 1.0, (2, 40)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC)
-    canvas = blank((95, 140, 185)) * (1.0 + 0.08 * rings[..., None].astype(np.float32)) + grain(rng, 4.0)
+    canvas = blank((95, 140, 185)) * (1.0 + 0.08 * _bumps(rng, (2, 40), 1.0)) + grain(rng, 4.0)
     for k in (0.25, 0.5, 0.75):
         box(canvas, k, 0, k + 0.008, 1, (55, 85, 115))
     return canvas
@@ -188,10 +198,7 @@ def _window(rng: np.random.Generator) -> Floats:
     rows = np.linspace(0.0, 1.0, DRAWN, dtype=np.float32)[:, None, None]
     sky, ground = np.array((250, 235, 215), dtype=np.float32), np.array((120, 190, 150), dtype=np.float32)
     canvas: Floats = np.where(rows < rng.uniform(0.5, 0.7), sky - 40 * rows, ground) + cloud(rng, 6, 10.0)
-    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
-    for k in (0.0, 0.475, 0.95):
-        box(canvas, k, 0, k + 0.05, 1, (235, 235, 235))
-        box(canvas, 0, k, 1, k + 0.05, (235, 235, 235))
+    _bars(canvas, (0.0, 0.475, 0.95), 0.05, (235, 235, 235))
     return canvas
 
 
@@ -220,9 +227,7 @@ def _poster(rng: np.random.Generator) -> Floats:
         for row, column in np.argwhere(rng.uniform(size=(5, 3)) < 0.6):
             left, above = 0.1 + 0.16 * letter + 0.042 * column, top + 0.05 * row
             box(canvas, left, above, left + 0.042, above + 0.05, ink)
-    for edge in (0.0, 0.97):
-        box(canvas, edge, 0, edge + 0.03, 1, (245, 245, 245))
-        box(canvas, 0, edge, 1, edge + 0.03, (245, 245, 245))
+    _bars(canvas, (0.0, 0.97), 0.03, (245, 245, 245))
     return canvas + grain(rng, 3.0)
 
 
@@ -236,8 +241,7 @@ def _carton(rng: np.random.Generator) -> Floats:
 
 
 def _plaster(rng: np.random.Generator) -> Floats:
-    base = vivid(rng, (0.04, 0.28))
-    canvas = blank(scaled(base, rng.uniform(190.0, 230.0) / max(base))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
+    canvas = blank(lit_to(vivid(rng, (0.04, 0.28)), rng.uniform(190.0, 230.0))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
     if rng.uniform() < 0.3:
         box(canvas, 0, 0.68, 1, 0.965, scaled(vivid(rng, (0.15, 0.45)), 0.85))
     box(canvas, 0, 0.965, 1, 1, (70, 75, 80))
@@ -260,7 +264,6 @@ def _facade(rng: np.random.Generator) -> Floats:
     colour = vivid(rng, (0.08, 0.45))
     canvas = (_brick(rng) if rng.uniform() < 0.4 else blank(scaled(colour, 0.8))) + cloud(rng, 5, 5.0)
     left, top = rng.uniform(0.15, 0.3), rng.uniform(0.12, 0.25)
-    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
     box(canvas, left, top, 1 - left, 0.65, (225, 225, 225))
     for column in range(2):
         x = left + 0.03 + column * (0.5 - left)
@@ -281,21 +284,14 @@ def _parquet(rng: np.random.Generator) -> Floats:
     for row in range(8):
         start = rng.uniform(-0.5, 0.0)
         while start < 1.0:
-            box(
-                canvas,
-                max(start, 0.0),
-                row / 8,
-                min(start + 0.49, 1.0),
-                (row + 0.95) / 8,
-                tuple(tone * rng.uniform(0.85, 1.15)),
-            )
+            shade = tuple(tone * rng.uniform(0.85, 1.15))
+            box(canvas, max(start, 0.0), row / 8, min(start + 0.49, 1.0), (row + 0.95) / 8, shade)
             start += 0.5
     return canvas + cloud(rng, 30, 4.0) + grain(rng, 4.0)
 
 
 def _linoleum(rng: np.random.Generator) -> Floats:
-    base = vivid(rng, (0.1, 0.4))
-    canvas = blank(scaled(base, rng.uniform(120.0, 185.0) / max(base)))
+    canvas = blank(lit_to(vivid(rng, (0.1, 0.4)), rng.uniform(120.0, 185.0)))
     return canvas + cloud(rng, 12, 8.0) + cloud(rng, 48, 6.0) + grain(rng, 4.0)
 
 
@@ -335,10 +331,7 @@ def _hedge(rng: np.random.Generator) -> Floats:
 
 
 def _bark(rng: np.random.Generator) -> Floats:
-    furrows = cv2.resize(
-        rng.normal(0.0, 1.0, (5, 28)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC
-    )
-    return blank((58, 78, 96)) * (1.0 + 0.25 * furrows[..., None].astype(np.float32)) + grain(rng, 8.0)
+    return blank((58, 78, 96)) * (1.0 + 0.25 * _bumps(rng, (5, 28), 1.0)) + grain(rng, 8.0)
 
 
 def _sky(rng: np.random.Generator) -> Floats:
@@ -370,8 +363,7 @@ def _books(rng: np.random.Generator) -> Floats:
 
 
 def _cabinet(rng: np.random.Generator) -> Floats:
-    base = vivid(rng, (0.05, 0.6))
-    colour = scaled(base, rng.uniform(150.0, 235.0) / max(base))
+    colour = lit_to(vivid(rng, (0.05, 0.6)), rng.uniform(150.0, 235.0))
     canvas = blank(scaled(colour, 0.6))
     columns, rows = int(rng.integers(1, 3)), int(rng.integers(1, 5))
     for row in range(rows):
@@ -387,7 +379,6 @@ def _cabinet(rng: np.random.Generator) -> Floats:
 def _steel(rng: np.random.Generator) -> Floats:
     brushed = cv2.resize(rng.normal(0.0, 5.0, (DRAWN, 3)).astype(np.float32), (DRAWN, DRAWN))
     canvas = blank((188, 186, 182)) + brushed[..., None].astype(np.float32) + grain(rng, 3.0)
-    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
     box(canvas, 0.08, 0.1, 0.11, 0.5, (90, 90, 92))
     box(canvas, 0, 0.6, 1, 0.615, (110, 110, 112))
     return canvas
@@ -414,9 +405,7 @@ def _board(rng: np.random.Generator) -> Floats:
         ink = ((160, 60, 30), (40, 40, 190), (60, 130, 40), (30, 30, 30))[int(rng.integers(4))]
         steps = np.cumsum(rng.normal((5.0, 0.0), 5.0, (12, 2)), axis=0).astype(int)
         cv2.polylines(canvas, [(at + steps).astype(np.int32)], False, ink, 3)
-    for edge in (0.0, 0.97):
-        box(canvas, edge, 0, edge + 0.03, 1, (150, 150, 152))
-        box(canvas, 0, edge, 1, edge + 0.03, (150, 150, 152))
+    _bars(canvas, (0.0, 0.97), 0.03, (150, 150, 152))
     return canvas
 
 
@@ -454,12 +443,10 @@ def _cans(canvas: Floats, rng: np.random.Generator) -> None:
     for layer in range(layers):
         for k in range(count):
             left, bottom = 0.04 + 0.94 * k / count, 0.9 - layer * height
-            colour = brands[(k + layer) % 2]
-            box(canvas, left, bottom - height, left + 0.9 / count, bottom, colour)
-            box(
-                canvas, left, bottom - 0.65 * height, left + 0.9 / count, bottom - 0.35 * height, scaled(brands[0], 1.3)
-            )
-            box(canvas, left, bottom - height, left + 0.9 / count, bottom - 0.93 * height, (190, 190, 190))
+            right, label = left + 0.9 / count, scaled(brands[0], 1.3)
+            box(canvas, left, bottom - height, right, bottom, brands[(k + layer) % 2])
+            box(canvas, left, bottom - 0.65 * height, right, bottom - 0.35 * height, label)
+            box(canvas, left, bottom - height, right, bottom - 0.93 * height, (190, 190, 190))
             x, y0, y1 = round(left * DRAWN), round((bottom - height) * DRAWN), round(bottom * DRAWN)
             patch = canvas[max(y0, 0) : y1, x : x + len(shade)]
             patch *= shade[None, : patch.shape[1], None]
