@@ -1,4 +1,4 @@
-"""Bodies as upright boxes with covered faces."""
+"""Bodies as upright boxes with covered faces, and by the cells of a grid."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.geometry.arrays import Array, Ints, Shorts
 
 
 @dataclass(frozen=True)
@@ -42,3 +42,18 @@ def box_array(boxes: Sequence[Box]) -> Array:
         for b in boxes
     ]
     return np.array(rows, dtype=np.float64).reshape(-1, 9)
+
+
+def boxes_of_cells(low: Ints, high: Ints, rows: int, columns: int) -> tuple[Shorts, Shorts]:
+    """Boxes by the cells of a grid: where those of each cell begin (cells + 1,), and their numbers, ascending in each.
+
+    `low` and `high` (B, 2): first and last column, and row, that each box is noted in.
+    """
+    noted = [
+        np.add.outer(columns * np.arange(bottom, top + 1), np.arange(left, right + 1)).ravel()
+        for (left, bottom), (right, top) in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+    cells = np.concatenate([np.zeros(0, np.int64), *noted])
+    boxes = np.repeat(np.arange(len(noted), dtype=np.int32), [len(each) for each in noted])
+    order = np.argsort(cells, kind="stable")
+    return np.searchsorted(cells[order], np.arange(rows * columns + 1)).astype(np.int32), boxes[order]

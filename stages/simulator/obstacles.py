@@ -10,6 +10,8 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Shorts
 from omninav.stages.geometry.plane.grid_rays import cells_along
 
+from .bodies import boxes_of_cells
+
 CELL = 1.0
 """Size (m) of the cells in which boxes are looked up."""
 
@@ -52,13 +54,7 @@ def gather(bodies: Sequence[Body], size: tuple[float, float], reach: float) -> O
     extent = np.hstack([across, upward]) + reach
     low = np.clip(np.floor((boxes[:, :2] - extent) / CELL).astype(int), 0, None)
     high = np.minimum(np.floor((boxes[:, :2] + extent) / CELL).astype(int), [columns - 1, rows - 1])
-    lists: list[list[int]] = [[] for _ in range(rows * columns)]
-    for number in range(len(boxes)):
-        for row in range(low[number, 1], high[number, 1] + 1):
-            for column in range(low[number, 0], high[number, 0] + 1):
-                lists[row * columns + column].append(number)
-    start = np.cumsum([0, *(len(cell) for cell in lists)]).astype(np.int32)
-    members = np.array([number for cell in lists for number in cell], dtype=np.int32)
+    start, members = boxes_of_cells(low, high, rows, columns)
     return Obstacles(boxes, start, members, rows, columns, float(size[0]), float(size[1]), reach)
 
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Bytes, Ints, Shorts
+from omninav.stages.geometry.arrays import Array, Bytes, Shorts
 
 from . import textures
-from .bodies import Box, Coverings, Tiling, box_array
+from .bodies import Box, Coverings, Tiling, box_array, boxes_of_cells
 from .lighting import Light, contact_map, light_map
 from .renderer import Scene
 
@@ -88,24 +87,4 @@ def cells(boxes: Array, grid: Array, rows: int, columns: int) -> tuple[Shorts, S
     low = np.floor((boxes[:, :2] - reach - grid[:2]) / grid[2] - 1e-9).astype(np.int64)
     high = np.floor((boxes[:, :2] + reach - grid[:2]) / grid[2] + 1e-9).astype(np.int64)
     last = np.array([columns - 1, rows - 1])
-    return _cells(np.clip(low, 0, last), np.clip(high, 0, last), rows, columns)
-
-
-@compiled()
-def _cells(low: Ints, high: Ints, rows: int, columns: int) -> tuple[Shorts, Shorts]:
-    start = np.zeros(rows * columns + 1, dtype=np.int32)
-    for box in range(len(low)):
-        for row in range(low[box, 1], high[box, 1] + 1):
-            for column in range(low[box, 0], high[box, 0] + 1):
-                start[row * columns + column + 1] += 1
-    for cell in range(rows * columns):
-        start[cell + 1] += start[cell]
-    members = np.empty(start[-1], dtype=np.int32)
-    filled = start[:-1].copy()
-    for box in range(len(low)):
-        for row in range(low[box, 1], high[box, 1] + 1):
-            for column in range(low[box, 0], high[box, 0] + 1):
-                cell = row * columns + column
-                members[filled[cell]] = box
-                filled[cell] += 1
-    return start, members
+    return boxes_of_cells(np.clip(low, 0, last), np.clip(high, 0, last), rows, columns)
