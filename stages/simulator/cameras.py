@@ -1,7 +1,7 @@
 """Cameras as rays: for each pixel the direction it looks along, in the robot's frame (x forward, y left, z up)."""
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,11 +16,10 @@ RAYS_PER_WEDGE = 200
 """About how many rays share one look around: fewer looks for more rays cost less, but each finds more bodies."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rays:
+class Rays(NamedTuple):
     """The pixels of a camera that see something, in wedges of like azimuth.
 
-    `shape`: rows and columns of the image. `pixels` (N,): their numbers, row by row from 0, wedge after wedge.
+    `rows` and `columns` of the image. `pixels` (N,): their numbers, row by row from 0, wedge after wedge.
     `directions` (N, 3): unit rays in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,):
     share that vignetting leaves. `wedge_start` (W + 1,): first ray of each wedge; `wedges` (W, 3): its lowest and
     highest azimuth (rad, counter-clockwise from forward) and steepest slope. `ray_of` (rows * columns,): ray of each
@@ -28,7 +27,8 @@ class Rays:
     follow those of the rays.
     """
 
-    shape: tuple[int, int]
+    rows: int
+    columns: int
     pixels: Shorts
     directions: Floats
     footprint: Floats
@@ -91,7 +91,8 @@ def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0
     gain = 1.0 - vignetting * rim**2
     footprint = np.nan_to_num(footprint[seen], nan=float(np.nanmax(footprint)))
     return Rays(
-        shape=(camera.height_px, camera.width),
+        rows=camera.height_px,
+        columns=camera.width,
         pixels=pixels[order],
         directions=np.ascontiguousarray(directions[seen][order], dtype=np.float32),
         footprint=footprint[order].astype(np.float32),
@@ -113,8 +114,7 @@ def leaning(rays: Rays, rotation: Array) -> Rays:
     seen = len(rays.pixels)
     ray_of = rays.ray_of.copy()
     ray_of[rays.pixels[order]] = np.arange(seen, dtype=np.int32)
-    return replace(
-        rays,
+    return rays._replace(
         pixels=rays.pixels[order],
         directions=np.ascontiguousarray(directions[order]),
         footprint=rays.footprint[order],

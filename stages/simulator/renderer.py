@@ -101,9 +101,8 @@ def render(
     if len(rays.own):
         lit[len(rays.pixels) :] = rays.own * _light_on_deck(scene, float(poses[0, 0]), float(poses[0, 1]))
     for x, y, heading in poses.tolist():
-        _trace(scene, moving, rays.directions, rays.footprint, rays.wedge_start, rays.wedges, x, y, heading,
-               float(eye_height), 1.0 / len(poses), lit)  # fmt: skip
-    image = np.zeros((*rays.shape, 3), dtype=np.uint8)
+        _trace(scene, moving, rays, x, y, heading, float(eye_height), 1.0 / len(poses), lit)
+    image = np.zeros((rays.rows, rays.columns, 3), dtype=np.uint8)
     _expose(lit, rays.ray_of, rays.gain, float(exposure), float(noise), np.uint64(key), QUANTILES,
             image.reshape(-1, 3))  # fmt: skip
     return image
@@ -121,10 +120,7 @@ def _light_on_deck(scene: Scene, x: float, y: float) -> Floats:
 def _trace(
     scene: Scene,
     moving: Bodies,
-    directions: Floats,
-    footprint: Floats,
-    wedge_start: Shorts,
-    wedges: Array,
+    rays: Rays,
     x: float,
     y: float,
     heading: float,
@@ -133,13 +129,10 @@ def _trace(
     lit: Floats,
 ) -> None:
     """Add colours (N, 3) of rays (N, 3), 0 to 255 times `weight`, before the chip."""
-    chunks = min(CHUNKS, len(wedges))
+    chunks = min(CHUNKS, len(rays.wedges))
     bearings = _bearings(moving.boxes, x, y)
     for chunk in numba.prange(chunks):
-        _chunk(
-            scene, moving, bearings, directions, footprint, wedge_start, wedges, x, y, heading, z, weight, lit, chunk,
-            chunks,
-        )  # fmt: skip
+        _chunk(scene, moving, bearings, rays, x, y, heading, z, weight, lit, chunk, chunks)
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
@@ -160,10 +153,7 @@ def _chunk(
     scene: Scene,
     moving: Bodies,
     bearings: Array,
-    directions: Floats,
-    footprint: Floats,
-    wedge_start: Shorts,
-    wedges: Array,
+    rays: Rays,
     x: float,
     y: float,
     heading: float,
@@ -174,9 +164,10 @@ def _chunk(
     chunks: int,
 ) -> None:
     """The wedges of one portion: every `chunks`-th, so that all portions cost about the same."""
-    # Taken out of the scene once: each mention of an array in a tuple counts references, which costs more than a test.
+    # Taken out of the tuples once: each mention of an array in a tuple counts references, which costs more than a test.
     boxes, faces, tiles, texels, level_start = scene.boxes, scene.faces, scene.tiles, scene.texels, scene.level_start
     table, size, glow, grid = scene.surface_table, scene.surface_size, scene.glow, scene.grid
+    directions, footprint, wedge_start, wedges = rays.directions, rays.footprint, rays.wedge_start, rays.wedges
     light, contact, moved, moved_faces = scene.light, scene.contact, moving.boxes, moving.faces
     start, members = scene.cell_start, scene.cell_boxes
     rows, columns, ceiling, side = scene.rows, scene.columns, scene.height, scene.side
