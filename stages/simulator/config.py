@@ -17,42 +17,12 @@ Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Bounds(gt=0, le=FAR)]
 Spread = Annotated[float, Bounds(ge=0, le=FAR)]
 Share = Annotated[float, Bounds(ge=0, le=1)]
-Material = Literal[
-    "wall",
-    "concrete",
-    "stripes",
-    "floor",
-    "ceiling",
-    "lamp",
-    "wood",
-    "mat",
-    "counter",
-    "door",
-    "window",
-    "poster",
-    "carton",
-    "goods",
-    "plaster",
-    "brick",
-    "facade",
-    "carpet",
-    "parquet",
-    "linoleum",
-    "asphalt",
-    "paving",
-    "grass",
-    "hedge",
-    "leaves",
-    "bark",
-    "sky",
-    "curtain",
-    "books",
-    "cabinet",
-    "steel",
-    "fabric",
-    "screen",
-    "board",
-]
+OfHalls = Literal["wall", "concrete", "stripes", "floor", "ceiling", "lamp"]
+OfStores = Literal["wood", "mat", "counter", "door", "window", "poster", "carton", "goods"]
+OfRooms = Literal["plaster", "brick", "facade", "carpet", "parquet", "linoleum"]
+Outdoors = Literal["asphalt", "paving", "grass", "hedge", "leaves", "bark", "sky"]
+OfFurniture = Literal["curtain", "books", "cabinet", "steel", "fabric", "screen", "board"]
+Material = Literal[OfHalls, OfStores, OfRooms, Outdoors, OfFurniture]
 """Materials of faces; `textures` draws them."""
 
 
