@@ -125,9 +125,9 @@ def light_map(
     table = np.array(
         [(*light.position, *light.facing, *(light.scale * np.array(light.colour)), *light.on) for light in lights]
     ).reshape(-1, 12)
-    blocking = _blocking(boxes, x, y, height)
+    blocking = _blocking(boxes, corner, step, (rows, columns), height)
     lit, full = np.zeros((5, rows, columns, 3), dtype=np.float32), np.zeros((rows, columns), dtype=np.float32)
-    _shine(table, blocking, x, y, height, FACE_HEIGHTS_M, FACE_NORMALS, lit, full)
+    _shine(table, blocking, x, y, FACE_HEIGHTS_M, FACE_NORMALS, lit, full)
     mean = float(full.mean(dtype=np.float64)) or 1.0
     lit *= (1.0 - ambient) / mean
     lit[1:] *= 1.6  # a wall also gets what floor and ceiling throw back
@@ -149,30 +149,16 @@ def contact_map(boxes: Array, corner: Array, size: tuple[float, float], step: fl
     return left
 
 
-def _blocking(boxes: Array, x: Array, y: Array, height: float) -> Bools:
-    """Points (rows, columns) inside a body that leaves no way for light under the ceiling."""
-    blocking = np.zeros((len(y), len(x)), dtype=np.bool_)
+def _blocking(boxes: Array, corner: Array, step: float, shape: tuple[int, int], height: float) -> Bools:
+    """Points (rows, columns) inside a body that leaves no way for light under the ceiling.
+
+    Those no further from it than half a step count as inside: no wall is too thin to be met.
+    """
     tall = boxes[(boxes[:, 6] < 0.3) & (boxes[:, 7] > height - 0.3)]
-    _cover(tall, x, y, blocking)
-    return blocking
-
-
-@compiled()
-def _cover(boxes: Array, x: Array, y: Array, covered: Bools) -> None:
-    """Mark the points that lie in a box, or no further from it than half a step: no wall is too thin to be met."""
-    step = x[1] - x[0]
-    for b in range(len(boxes)):
-        cos, sin = boxes[b, 2], boxes[b, 3]
-        length, depth = max(boxes[b, 4], 0.5 * step), max(boxes[b, 5], 0.5 * step)
-        reach_x = abs(cos) * length + abs(sin) * depth
-        reach_y = abs(sin) * length + abs(cos) * depth
-        for row in range(max(0, math.floor((boxes[b, 1] - reach_y - y[0]) / step)),
-                         min(len(y), math.ceil((boxes[b, 1] + reach_y - y[0]) / step) + 1)):  # fmt: skip
-            for column in range(max(0, math.floor((boxes[b, 0] - reach_x - x[0]) / step)),
-                                min(len(x), math.ceil((boxes[b, 0] + reach_x - x[0]) / step) + 1)):  # fmt: skip
-                px, py = x[column] - boxes[b, 0], y[row] - boxes[b, 1]
-                if abs(cos * px + sin * py) <= length + 1e-9 and abs(cos * py - sin * px) <= depth + 1e-9:
-                    covered[row, column] = True
+    tall[:, 4:6] = np.maximum(tall[:, 4:6], 0.5 * step)
+    distance = np.full(shape, 1e3, dtype=np.float32)
+    _near(tall, corner, step, 0.0, distance)
+    return distance <= np.float32(1e-9)
 
 
 @compiled(error_model="numpy", parallel=True)
@@ -181,7 +167,6 @@ def _shine(
     blocking: Bools,
     x: Array,
     y: Array,
-    height: float,
     heights: Array,
     faces: Array,
     lit: Floats,
