@@ -90,8 +90,9 @@ class InputConflicts(Stage):
     Motion seen in the images (turns between panoramas, and whether anything changes) is compared with odometry's, over
     the last `WINDOW` images; the track of single images' best matches in the map, without any belief, with odometry's
     track and with the estimate. A finding needs two judgements in a row (that the camera is frozen, none), is said
-    once, as a warning, with what to check, and stands until two judgements in a row do not find it. Where nothing measured the motion, nothing is said
-    of it. Which conflicts are noticed after how many images, where the limits are from, and what cannot be noticed:
+    once, as a warning, with what to check, and stands until two judgements in a row do not find it. Where nothing
+    measured the motion, nothing is said of it. Which conflicts are noticed after how many images, where the limits are
+    from, and what cannot be noticed:
     docs/conflicts.md.
     """
 
