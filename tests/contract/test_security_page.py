@@ -26,7 +26,7 @@ TESTS = {
     "Camera files": "stages/recordings/test_camera_yaml.py::test_a_hostile_file_is_refused_in_one_short_line",
     "Occupancy grids": "stages/recordings/test_occupancy_grid.py::test_values_without_bounds_are_refused_by_name",
     "Tables and layouts": (
-        "stages/recordings/test_image_folder.py::test_a_hostile_description_is_one_line_that_names_the_place"
+        "stages/recordings/test_image_folder.py::test_a_wrong_or_hostile_description_is_one_line_that_names_the_place"
     ),
     "Names": "hostile/test_names.py::test_an_experiments_name_is_a_name",
     "Logs": (
@@ -40,7 +40,7 @@ TESTS = {
     "Folders that cannot be written": f"{TRUST}::test_a_folder_that_cannot_be_used_is_one_line",
     "What a peer can do": f"{LIVE}::test_requests_that_are_turned_off_are_not_heard",
     "What it can call": "stages/live/test_amcl_interface.py::test_amcls_topics_and_services_are_answered",
-    "What a message cannot do": f"{LIVE}::test_a_damaged_image_is_counted_and_the_next_one_is_used",
+    "What a message cannot do": f"{LIVE}::test_a_damaged_message_is_counted_and_the_drive_goes_on",
     "What it can read": "stages/live/test_every_message.py::test_over_dds",
     "How far it is found": "stages/live/test_transport.py::test_discovery_reaches_as_far_as_ros_says",
     "SROS 2": "stages/live/test_every_message.py::test_a_keystore_that_is_not_there_is_one_line",
