@@ -50,6 +50,6 @@ def made_drive(
 
 
 def figures(stage: Any, *given: Any, **more: Any) -> Any:
-    """What a metric finds, or None."""
+    """Gives the figures that a metric finds, or None."""
     metrics = stage.step(Context("metric"), *given, **more).metrics
     return metrics and metrics.values

@@ -1,4 +1,4 @@
-"""How much memory something takes while it runs."""
+"""Measures the peak of memory while something runs."""
 
 import tracemalloc
 from collections.abc import Callable

@@ -30,10 +30,10 @@ def measured(**changes):
 
 
 def sweep_row(job: int, metrics: Metrics | None, folder: Path = Path(), **manifest: str) -> dict[str, Any]:
-    """What a sweep's tables and page know of one job; of one that failed it has no metrics."""
+    """Makes the row of one job in a sweep's tables; one that failed has no metrics."""
     return {"job": str(job), "folder": folder, "manifest": {"status": "complete", **manifest}, "metrics": metrics}
 
 
 def compared(name: str, metrics: Metrics, **config: object) -> dict[str, Any]:
-    """What a comparison knows of one run."""
+    """Makes one run of a comparison."""
     return {"name": name, "metrics": metrics, "config": config, "manifest": {}}

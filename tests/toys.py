@@ -68,7 +68,7 @@ class Count(Source):
 
 
 class GivesNumber(Stage):
-    """What gives a number each time."""
+    """Gives a number each time."""
 
     class Out(Outputs):
         number: Number

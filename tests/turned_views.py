@@ -1,4 +1,4 @@
-"""By how much panoramas turn from one to the next, from their pixels alone."""
+"""Measures the turns between successive panoramas from their pixels alone."""
 
 import numpy as np
 import numpy.typing as npt

@@ -10,6 +10,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.many_views import ManyViews
 from omninav.stages.geometry.appearance.visual_distance import (
     MAX_GLOBAL_DISTANCE,
+    MIN_MATCHES,
     ComparisonOptions,
     PatchDistance,
     colour_distances,
@@ -33,7 +34,7 @@ class VisualDistance(Stage):
     """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
     max_global_distance: Annotated[float, Bounds(gt=0)] = MAX_GLOBAL_DISTANCE
     """Largest distance between the global colours of views that are compared further."""
-    min_matches: Annotated[int, Bounds(ge=1)] = 8
+    min_matches: Annotated[int, Bounds(ge=1)] = MIN_MATCHES
     """Fewest matches of views that have something in common."""
 
     class Out(Outputs):

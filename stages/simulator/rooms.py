@@ -28,7 +28,7 @@ class Opening(NamedTuple):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Where it begins and ends along the wall."""
+        """Gives the ends of the gap along the wall (m)."""
         return self.middle - self.width / 2, self.middle + self.width / 2
 
 
@@ -45,7 +45,7 @@ class _Wall(NamedTuple):
     inward: int
 
     def inside(self, inset: float) -> float:
-        """Where a line across it lies that is so many metres inside the room."""
+        """Gives the coordinate across the wall that lies so many metres inside the room."""
         return self.line + self.inward * inset
 
     def on_map(self, along: float, across: float) -> Point:

@@ -89,7 +89,7 @@ def test_the_parameters_of_a_stage_that_was_swapped_are_taken_out(capsys: pytest
 def test_the_words_typed_change_the_map_as_they_would_its_variant() -> None:
     words = ("variant=omniview_mcl_as_printed", "learn=map", "nodes.mapping.distance_m=0.9")
     mapping = planned(*words).graph.nodes["mapping"].stage
-    assert (mapping.distance_m, mapping.vicinity_m) == (0.9, 0.5)  # type: ignore[attr-defined]
+    assert (mapping.distance_m, mapping.vicinity_m) == (0.9, 0.5)
     swapped = planned("variant=omninav", "learn=map", "mapping=image_database").graph.nodes["mapping"]
     assert swapped.target.endswith("ImageDatabase")
 
@@ -99,7 +99,7 @@ def test_the_words_typed_change_the_map_as_they_would_its_variant() -> None:
 def test_what_maps_while_it_localises_has_true_poses_for_a_first_map_alone(variant: str) -> None:
     first, usual = planned(f"variant={variant}", "learn=map").graph, planned(f"variant={variant}")
     assert "pose_fixes" in first.nodes
-    assert first.nodes["straightened"].stage.max_distance == 0  # type: ignore[attr-defined]
+    assert first.nodes["straightened"].stage.max_distance == 0
     assert "pose_fixes" not in usual.graph.nodes
     assert not usual.artifacts
     made = planned(

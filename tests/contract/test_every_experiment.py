@@ -35,7 +35,7 @@ def hydra():
 
 @functools.cache
 def settings_of(name: str):
-    """What the command in an experiment's file composes."""
+    """Composes the command that an experiment's file names."""
     command = (CONF / f"{name}.yaml").read_text().split("\n")[1].partition("  omninav ")[2]
     return resolved_but_for_the_experiment(without_graph(shlex.split(command)))
 

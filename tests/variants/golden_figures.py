@@ -80,7 +80,7 @@ RUNS: dict[str, tuple[str, ...]] = {
 
 
 def started_by(variant: str) -> tuple[str, ...]:
-    """What is typed to run a variant, or the making of its map."""
+    """Gives the words that run a variant, or make its map."""
     if variant == "simulate":
         return ("simulate", *RUNS[variant])
     of = variant.removesuffix("_map")

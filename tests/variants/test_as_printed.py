@@ -112,7 +112,7 @@ PRINTED_MAP: Stages = {
     ),
     "mapping": ("TopologicalMapping", {"min_path_matches": 0, "spread": "all_views"}),
 }
-"""Of Goedemé et al.: prototypes alone."""
+"""Stages of a map of Goedemé et al., which keeps prototypes alone."""
 LEFT_OUT = {
     "particle_cml_as_printed": {"fixed_lag_smoother", "pose_fixes", "proposals", "monitor"},
     "omniview_cml_as_printed": {"pose_fixes", "proposals", "monitor"},

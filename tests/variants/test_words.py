@@ -23,7 +23,7 @@ DISTANCES = {
     "plain_matching": "distance_m",
     "retrieval_mcl": "min_distance_m",
 }
-"""What localises in a map of references, and what the distance between its references is called."""
+"""Variants that localise in a map of references, with the setting of the distance between these."""
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,8 @@ from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_neare
 
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
+MIN_MATCHES = 8
+"""Fewest matches of views that have something in common, where nothing else is said."""
 PatchDistance = Literal["euclidean", "mahalanobis"]
 """Distance of two patches' descriptors: as they are, or each element by its spread over both views (equation 2 of
 Goedemé et al. 2007)."""
@@ -31,7 +33,7 @@ class ComparisonOptions(NamedTuple):
     ratio: float = 0.8
     segment_ratio: float = 0.8
     max_colour_distance: float = 0.5
-    min_matches: int = 8
+    min_matches: int = MIN_MATCHES
     min_angle: float = math.radians(0.5)
     patch_distance: PatchDistance = "euclidean"
     search: Literal["all", "kd_tree"] = "all"

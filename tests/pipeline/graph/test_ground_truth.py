@@ -20,7 +20,7 @@ WIRES = {
 
 
 def refused_at(where: str, nodes: dict = NODES, **wires: object) -> Problem:
-    """What is said of the only thing that is wrong with other nodes or wires."""
+    """Gives the sentence on the one mistake of other nodes or wires."""
     with pytest.raises(ProblemsFound) as found:
         build(graph_of_toys(nodes, WIRES | wires))
     (problem,) = found.value.problems

@@ -167,7 +167,7 @@ def test_ticks_in_which_a_stage_had_nothing_to_do_are_no_warning(tmp_path):
 
 
 class Idle(Stage):
-    """What has parameters and does nothing."""
+    """Has parameters and does nothing."""
 
     def step(self, ctx: Context) -> None: ...
 

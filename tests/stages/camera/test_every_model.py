@@ -1,4 +1,4 @@
-"""What holds for each camera model, and where pixels of those look that can be worked out by hand."""
+"""Each camera model keeps its promises; pixels look where one works it out by hand."""
 
 import math
 

@@ -41,7 +41,7 @@ def mixture(*components: tuple[float, float]) -> GaussianMixture:
 
 
 def fused(*sources: GaussianMixture | None, **options: Any) -> GaussianMixture:
-    return CovarianceIntersection(**options).step(CTX, *sources).belief  # type: ignore[arg-type]
+    return CovarianceIntersection(**options).step(CTX, *sources).belief
 
 
 def parts(mixture: GaussianMixture) -> Mixture:

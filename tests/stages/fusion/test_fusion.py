@@ -8,7 +8,7 @@ from omninav.stages.fusion.uniform_recovery import UniformRecovery
 from omninav.stages.values.belief import Likelihood, Particles
 
 THERE = even(np.full((50, 3), 77.0))
-"""What is proposed, far from all that is believed."""
+"""Proposed poses, far from the belief."""
 
 
 def belief(number: int = 1000, spread: float = 1.0) -> Particles:

@@ -20,7 +20,7 @@ TRUTH = Pose(3.0, 4.0, 3.1)
 def begun(stage: ParticlePrior, first: bool = True, **ports: object) -> Particles | None:
     ctx = Context("start", np.random.default_rng(0))
     ctx.tick = Tick(7, 7, first_of_log=first)
-    return stage.step(ctx, ports.pop("map", MAP), ports.pop("truth", TRUTH), **ports).belief  # type: ignore[arg-type]
+    return stage.step(ctx, ports.pop("map", MAP), ports.pop("truth", TRUTH), **ports).belief
 
 
 @pytest.mark.parametrize(("scale", "reach"), [(None, 1.5), (LengthScale(0.2), 0.6)])
@@ -52,7 +52,7 @@ def test_a_uniform_start_is_spread_over_all_references_or_the_free_space_where_i
 @pytest.mark.parametrize("at", ["uniform", "truth"])
 def test_a_start_that_lacks_what_it_needs_says_what_to_type(at: str) -> None:
     with pytest.raises(BadInput, match="start="):
-        begun(ParticlePrior(at=at), map=None, truth=None)  # type: ignore[arg-type]
+        begun(ParticlePrior(at=at), map=None, truth=None)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_start_that_lacks_what_it_needs_says_what_to_type(at: str) -> None:
 def test_a_known_start_has_the_spread_that_is_said_and_headings_within_half_a_turn(
     at: object, place: tuple[float, float], spread: tuple[float, float, float]
 ) -> None:
-    belief = begun(ParticlePrior(at=at, number=4000))  # type: ignore[arg-type]
+    belief = begun(ParticlePrior(at=at, number=4000))
     assert belief is not None
     assert belief.poses[:, :2].mean(axis=0) == pytest.approx(place, abs=0.02)
     assert belief.poses[:, :2].std(axis=0) == pytest.approx(spread[:2], rel=0.1)

@@ -21,7 +21,7 @@ TARGET = (5.0, 5.0, 0.4)
 
 
 def seen(pose: tuple[float, float, float]) -> Image:
-    return look("mirror", pose[2], *pose[:2])  # type: ignore[return-value]
+    return look("mirror", pose[2], *pose[:2])
 
 
 def vector(stage: MinWarping, image: Image, target: Image, given: HomingVector = LOST) -> HomingVector:

@@ -99,7 +99,7 @@ class Recorded(Wire):
 
 
 def recorded(drive: Path, *topics: str) -> list[Arrival]:
-    """What a recorded robot said on these topics (none: on all), in the order in which it was received."""
+    """Gives the messages of a recorded robot on these topics (none: on all), in the order of their arrival."""
     reader = LogReader(drive)
     types = reader.topics
     records = sorted(reader.scan(set(topics) or None), key=lambda record: record.log_time)

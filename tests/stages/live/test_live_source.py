@@ -50,7 +50,7 @@ class Drive:
 
     @property
     def intake(self) -> Intake:
-        """What it has subscribed with, without a tick."""
+        """Gives what the stage subscribed to, without a tick."""
         if self.source._intake is None:
             self.source._intake = self.source._join(self.state)
         return self.source._intake

@@ -28,8 +28,8 @@ def state(*means, sigma=0.1, weights=None):
 
 def learn(map, view, state, threshold=LIMIT, **options):
     stage = AdaptiveViews(**{**FREE, **options})
-    lessons = MapUpdates((MapUpdate(view, state, 0),))
-    return stage.step(Context("mapping"), lessons, threshold, map, PendingUpdates()).events
+    updates = MapUpdates((MapUpdate(view, state, 0),))
+    return stage.step(Context("mapping"), updates, threshold, map, PendingUpdates()).events
 
 
 def test_a_new_view_is_inserted_with_its_state_and_weight_beta():
@@ -185,9 +185,9 @@ def test_a_state_of_two_modes_updates_by_the_weight_of_each():
 
 def test_the_cap_on_views_holds_when_many_updates_come_at_once():
     map = ViewMixtures.empty()
-    lessons = MapUpdates(tuple(MapUpdate(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
+    updates = MapUpdates(tuple(MapUpdate(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
     stage = AdaptiveViews(max_views=4)
-    event = stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events
+    event = stage.step(Context("mapping"), updates, LIMIT, map, PendingUpdates()).events
     assert len(map) == event.views == 4
     assert 8 in map.ids
     assert event.inserted.tolist() == map.ids.tolist()
@@ -288,8 +288,8 @@ def test_an_event_says_why_views_went_and_what_changed():
     stage = AdaptiveViews(**FREE, max_views=2)
     events = []
     for n in range(3):
-        lessons = MapUpdates((MapUpdate(view(5.0 * n, 0), state([9.0 * n, 0, 0]), 30 + n),))
-        events.append(stage.step(Context("mapping"), lessons, LIMIT, map, PendingUpdates()).events)
+        updates = MapUpdates((MapUpdate(view(5.0 * n, 0), state([9.0 * n, 0, 0]), 30 + n),))
+        events.append(stage.step(Context("mapping"), updates, LIMIT, map, PendingUpdates()).events)
     assert [event.why for event in events] == ["", "", "full"]
     assert [event.removed.tolist() for event in events] == [[], [], [0]]
     assert [event.seen.tolist() for event in events] == [[30], [31], [32]]

@@ -106,9 +106,9 @@ def test_odometry_explains_a_state_up_to_999_of_1000_drives(missed: float, expla
     assert [update.index for update in out.updates.items] == ([1, 2] if explained else [2])
 
 
-def fused(*lessons: tuple[float, float]) -> ViewMixtures:
+def fused(*updates: tuple[float, float]) -> ViewMixtures:
     map, pending = ViewMixtures.empty(), FusedMixturesState()
-    items = tuple(MapUpdate(view(look), along_x(place), n) for n, (look, place) in enumerate(lessons))
+    items = tuple(MapUpdate(view(look), along_x(place), n) for n, (look, place) in enumerate(updates))
     FusedMixtures().step(CTX, MapUpdates(items), NoveltyThreshold(1.0), map, pending)
     return map
 

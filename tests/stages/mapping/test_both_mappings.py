@@ -1,4 +1,4 @@
-"""What both mappings of views do: wait for a limit, keep it with the map, and stay within what can be."""
+"""Both mappings of views wait for a limit, keep it with the map, and keep every figure within its bounds."""
 
 import math
 from pathlib import Path
@@ -104,8 +104,8 @@ def test_what_is_measured_is_that_of_the_drive_where_a_known_map_has_no_settled_
 def test_before_there_is_a_limit_only_the_first_update_is_applied(mapping: str) -> None:
     stage, waiting, map = MAPPINGS[mapping][0](), MAPPINGS[mapping][1](), ViewMixtures.empty()
     for n in range(3):
-        lessons = MapUpdates((MapUpdate(view(2.0 * n), along_x(n), n),))
-        stage.step(Context("mapping"), lessons, None, map, waiting)
+        updates = MapUpdates((MapUpdate(view(2.0 * n), along_x(n), n),))
+        stage.step(Context("mapping"), updates, None, map, waiting)
         assert len(map) == 1
     event = stage.step(Context("mapping"), None, LIMIT, map, waiting).events
     assert map.means[:, 0].tolist() == [0.0, 1.0, 2.0]
@@ -116,21 +116,21 @@ def test_before_there_is_a_limit_only_the_first_update_is_applied(mapping: str) 
 @both
 def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing(mapping: str) -> None:
     stage, waiting, map = MAPPINGS[mapping][0](), MAPPINGS[mapping][1](), ViewMixtures.empty()
-    for lessons in (MapUpdates(()), None):
-        out = stage.step(Context("mapping"), lessons, LIMIT, map, waiting)
+    for updates in (MapUpdates(()), None):
+        out = stage.step(Context("mapping"), updates, LIMIT, map, waiting)
         assert out.map is map
         assert out.events is None
-    lessons = MapUpdates((MapUpdate(view(0.0), along_x(0.0), 0),))
-    assert Frozen().step(Context("m"), map=map, updates=lessons, threshold=LIMIT).map is map
+    updates = MapUpdates((MapUpdate(view(0.0), along_x(0.0), 0),))
+    assert Frozen().step(Context("m"), map=map, updates=updates, threshold=LIMIT).map is map
     assert (len(map), map.steps) == (0, 0)
 
 
 def random_stage(mapping: str, rng: np.random.Generator) -> FusedMixtures | AdaptiveViews:
     if mapping == "fused":
         average = str(rng.choice(["visits", "halves"]))
-        return FusedMixtures(average=average, spread=bool(rng.random() < 0.5), max_views=12)  # type: ignore[arg-type]
+        return FusedMixtures(average=average, spread=bool(rng.random() < 0.5), max_views=12)
     forgetting, beta = str(rng.choice(["active", "passive", "none"])), rng.uniform(0.1, 1.0)
-    return AdaptiveViews(forgetting=forgetting, beta=beta, max_views=12, min_sigma_m=0.0, min_sigma_deg=0.0)  # type: ignore[arg-type]
+    return AdaptiveViews(forgetting=forgetting, beta=beta, max_views=12, min_sigma_m=0.0, min_sigma_deg=0.0)
 
 
 @both

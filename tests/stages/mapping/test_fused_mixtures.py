@@ -87,11 +87,11 @@ def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_firs
     maps = []
     for taught, corrected in ((first, again), (known, [])):
         map, stage, learned = ViewMixtures.empty(), FusedMixtures(average=average), FusedMixturesState()
-        for lessons in (
+        for updates in (
             *([MapUpdate(view(views[n]), state(taught[n]), n)] for n in range(12)),
             [MapUpdate(view(views[n]), state(then[n]), int(n)) for n in corrected],
         ):
-            stage.step(Context("mapping"), MapUpdates(tuple(lessons), open_from=0), LIMIT, map, learned)
+            stage.step(Context("mapping"), MapUpdates(tuple(updates), open_from=0), LIMIT, map, learned)
         maps.append(map)
     assert maps[0].ids.tolist() == maps[1].ids.tolist()
     for row in range(len(maps[0])):

@@ -114,7 +114,7 @@ TRUE = (3.0, -2.0, 1.0)
 
 
 def beside(offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Row] | None = None) -> dict:
-    """Of estimates that lie so far (m, m, degrees) from the true pose."""
+    """Measures estimates that lie so far (m, m, degrees) from the true pose."""
     believed = np.array(offsets) * (1.0, 1.0, np.pi / 180) + TRUE
     told = [PoseConfidence(each) for each in confidences]
     return measured(made_drive(truth or [TRUE] * len(offsets), believed, confidences=told))

@@ -16,7 +16,7 @@ HERE, FAR, NAN = (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), float("nan")
 
 
 def own(values, at=HERE, poses=POSES, candidates=None):
-    """How a view taken `at` a pose looks in a map of these poses, with these similarities to them."""
+    """Measures the contrast of a view `at` a pose in a map of these poses, with these similarities to them."""
     number = len(poses)
     at_poses, features = np.array(poses).reshape(number, 3), np.ones((number, 1, 2), np.float32)
     graph = ReferenceGraph(at_poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")

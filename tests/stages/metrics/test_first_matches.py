@@ -34,7 +34,7 @@ def one_metre_apart(monkeypatch: pytest.MonkeyPatch) -> None:
 def matches(
     one: Patches | Columns, other: Patches | Columns, known: Sequence[bool] = (True, True), lens=(), **parameters
 ) -> dict:
-    """What is found of two images a metre apart; `known`: of which of them the depths are."""
+    """Measures the matches of two images a metre apart; `known`: the image whose depths are given."""
     features = [one[0], other[0]]
     depths = [depth if there else None for (_, depth), there in zip((one, other), known, strict=True)]
     if isinstance(one[0], VerticalSegments):
@@ -86,7 +86,7 @@ def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) ->
 
 
 def beside(degrees: float = 0.0, axis: int = 2, colour: float = 0.0, **parameters) -> dict:
-    """Of points to the sides that are seen turned in the second image."""
+    """Measures matches of points to the sides, seen turned in the second image."""
     return matches(sides(0.0), sides(1.0, axis, degrees, colour), **parameters)
 
 

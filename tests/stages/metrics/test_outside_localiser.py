@@ -42,7 +42,7 @@ def images(truth: list[Pose | None]) -> RecordedImages:
 
 
 def located(folder: Path, program: str, truth: list[Pose | None] = TRUTH, command: str = "") -> OutsideLocaliser.Out:
-    """By a program of one's own, or by a command."""
+    """Runs a program of one's own, or a command."""
     (folder / "mine.py").write_text(program)
     stage = OutsideLocaliser(command=command or f"python {folder / 'mine.py'}")
     return stage.step(Context("drive", folder=folder), images(truth), images(TRUTH), TICKS, TRUTH, MOTION)

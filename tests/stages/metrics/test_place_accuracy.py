@@ -22,7 +22,7 @@ def believed(place: int | None, map=ROW) -> PlaceBelief | None:
 
 
 def hits(places, truth, begun=(0,), map=ROW):
-    """Of a robot that believes to be at these places, at true poses; its belief began in these frames."""
+    """Measures a robot that believes to be at these places, at true poses; its belief began in these frames."""
     begins = [believed(0, map) if k in begun else None for k in range(len(truth))]
     found = figures(PlaceAccuracy(), made_drive(truth), [believed(place, map) for place in places], begins, map)
     return found and found["localisation"]

@@ -64,7 +64,7 @@ def judged(
     scale: LengthScale = SCALE,
     **inputs: Any,
 ) -> PoseConfidence:
-    """What the monitor says of a belief of poses of equal weight."""
+    """Asks the monitor about a belief of poses of equal weight."""
     belief, ctx = Particles(poses, np.full(len(poses), 1 / len(poses))), Context("monitor")
     ctx.tick = tick or ctx.tick
     recent = recent or ConfidenceMonitorState()

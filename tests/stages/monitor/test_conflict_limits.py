@@ -36,7 +36,7 @@ Array = npt.NDArray[np.float64]
 Finding = Callable[[Watched, float], str]
 SCALE_M = 0.4
 STANDS = {"step": 0.0, "seen": 0.1}
-"""Of a robot whose odometry stands still while its images turn."""
+"""Rows of a robot whose odometry stands still while its images turn."""
 
 
 def rows_of(

@@ -19,7 +19,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 @contextmanager
 def refused(said: str) -> Iterator[None]:
-    """What happens here is refused in one short line that fits."""
+    """Expects a refusal in one short line that fits."""
     with pytest.raises(BadInput, match=said) as caught:
         yield
     assert "\n" not in str(caught.value)

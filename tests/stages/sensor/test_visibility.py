@@ -48,14 +48,14 @@ def weighed(
     inputs: tuple[object, ...] = (),
     **said: object,
 ) -> Visibility.Out:
-    """What the stage makes of particles at `poses`, of which each reference says these values at each heading."""
+    """Weighs particles at `poses` by the values of each reference at each heading."""
     stage.setup(Context("sensor"))
-    alike = Similarities(values.astype(np.float32), **said)  # type: ignore[arg-type]
-    return stage.step(Context("sensor"), alike, even(poses), references(at), areas, *inputs)  # type: ignore[arg-type]
+    alike = Similarities(values.astype(np.float32), **said)
+    return stage.step(Context("sensor"), alike, even(poses), references(at), areas, *inputs)
 
 
 def areas_of(sectors: int, number: int = 25) -> VisibilityAreas:
-    """Of the first references, each with views in as many sectors."""
+    """Makes areas of the first references, each with views in as many sectors."""
     return visibility_areas(REFERENCES[:number], ROOM, axes_of(sectors))
 
 

@@ -33,7 +33,7 @@ def landmarks(world, order):
 
 @pytest.fixture(scope="package")
 def similarity(world):
-    """How many landmarks each two references share (R, R)."""
+    """Counts the landmarks that each two references share (R, R)."""
     seen = np.zeros((len(world.poses), len(world.points)), np.float32)
     seen[world.references, world.landmarks] = 1.0
     return seen @ seen.T
