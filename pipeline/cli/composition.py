@@ -22,7 +22,8 @@ from omninav.pipeline.run.artifact_specification import ArtifactSpecification, r
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
-from .config_groups import config_file, listed_groups, replaced, settings_left_open
+from .composition_cache import TYPED
+from .config_groups import config_file, listed_groups, replaced, settings_left_open, stand_ins
 from .hydra_session import hydra_started
 from .overrides import composed_of
 from .stand_ins import contradictions, take_stand_ins
@@ -32,8 +33,10 @@ OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """Keys that a variant's file sets; everything else in a configuration is a setting."""
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
-OF_OTHERS = ("experiment", "hydra")
+OF_OTHERS = ("experiment", "hydra", TYPED)
 """Blocks that are read before the graph is made."""
+OF_COMMANDS = ("defaults", "profile", "transport", "tour_settings")
+"""Keys of config.yaml that Hydra, a command, or what makes a map reads."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 
@@ -93,7 +96,7 @@ def complete(config: Any) -> dict[str, Any]:
         of_run = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
         problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain)]
         problems += convert_fields(of_run, RunSettings, "")[1]
-        problems += [*contradictions(config), *_unknown_settings(config, read)]
+        problems += [*contradictions(config), *_unknown_settings(config, read), *_unread_settings(config, read)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
             if spec.variant is not None:
@@ -147,6 +150,15 @@ def _unknown_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
     for name in config:
         if name not in known:
             yield Problem(str(name), "there is no such setting", suggest(str(name), known, "settings"))
+
+
+def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
+    """A problem for each setting that was typed and that nothing of the run reads."""
+    hints = {name: hint for _, _, rule in stand_ins() for name, hint in rule["unread"].items()}
+    known = {"world", *config_file()} - {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open()}
+    typed = {str(name).partition(".")[0] for name in config.get(TYPED) or ()}
+    for name in sorted(known & typed - {*read}):
+        yield Problem(name, "nothing of this run reads it", hints.get(name, f"leave {name}=… away"))
 
 
 def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:

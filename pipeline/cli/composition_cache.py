@@ -18,6 +18,8 @@ from omninav.pipeline.graph.problems import BadInput
 
 CONFIG = "config"
 """The file that every configuration is composed from."""
+TYPED = "typed"
+"""The key of a configuration under which all that was typed stands."""
 RUN_ALONE = "hydra.mode=RUN"
 """The word that tells Hydra that a job belongs to no sweep."""
 
@@ -37,7 +39,7 @@ def from_options(kept: Callable[[tuple[str, ...]], bytes], words: Sequence[Overr
     """Sets words in the configuration that their options give, whose bytes `kept` returns. Raises Hydra's errors.
 
     Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
-    options give is kept, and all else (`day=2`) is set in a copy of it.
+    options give is kept, and all else (`day=2`) is set in a copy of it. What was set is listed under `typed`.
     """
     settings = [word for word in words if _is_setting(word)]
     config = pickle.loads(kept(tuple(str(word.input_line) for word in words if word not in settings)))
@@ -46,6 +48,7 @@ def from_options(kept: Callable[[tuple[str, ...]], bytes], words: Sequence[Overr
             _set(config, word)
         except OmegaConfBaseException as error:
             raise ConfigCompositionException(f"Error merging override {word.input_line}") from error
+    OmegaConf.update(config, TYPED, [word.key_or_group for word in words], force_add=True)
     return config
 
 

@@ -32,13 +32,11 @@ def exchanged(config: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def contradictions(config: Any) -> Iterator[Problem]:
     """A problem for each setting that is given beside an option which does not read it, and the other one would."""
-    for group, option, rule in stand_ins():
+    for group, _, rule in stand_ins():
         setting, target = rule["where_null"], _node(config, group).get("_target_")
         if target == _stand_in(group, rule)["_target_"] and config.get(setting):
             typed = f"{group}={rule['take']}"
             yield Problem(setting, f"{typed} does not read it", f"leave {typed} or {setting}=… away")
-        if target == (node_option(group, option) or {})["_target_"] and config.get(rule["unread"]):
-            yield Problem(rule["unread"], f"{group}={option} does not read it", rule["instead"])
 
 
 def decisive_settings() -> set[str]:
@@ -52,5 +50,5 @@ def _node(config: Any, group: str) -> dict[str, Any]:
     return dict(plain)
 
 
-def _stand_in(group: str, rule: Mapping[str, str]) -> dict[str, Any]:
+def _stand_in(group: str, rule: Mapping[str, Any]) -> dict[str, Any]:
     return dict(option_content(group, rule["take"])["nodes"][group])
