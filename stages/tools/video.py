@@ -2,6 +2,7 @@
 
 import math
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import groupby
@@ -67,7 +68,10 @@ class MakeVideo(Tool):
             raise BadInput(f"out: {self.out} is no .mp4 or .webm; type out=video.mp4")
         if not log.is_file():
             raise BadInput(f"{self.run_folder}: no result.mcap in it; name the folder of a run that has ended")
-        scenes = [scene for scene in scenes_in(log) if self.begin <= scene["seconds"] <= (self.end or math.inf)]
+        messages = LogReader(log)
+        scenes = [scene for scene in scenes_in(messages) if self.begin <= scene["seconds"] <= (self.end or math.inf)]
+        for lost in messages.details.values():
+            print(f"{lost}; the video shows what is left", file=sys.stderr)
         if not scenes:
             raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and the end; see its frames.csv")
         lasted = scenes[-1]["seconds"] - scenes[0]["seconds"]
@@ -80,11 +84,11 @@ class MakeVideo(Tool):
         print(f"{out}: {len(scenes)} images, {len(scenes) / rate:.0f} s, {out.stat().st_size / 1e6:.1f} MB")
 
 
-def scenes_in(log: Path) -> Iterator[dict[str, Any]]:
+def scenes_in(log: LogReader) -> Iterator[dict[str, Any]]:
     """The last content of each topic at each tick with a pose, as `seconds` since the first, and the topic's name."""
     known: dict[str, Any] = {}
     begun = None
-    for stamp, messages in groupby(LogReader(log).messages(TOPICS), key=lambda message: message.stamp):
+    for stamp, messages in groupby(log.messages(TOPICS), key=lambda message: message.stamp):
         now = {message.topic: message.content for message in messages}
         begun = stamp if begun is None else begun
         known |= now

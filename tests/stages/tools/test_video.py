@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import BadInput, Context
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.plots.pose_messages import pose_messages
 from omninav.stages.tools.video import BAND, BLUE, LIGHT, MAX_HEIGHT, ORANGE, WIDTH, Floor, MakeVideo, scenes_in
@@ -56,11 +57,20 @@ def test_a_video_shows_when_the_robot_is_lost(folder, capsys):
     assert colours == [BLUE] * 4 + [ORANGE] * 5
 
 
+def test_a_cut_log_is_shown_as_far_as_it_reaches_and_said_to_be_cut(folder, capsys):
+    log = folder / "result.mcap"
+    log.write_bytes(log.read_bytes()[:-20])
+    MakeVideo(run_folder=str(folder), out=str(folder / "video.mp4")).run(Context("video"))
+    said = capsys.readouterr()
+    assert "11 images" in said.out
+    assert f"{log}: " in said.err
+
+
 def test_a_long_way_along_y_fits_into_the_height_and_lies_in_the_middle(tmp_path):
     with LogWriter(tmp_path / "result.mcap") as log:
         for k in range(51):
             write_scene(log, 100 + k, 7.0, 0.4 * k)
-    floor = Floor(list(scenes_in(tmp_path / "result.mcap")))
+    floor = Floor(list(scenes_in(LogReader(tmp_path / "result.mcap"))))
     assert floor.frame(50).shape == (BAND + MAX_HEIGHT, WIDTH, 3)
     assert floor.pixels(np.array([[7.0, 10.0]])).tolist() == [[WIDTH // 2, MAX_HEIGHT // 2]]
     assert (floor.frame(50)[BAND:, WIDTH // 2 - 2 : WIDTH // 2 + 3] < 100).any(
@@ -77,7 +87,7 @@ def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
         place = {"position": {"x": -1.0, "y": 0.0}}
         info = {"resolution": 0.1, "width": 50, "height": 30, "origin": place}
         log.write("/grid", "nav_msgs/msg/OccupancyGrid", SECOND * 100, {"info": info, "data": data.ravel()})
-    floor = Floor(list(scenes_in(tmp_path / "result.mcap")))
+    floor = Floor(list(scenes_in(LogReader(tmp_path / "result.mcap"))))
     rows, columns = np.nonzero((floor.plan == LIGHT).all(axis=2))
     expected = floor.pixels(np.array([[3.0, 0.3], [3.1, 0.2]]))
     drawn = np.array([[columns.min(), rows.min()], [columns.max(), rows.max()]])
@@ -106,7 +116,7 @@ def test_a_video_that_fails_leaves_the_one_that_was_there(folder, monkeypatch):
 
 
 def test_a_scene_holds_the_last_of_each_topic(folder):
-    scenes = list(scenes_in(folder / "result.mcap"))
+    scenes = list(scenes_in(LogReader(folder / "result.mcap")))
     assert [scene["seconds"] for scene in scenes] == list(range(11))
     assert [scene["/estimate/state"].data for scene in scenes[5:7]] == ["tracking", "lost"]
 
