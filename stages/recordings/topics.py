@@ -72,11 +72,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     stamps = np.array([frame.stamp for frame in frames], dtype=np.int64)
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
-        keep = within(stamps, odometry.stamps)
-        _drop_frames(feed, name, "outside_odometry", stamps, ~keep, f"outside the time of {topics.odometry}")
+        keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)
     elif truth is not None:
-        keep = within(stamps, truth.stamps)
-        _drop_frames(feed, name, "no_position", stamps, ~keep, f"outside the time of {topics.truth}")
+        keep = _seen_within(feed, name, "no_position", stamps, truth.stamps, topics.truth)
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
         raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
@@ -233,9 +231,13 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
     return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
-def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: Bools, why: str) -> None:
-    for stamp in stamps[lost]:
-        feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
+def _seen_within(feed: Feed, name: str, kind: str, stamps: Stamps, times: Stamps, topic: str | None) -> Bools:
+    """Which images lie in the time of a topic; the others are counted as lost."""
+    keep = within(stamps, times)
+    first, last = times[[0, -1]] / 1e9
+    for stamp in stamps[~keep]:
+        feed.drop(kind, f"{name}: image at {stamp / 1e9:.3f} s, but {topic} is from {first:.3f} to {last:.3f} s")
+    return keep
 
 
 def _first_size(name: str, number: int, fetch_image: Callable[[int], Callable[[], Pixels]]) -> tuple[int, int]:
