@@ -2,8 +2,10 @@
 
 import ast
 import re
+import textwrap
 from pathlib import Path
 
+import yaml
 from offenders import assert_each
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +29,16 @@ def links_and_paths_exist(page: Path) -> None:
     missing = [link for link in links if not (page.parent / link).exists()]
     missing += [path for path in paths if not (ROOT / path).exists()]
     assert not missing
+
+
+def test_code_on_every_page_can_be_read() -> None:
+    assert_each(PAGES, code_can_be_read)
+
+
+def code_can_be_read(page: Path) -> None:
+    blocks = re.findall(r"^```(python|yaml)\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    for language, code in blocks:
+        ast.parse(textwrap.dedent(code)) if language == "python" else list(yaml.safe_load_all(code))
 
 
 def test_a_page_names_every_folder() -> None:
