@@ -1,8 +1,11 @@
 """Results that any "after" stage may give: numbers for `metrics.json`, plots and tables for the report."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any, Literal
+
+import numpy as np
 
 from .stage import Outputs, Stage
 from .value import Value
@@ -81,10 +84,21 @@ def merged(parts: Iterable[Metrics]) -> Metrics:
 
 def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
     for key, value in more.items():
-        if isinstance(value, Mapping) and isinstance(into.get(key), dict):
+        if isinstance(value, Mapping):
+            if not isinstance(into.get(key), dict):
+                into[key] = {}
             _merge(into[key], value)
         else:
-            into[key] = dict(value) if isinstance(value, Mapping) else value
+            into[key] = _as_json(value)
+
+
+def _as_json(value: Any) -> Any:
+    """A figure as JSON holds it: a number of numpy's as one of Python's, and None for what is not a number."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_as_json(each) for each in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 class Slide(Value):

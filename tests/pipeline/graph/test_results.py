@@ -1,3 +1,8 @@
+import json
+import math
+
+import numpy as np
+
 from omninav.pipeline import Metrics, Quantity
 from omninav.pipeline.graph.results import merged
 
@@ -11,6 +16,13 @@ def test_metrics_of_several_stages_are_merged_group_by_group():
     assert both.headlines == ("group.a", "c")
     assert both.details == ("group",)
     assert one.values == {"group": {"a": 1, "b": 1}}
+
+
+def test_numbers_of_numpy_are_merged_as_json_holds_them():
+    values = {"one": np.float32(0.5), "several": (np.int64(2), math.nan), "group": {"yes": np.bool_(True)}}
+    assert json.loads(json.dumps(merged([Metrics(values)]).values, allow_nan=False)) == {
+        "one": 0.5, "several": [2, None], "group": {"yes": True},
+    }  # fmt: skip
 
 
 def test_what_a_run_was_for_is_said_first():
