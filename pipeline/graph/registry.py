@@ -80,14 +80,14 @@ def resolve(target: str) -> type[Stage]:
 
 
 def _thing(target: str) -> Any:
-    named = {entry.name: entry.target for entry in plugins()}
+    named = {entry.name: entry.target for entry in plugins() if not entry.problem}
     target = named.get(target, target)
     module_name, _, class_name = target.rpartition(":") if ":" in target else target.rpartition(".")
     if not module_name:
         raise UnknownStage(f"'{target}' is no full name; write package.module.Class or path/to/file.py:Class")
     typed = _TYPED.get()
     if typed is not None and not {target, module_name} & {*typed} and not is_listed(target):
-        again = f"if you trust it, type its name again: omninav resume FOLDER {module_name}"
+        again = f"if you trust it, name it behind the folder, as in omninav resume FOLDER {module_name}"
         raise BadInput(f"{cut(target)} is code that `omninav stages` does not list, and is not run unasked; {again}")
     module = _load(module_name)
     thing = getattr(module, class_name, None)
@@ -191,7 +191,9 @@ def _load_file(path: Path) -> ModuleType:
 def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
     """Stages of installed distributions; looking through them takes as long as everything else, so once will do."""
     points = importlib.metadata.entry_points(group=ENTRY_POINTS)
-    return tuple(Entry(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name))
+    return tuple(
+        _plugin(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name)
+    )
 
 
 def plugins() -> list[Entry]:
@@ -205,8 +207,16 @@ def plugins() -> list[Entry]:
                 Entry(item, "", "environment", problem=f"'{item}' in {ENVIRONMENT} is not understood; {wanted}")
             )
             continue
-        found.append(Entry(name, target, "environment"))
+        found.append(_plugin(name, target, "environment"))
     return found
+
+
+def _plugin(name: str, target: str, origin: str) -> Entry:
+    """The row of a plugin, with a problem where omninav has a file of its name, which would be taken in its place."""
+    role, _, own = name.partition(".")
+    taken = own.isidentifier() and is_role(role) and importlib.util.find_spec(f"{BUILT_IN}.{role}.{own}") is not None
+    problem = f"'{name}' is of omninav itself; give the {origin} one another name" if taken else ""
+    return Entry(name, target, origin, problem=problem)
 
 
 def entries() -> Iterator[Entry]:

@@ -76,6 +76,11 @@ def test_a_broken_plugin_is_a_row_with_its_problem_and_the_others_stay(
     assert rows["match.scale"].problem == ""
 
 
+def test_a_plugin_of_the_name_of_a_built_in_stage_is_a_problem(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", f"match.l2={stage_file}:Twice")
+    assert "'match.l2' is of omninav itself" in next(entry for entry in plugins() if entry.name == "match.l2").problem
+
+
 def test_an_environment_entry_that_is_not_understood_says_what_to_write(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OMNINAV_STAGES", "my_stage.py")
     (entry,) = plugins()
