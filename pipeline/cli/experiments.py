@@ -1,6 +1,7 @@
 """Experiments on the command line: which words are for their conditions, and how these are composed."""
 
 import shlex
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +16,7 @@ from omninav.pipeline.experiment.pages import Judged
 from omninav.pipeline.experiment.result import ExperimentResult, read_result, result_files
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
 from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
-from omninav.pipeline.experiment.verdicts import Verdict
+from omninav.pipeline.experiment.verdicts import Verdict, unmeasured
 from omninav.pipeline.graph.problems import BadInput, counted
 
 from .composition import complete, read_words
@@ -38,6 +39,8 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Run every condition and repetition of an experiment's file, and write its page. 1 where a job failed."""
     run = planned_experiment(config, arguments)
     well = run.run()
+    for problem in unmeasured(run.experiment, results_by_condition(run.conditions)):
+        print(f"{problem}", file=sys.stderr)
     verdicts = run.verdicts()
     if verdicts:
         show(verdict_table(run.experiment, verdicts))

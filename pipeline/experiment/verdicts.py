@@ -1,10 +1,14 @@
 """Claims against results: means, intervals of paired differences, shares of runs, and whether each claim holds."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
+from omninav.pipeline.graph.problems import Problem, suggest
+from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.report.quantities import numbers
 
 from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
 from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of
@@ -97,6 +101,16 @@ def samples(experiment: Experiment, results: Results, measure: str, labels: Labe
         if figure is not None:
             found[repetition] = figure
     return found
+
+
+def unmeasured(experiment: Experiment, results: Results) -> Iterator[Problem]:
+    """A problem for each measure of which no run has a figure."""
+    runs = [result for of_condition in results.values() for result in of_condition.values() if result["metrics"]]
+    known = numbers(Metrics(runs[0]["metrics"])) if runs else {}
+    for name, measure in experiment.measures.items():
+        if runs and all(figure_of(measure, result) is None for result in runs):
+            path = " or ".join(measure.path)
+            yield Problem(f"experiment.measures.{name}.path", f"no run has {path}", suggest(path, known, "figures"))
 
 
 def over_runs(measure: Measure, figures: Iterable[float]) -> float:

@@ -6,7 +6,7 @@ from made_experiments import experiment, run_with
 
 from omninav.pipeline.experiment.intervals import bootstrap_interval
 from omninav.pipeline.experiment.specification import Measure
-from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, judge, key_of, over_runs
+from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, judge, key_of, over_runs, unmeasured
 
 
 def held(claim: dict[str, object], seeds: int = 1, **errors: list[float]) -> bool | None:
@@ -364,3 +364,14 @@ def test_figures_that_are_zero_together_have_a_ratio_where_they_are_not_zero_eac
         {"ratio_to": {"method": "b"}, "below": 1.0}, a=[1.0] * 6, b=[-1.0, 0.0, -1.0, -1.0, -1.0, -1.0]
     ).cases
     assert case.ours == pytest.approx(-1.2)
+
+
+def test_a_measure_that_no_run_has_is_named_with_what_is_like_it():
+    tried = experiment(
+        sweep={"method": {"a": ""}}, measures={name: {"title": "E", "path": [name]} for name in ("eror", "drift")}
+    )
+    results = {key_of({"method": "a"}): {("", 0): run_with(error=1.0), ("", 1): run_with(error=1.0, drift=2.0)}}
+    assert [str(problem).split("\n")[0] for problem in unmeasured(tried, results)] == [
+        "experiment.measures.eror.path: no run has eror"
+    ]
+    assert not [*unmeasured(tried, {})]
