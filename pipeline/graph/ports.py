@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+import numpy as np
+
 from .parameters import read_parameters, split_optional
 from .problems import Problem, cut, nearest, suggest
 from .stage import Bounds
@@ -28,6 +30,8 @@ def type_name(annotation: Any) -> str:
         return " | ".join(repr(option) for option in get_args(annotation))
     if origin in (Union, types.UnionType):
         return " | ".join(type_name(option) for option in get_args(annotation))
+    if origin is np.ndarray:
+        return f"an array of {' '.join(type_name(kind) for kind in get_args(get_args(annotation)[1])) or 'numbers'}"
     if origin in (list, tuple, Sequence):
         items = [a for a in get_args(annotation) if a is not Ellipsis]
         if origin is tuple and Ellipsis not in get_args(annotation):
