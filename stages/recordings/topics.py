@@ -86,9 +86,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     width, height = _first_size(name, len(frames), fetch_image)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
     if (width, height) != (view.width, view.height_px):
+        hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
         raise UnreadableRecording(
-            f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; "
-            "give camera=PATH/camera.yaml"
+            f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )
     recording = TopicRecording(
         name=name,
