@@ -13,8 +13,12 @@ from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
 from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import SOURCE_WORDS, Motion, Pose
 from omninav.stages.values.similarity import BestMatch
+from omninav.stages.values.visual_words import PlaceWords
+
+from .map_frame import in_map_frame
 
 POSES = ("estimate", "mean", "truth", "motion")
 SHAPES = {"covariance": (3, 3), "evidence": (len(EVIDENCE),), **dict.fromkeys(POSES, (3,))}
@@ -48,8 +52,12 @@ class CollectDrive(Stage):
         matches: Sequence[BestMatch | None] | None = None,
         confidences: Sequence[PoseConfidence | None] | None = None,
         evidence: Sequence[ImageEvidence | None] | None = None,
+        map: ReferenceGraph | PlaceWords | None = None,
     ) -> Out:
-        """The whole run at once. Each sequence is read once, in order."""
+        """The whole run at once. Each sequence is read once, in order.
+
+        True poses are moved into the frame of a map whose own poses are not true ones (`in_map_frame`), with a warning.
+        """
         absent = [None] * len(ticks)
         looked: list[Sequence[Any]] = [
             absent if each is None else each for each in (estimates, tallies, matches, confidences, evidence)
@@ -80,4 +88,10 @@ class CollectDrive(Stage):
 
         table = np.fromiter(rows(), ROW)  # not a list: a long run has many rows
         columns: dict[str, Any] = {name: np.ascontiguousarray(table[name]) for name in ROW.names or ()}
+        if map is not None and map.pose_source in ("odometry", "guess") and np.isfinite(columns["truth"]).any():
+            columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
+            ctx.warn(
+                f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own: the true poses "
+                "were moved into it as one, to fit most estimates; errors are those that remain"
+            )
         return self.Out(drive=Drive(**columns, conflicts=tuple(conflicts)))

@@ -86,3 +86,13 @@ def test_a_belief_begins_again_where_somebody_asks_for_it() -> None:
     assert anywhere is not None
     assert there.poses.mean(axis=0) == pytest.approx([9.0, -9.0, 0.0], abs=0.03)
     assert anywhere.poses[:, :2].mean(axis=0) == pytest.approx([5.0, 5.0], abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("source", "at", "warned"), [("odometry", "truth", 1), ("truth", "truth", 0), ("odometry", "origin", 0)]
+)
+def test_a_true_start_in_a_map_of_odometry_is_warned_of(source: str, at: str, warned: int) -> None:
+    ctx = Context("start", np.random.default_rng(0))
+    ctx.tick = Tick(0, 0, first_of_log=True)
+    ParticlePrior(at=at).step(ctx, references([[5.0, 5.0, 0.0]], source=source), TRUTH)
+    assert len(ctx.warnings) == warned

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from made_references import references
 from small_run import collected, small_run
 
-from omninav.pipeline import Tick
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.metrics.collect_drive import CollectDrive
 from omninav.stages.values.belief import PoseEstimate, SinglePose
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.episode_statistics import EpisodeStatistics
@@ -55,6 +57,16 @@ def test_every_column_holds_what_the_tick_brought():
     assert [each.tolist() for each in floats] == [[0.75], [8.5], [0.9], [1.25], [0.5]]
     assert drive.confidence.tolist() == [0.25]
     assert drive.state.tolist() == [2]
+
+
+@pytest.mark.parametrize(("source", "moved"), [("odometry", [3.0, 0.0]), ("truth", [-1.0, -2.0])])
+def test_true_poses_are_in_the_frame_of_the_map(source, moved):
+    run, ctx = small_run(frames=2), Context("drive")
+    there, believed = [Pose(-1.0, -2.0, 0.0)] * 2, [PoseEstimate(Pose(3.0, 0.0, 0.5), np.eye(3), 1.0, None)] * 2
+    map = references([[0.0, 0.0, 0.0]], source=source)
+    drive = CollectDrive().step(ctx, run.ticks, there, run.motion, believed, map=map).drive
+    assert drive.truth[0, :2].tolist() == pytest.approx(moved)
+    assert bool(ctx.warnings) is (source == "odometry")
 
 
 def test_what_a_tick_did_not_bring_is_not_a_number_or_less_than_none():

@@ -1,0 +1,44 @@
+"""The frame of a map whose poses are not true ones, as the estimates in it show it."""
+
+import numpy as np
+
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.plane.se2 import between, compose
+
+from .relative_errors import align
+
+TRIED = 500
+"""Most images whose estimates are each tried as the one that is right."""
+FITS = 2.0
+"""Most distance, over the median, of an estimate that counts in the last fit."""
+
+
+def in_map_frame(truth: Array, estimate: Array) -> Array:
+    """True poses (N, 3), moved as one so that they lie closest to most estimates (N, 3) in a map's frame.
+
+    Each estimate in turn is taken as right; of those motions the one with the least median distance is fitted to the
+    estimates that it brings near, by least squares. So a robot that is lost for less than half of the time moves
+    nothing. Rows of NaN are passed over.
+    """
+    known = np.isfinite(truth[:, 0]) & np.isfinite(estimate[:, 0])
+    if not known.any():
+        return truth
+    there, believed = truth[known], estimate[known]
+    rows = np.unique(np.linspace(0, len(there) - 1, TRIED).astype(np.int64))
+    origin = np.zeros(3)
+    motions = compose(believed[rows], between(there[rows], origin))
+    best, least = motions[0], np.inf
+    for motion in motions:
+        distance = float(np.median(_apart(compose(motion, there), believed)))
+        if distance < least:
+            best, least = motion, distance
+    near = _apart(compose(best, there), believed) <= FITS * least
+    if near.sum() > 1 and np.ptp(there[near, :2], axis=0).max() > 0.0:
+        rotation, shift = align(there[near, :2], believed[near, :2])
+        best = np.array([*shift, np.arctan2(rotation[1, 0], rotation[0, 0])])
+    return compose(best, truth)
+
+
+def _apart(poses: Array, others: Array) -> Array:
+    distances: Array = np.hypot(*(poses[:, :2] - others[:, :2]).T)
+    return distances
