@@ -29,7 +29,7 @@ class FramesTable(Stage):
     | `log`, `frame` | number of the log, and of the frame within it, from 0 |
     | `stamp_ns`, `time_s` | the image's header stamp (ns), and the time since the log's first frame (s) |
     | `estimate_x`, `_y`, `_heading` | the belief's heaviest mode |
-    | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance over x, y and heading (m², m rad, rad²) |
+    | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance, where one is stated (m², m rad, rad²) |
     | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
     | `confident` | 1 where the estimate is confident (see `Confidence`), else 0 |
     | `confidence` | probability that the estimate is right (see `ConfidenceMonitor`), where a monitor tells it |
@@ -63,9 +63,12 @@ def columns_of(drive: Drive) -> Columns:
     both = known(drive.estimate) & known(drive.truth)
     odometry = drive.odometry_alone() if len(drive) else None
     columns |= _poses("estimate", drive.estimate)
-    columns |= {f"covariance_{name}": drive.covariance[:, row, column] for name, row, column in PLANE}
-    columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
-    columns["confident"] = np.where(known(drive.estimate), confident(drive), -1)
+    stated = known(drive.estimate) & drive.covariance.any(axis=(1, 2))
+    covariance = np.where(stated[:, None, None], drive.covariance, np.nan)
+    columns |= {f"covariance_{name}": covariance[:, row, column] for name, row, column in PLANE}
+    weighed = stated | (drive.place >= 0)  # a place has a probability, and no size
+    columns["estimate_weight"] = np.where(weighed, drive.mode_weight, np.nan)
+    columns["confident"] = np.where(weighed, confident(drive), -1)
     columns["confidence"] = drive.confidence
     columns["state"] = np.ma.masked_array(np.array((*TRACKING_STATES, ""))[drive.state], drive.state < 0)
     columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)

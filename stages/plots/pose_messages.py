@@ -58,6 +58,9 @@ def path_bytes(stamps: npt.ArrayLike, poses: Array, now: int) -> bytes:
     gap = len(first) - 7 * 8
     return b"".join((empty[:-4], len(poses).to_bytes(4, "little"), first[:gap], bytes(4), first[gap:], *others))
 
+UNKNOWN_VARIANCE = 1e6
+"""Variance of a published pose of which nothing is known, m² and rad²."""
+
 
 @cache
 def _stamped_poses() -> MessageRows:
@@ -81,10 +84,14 @@ def set_heading(rows: npt.NDArray[np.void], heading: Array) -> None:
 
 
 def covariance_6x6(plane: Array) -> Array:
-    """ROS' row-major 6 x 6 covariance (x, y, z, roll, pitch, yaw) of (..., 3, 3) over (x, y, heading): (..., 36)."""
+    """ROS' row-major 6 x 6 covariance (x, y, z, roll, pitch, yaw) of (..., 3, 3) over (x, y, heading): (..., 36).
+
+    One of zeros, of a method that states none, becomes `UNKNOWN_VARIANCE`: filters take zeros for certainty.
+    """
     whole = np.zeros((*plane.shape[:-2], 6, 6))
     axes = np.array([0, 1, 5])
-    whole[..., axes[:, None], axes] = plane
+    stated = np.any(plane, axis=(-2, -1), keepdims=True)
+    whole[..., axes[:, None], axes] = np.where(stated, plane, UNKNOWN_VARIANCE * np.eye(3))
     return whole.reshape(*plane.shape[:-2], 36)
 
 

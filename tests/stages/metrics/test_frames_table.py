@@ -8,7 +8,7 @@ from small_run import small_run
 
 from omninav.pipeline import Context
 from omninav.stages.metrics.frames_table import FramesTable, columns_of
-from omninav.stages.values.belief import PlaceBelief, PoseEstimate
+from omninav.stages.values.belief import PlaceBelief, PoseEstimate, SinglePose
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.pose import Pose
@@ -43,6 +43,12 @@ def test_errors_are_those_of_the_estimate_against_the_truth():
     assert columns["heading_error_deg"][0] == pytest.approx(np.degrees(2 * np.pi - 6.0))
     assert columns["place"].tolist() == [1]
     assert columns["estimate_weight"].tolist() == [0.8]
+
+
+def test_of_a_belief_without_covariance_nothing_is_said_of_how_sure_it_is(tmp_path):
+    (row,) = written(tmp_path, made_drive([None], estimates=[SinglePose(Pose(1.0, 2.0, 0.5)).estimate()]))
+    assert row["estimate_x"] == "1"
+    assert [row[name] for name in ("covariance_xx", "covariance_hh", "estimate_weight", "confident")] == [""] * 4
 
 
 def test_a_match_says_what_looked_most_like_the_image(tmp_path):

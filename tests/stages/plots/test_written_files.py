@@ -111,6 +111,7 @@ def test_a_covariance_stands_where_ros_wants_it():
     assert whole[5, 5] == plane[2, 2]
     assert whole[1, 5] == plane[1, 2]
     assert not whole[2:5].any()
+    assert covariance_6x6(np.zeros((2, 3, 3))).reshape(2, 6, 6)[1, [0, 1, 5], [0, 1, 5]].tolist() == [1e6] * 3
 
 
 def test_thinning_keeps_a_particle_as_often_as_its_weight_says():
