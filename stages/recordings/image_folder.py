@@ -311,7 +311,7 @@ def _glob(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
 
 
 def _image_at(path: Path) -> Pixels:
-    return decode_image(read_small(path, MAX_FILE_BYTES), upright=True)
+    return decode_image(read_small(path, MAX_FILE_BYTES))
 
 
 def _is_turned(path: Path) -> bool:

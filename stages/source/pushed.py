@@ -218,7 +218,7 @@ def _pixels(image: Pixels | bytes) -> Pixels:
         if size > MAX_FILE_BYTES:
             raise BadInput(f"step: image has {size:,} bytes, expected at most {MAX_FILE_BYTES:,}")
         try:
-            image = decode_image(bytes(image), upright=True)
+            image = decode_image(bytes(image))
         except Undecodable as error:
             raise BadInput(f"step: the image cannot be decoded ({error}); leave this frame out") from None
     if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):

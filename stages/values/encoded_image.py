@@ -37,10 +37,10 @@ class Undecodable(ValueError):
     """Bytes that are no image; the message says what is wrong with them."""
 
 
-def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS, upright: bool = False) -> Bytes:
+def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS) -> Bytes:
     """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
 
-    `upright`: a JPEG is turned as its EXIF orientation says, as of a camera that was held on its side.
+    A JPEG is turned as its EXIF orientation says, as of a camera that was held on its side.
     JPEG, PNG, BMP, PNM, WebP and TIFF. Raises `Undecodable`; before anything is unpacked where the file says that it is
     larger than `max_pixels`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
     """
@@ -60,7 +60,7 @@ def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS,
         raise Undecodable(" ".join(str(error.err or error).split())[:200]) from None
     if pixels is None:
         raise Undecodable(f"{len(data)} bytes that are no image OpenCV knows")
-    turn = _TURNS.get(orientation_of(data)) if upright else None
+    turn = _TURNS.get(orientation_of(data))
     return np.asarray(pixels if turn is None else np.ascontiguousarray(turn(pixels)), dtype=np.uint8)
 
 

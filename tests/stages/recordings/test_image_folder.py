@@ -325,7 +325,7 @@ def as_held(picture: np.ndarray, orientation: int) -> bytes:
 def test_an_image_is_turned_as_its_exif_says(orientation: int) -> None:
     data = as_held(picture(0), orientation)
     peer = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)  # OpenCV's own turning
-    np.testing.assert_array_equal(decode_image(data, upright=True), peer)
+    np.testing.assert_array_equal(decode_image(data), peer)
     assert orientation_of(data) == orientation
 
 
