@@ -282,6 +282,8 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
 
 def _hinted(problem: Problem) -> Problem:
     place = problem.where.removeprefix("experiment.")
+    if problem.hint == f"type {problem.where}=…":
+        return Problem(problem.where, problem.what, "write it in the experiment's file")
     if place.partition(".")[0] not in TYPED or problem.hint:
         return problem
     label = place.rpartition(".")[2]
