@@ -12,7 +12,7 @@ from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import SOURCE_WORDS, Pose
+from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS, Pose
 
 from .first_pose import Where, first_pose, particles_around
 
@@ -55,7 +55,7 @@ class ParticlePrior(Stage):
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         where = self.at if restart is None else restart.at or "uniform"
-        if where == "truth" and map is not None and map.pose_source in ("odometry", "guess"):
+        if where == "truth" and map is not None and map.pose_source in OWN_FRAMES:
             ctx.warn(
                 f"start=truth: the map's poses are from {SOURCE_WORDS[map.pose_source]}, whose frame is not that of "
                 "the true poses unless both begin alike; start=uniform does without"

@@ -5,7 +5,7 @@ from typing import Literal
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import SOURCE_WORDS, Pose, PoseSource, frame_of
+from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS, Pose, PoseSource, frame_of
 
 Supervised = Literal["auto", "truth", "odometry"]
 
@@ -19,7 +19,7 @@ def pose_of_view(
     Raises BadInput where `supervised` is truth and there is none, and where a second log follows one whose poses are
     odometry.
     """
-    if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source in ("odometry", "guess"):
+    if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source in OWN_FRAMES:
         raise BadInput(
             "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
             "one map; learn a map of each tour, and type: omninav map join one.omap other.omap out=both.omap"

@@ -14,7 +14,7 @@ from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import SOURCE_WORDS, Motion, Pose
+from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS, Motion, Pose
 from omninav.stages.values.similarity import BestMatch
 from omninav.stages.values.visual_words import PlaceWords
 
@@ -88,7 +88,7 @@ class CollectDrive(Stage):
 
         table = np.fromiter(rows(), ROW)  # not a list: a long run has many rows
         columns: dict[str, Any] = {name: np.ascontiguousarray(table[name]) for name in ROW.names or ()}
-        if map is not None and map.pose_source in ("odometry", "guess") and np.isfinite(columns["truth"]).any():
+        if map is not None and map.pose_source in OWN_FRAMES and np.isfinite(columns["truth"]).any():
             columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
             ctx.warn(
                 f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own: the true poses "

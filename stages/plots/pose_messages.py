@@ -18,6 +18,8 @@ MAP, ODOM, BASE = "map", "odom", "base_link"
 """Frames: the map's, the odometry's, the robot's."""
 _HEAD = 4
 """Bytes before a message's body."""
+UNKNOWN_VARIANCE = 1e6
+"""Variance of a published pose of which nothing is known, m² and rad²."""
 
 
 def header(stamp: int, frame: str = MAP) -> Fields:
@@ -57,9 +59,6 @@ def path_bytes(stamps: npt.ArrayLike, poses: Array, now: int) -> bytes:
     # Doubles lie at multiples of 8: the first pose, 20 bytes behind the head, is the only one with a gap before them.
     gap = len(first) - 7 * 8
     return b"".join((empty[:-4], len(poses).to_bytes(4, "little"), first[:gap], bytes(4), first[gap:], *others))
-
-UNKNOWN_VARIANCE = 1e6
-"""Variance of a published pose of which nothing is known, m² and rad²."""
 
 
 @cache

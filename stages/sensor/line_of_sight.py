@@ -13,7 +13,7 @@ from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import SOURCE_WORDS
+from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS
 from omninav.stages.values.visibility import VisibilityAreas
 
 Runs = npt.NDArray[np.uint16]
@@ -224,6 +224,11 @@ class LineOfSight(Stage):
             raise BadInput(
                 "grid: no reference of the map sees an occupied cell in it; are both in the same frame? The map's "
                 f"poses come from {SOURCE_WORDS[map.pose_source]}"
+            )
+        if map.pose_source in OWN_FRAMES and grid.made_from != "tour":
+            ctx.warn(
+                f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own, and the grid "
+                "is in another; learn the map with true poses in the grid's frame, or type grid=from_tour"
             )
         if none:
             ctx.count("view_without_area", none, "areas: the view hits no occupied cell of the grid")

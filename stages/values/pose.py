@@ -73,6 +73,8 @@ SOURCE_WORDS: dict[PoseSource, str] = {
     "estimate": "the robot's own estimates",
 }
 """Each source, as a sentence has it."""
+OWN_FRAMES: tuple[PoseSource, ...] = ("odometry", "guess")
+"""Sources whose poses begin at an origin of their own, and not in the frame of true poses or of a grid."""
 
 
 def frame_of(odometry: Pose | None) -> PoseSource:

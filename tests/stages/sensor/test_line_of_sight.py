@@ -1,6 +1,7 @@
 """Visibility areas, against hand-drawn rooms and against geometry worked cell by cell."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -191,6 +192,15 @@ def test_it_says_what_it_covers_and_how_much_it_takes():
     }  # fmt: skip
     assert expected.items() <= out.metrics.values["visibility"].items()
     assert ctx.counts["view_without_area"] == 1
+
+
+@pytest.mark.parametrize(
+    ("source", "made_from", "warned"), [("odometry", "map", 1), ("odometry", "tour", 0), ("truth", "map", 0)]
+)
+def test_a_map_of_odometry_on_a_grid_of_another_frame_is_warned_of(source, made_from, warned):
+    ctx, seen = Context("areas"), references([(4.5, 1.5, 0.0)], np.zeros((1, 1, 4), np.float32), source=source)
+    LineOfSight().step(ctx, seen, replace(ROOM, made_from=made_from))
+    assert len(ctx.warnings) == warned
 
 
 def test_a_map_that_lies_beside_its_grid_is_refused():
