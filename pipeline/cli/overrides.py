@@ -45,9 +45,9 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     problems, parsed = parsed_words(words)
     groups = {name: _options(name, folders) for name in _groups(folders)}
     swaps = [word for word in parsed if word.key_or_group in groups]
-    options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
+    options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group], folders)]
     deciding = [word for word in parsed if word.key_or_group in decisive_settings()]
-    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
+    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group], folders))]
     plain = _plain([*known, *deciding], folders)
     for word in parsed if plain else ():
         # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
@@ -230,14 +230,17 @@ def _configurations(folder: Path) -> Iterator[Path]:
     return (file for file in islice(files, MAX_LISTED) if file.suffix == ".yaml")
 
 
-def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]:
+def _unknown_option(word: Override, options: Sequence[str], folders: Sequence[str]) -> Iterator[Problem]:
     if word.is_delete():
         return
     group = word.key_or_group
+    too_deep = [path for path in map(Path, folders) if path.absolute().name == group]
     for text in _texts(word):
         option = text.partition("=")[2].strip("'\"")
         if option not in options and not option.startswith("["):
             hint = suggest_option(group, option, options, "options", prefix=f"{group}=")
+            for path in too_deep:
+                hint = f"--config-dir names the folder above `{group}`: type --config-dir {path.parent}"
             yield Problem(group, f"there is no '{option}'", hint)
 
 

@@ -43,6 +43,17 @@ def test_a_variant_without_its_first_line_is_told_so(tmp_path: Path):
             complete(config)
 
 
+def test_a_config_dir_that_is_one_folder_too_deep_is_told_so(tmp_path: Path):
+    folder = tmp_path / "variant"
+    folder.mkdir()
+    (folder / "mine.yaml").write_text("# @package _global_\n")
+    with (
+        pytest.raises(ProblemsFound, match=f"type --config-dir {tmp_path}$"),
+        composed(["--config-dir", str(folder), "variant=mine"]),
+    ):
+        pass
+
+
 def test_every_stage_of_a_group_is_among_its_options():
     roles = [group for group in listed_groups() if is_role(group)]
     assert {"features", "match", "fusion", "control"} <= {*roles}
