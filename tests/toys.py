@@ -120,6 +120,16 @@ class Doubt(Stage):
         return self.Out(certainty=Certainty(float("nan") if ctx.tick.index >= self.since else 0.5))
 
 
+class Scribble(Stage):
+    """Writes into its input, from a tick on."""
+
+    since: int = 0
+    """The tick."""
+
+    def step(self, ctx: Context, big: Big) -> None:
+        big.array[0] += ctx.tick.index >= self.since
+
+
 class Noise(GivesNumber):
     """A number with noise from the stage's own generator."""
 

@@ -10,9 +10,11 @@ from omninav.pipeline.files import DISK
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.graph import Node, Wire
 from omninav.pipeline.graph.problems import BadInput, one_line
+from omninav.pipeline.graph.registry import BUILT_IN
 from omninav.pipeline.graph.stage import Context, Outputs, State
 
 from .channel import channel_key, held_key
+from .codec import encode
 
 CHECKED_TICKS = 10
 """First calls of a stage whose outputs are checked against what their types state: enough for a mistake in the stage
@@ -44,6 +46,9 @@ class Call:
             elif wire.hold:
                 key = held_key(wire.origin)
             self.inputs.append((wire.to_port, key, instead, port.optional))
+        foreign = node.lifetime == "tick" and not node.target.startswith(f"{BUILT_IN}.")  # tests check ours
+        ports = (wire.to_port for wire in wires if foreign and wire.origin not in static)
+        self.guarded = [name for name in ports if not getattr(node.signature.inputs[name].type, "in_place", False)]
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def set_up(self) -> None:
@@ -70,6 +75,8 @@ class Call:
                     values[origin] = None
                 return True
             given[port] = value
+        guarded = self.guarded if self.to_check > 0 else []
+        before = encode([given[name] for name in guarded]) if guarded else b""
         start = time.perf_counter()
         try:
             out = self.step(self.ctx, **given)
@@ -78,6 +85,8 @@ class Call:
         except Exception as error:
             raise self._failed(error, self._place()) from error
         self.times.append(time.perf_counter() - start)
+        if guarded and encode([given[name] for name in guarded]) != before:
+            raise StageFailed(f"{self._place()}: it changes its inputs, which others read too; write to a copy")
         if self.outputs and out is not None and not isinstance(out, Outputs):
             raise StageFailed(f"{self._place()}: step gave a value of type {type(out).__name__}, expected its Out")
         for name, origin in self.outputs:

@@ -287,6 +287,17 @@ def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, val
         Engine(graph, {}, EngineOptions(validate=validate)).run()
 
 
+def test_a_stage_that_changes_what_others_read_too_ends_the_run():
+    graph = graph_of(
+        {"source": {"_target_": "Count"}, "scribble": {"_target_": "Scribble", "since": 3}},
+        {"scribble": {"big": "source.big"}},
+    )
+    with pytest.raises(
+        StageFailed, match=r"stage 'scribble' \(toys.Scribble\) failed at tick 3 .*: it changes its inputs"
+    ):
+        Engine(graph).run()
+
+
 def test_later_outputs_are_checked_only_where_asked_for():
     nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": 15}}
     engine = Engine(graph_of(nodes, {"doubt": {"number": "source.number"}}))
