@@ -35,8 +35,8 @@ OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "ob
 """Settings that every run reads, whatever its graph is."""
 OF_OTHERS = ("experiment", "hydra", TYPED)
 """Blocks that are read before the graph is made."""
-OF_COMMANDS = ("defaults", "profile", "transport", "tour_settings")
-"""Keys of config.yaml that Hydra, a command, or what makes a map reads."""
+OF_COMMANDS = ("defaults", "profile", "transport")
+"""Keys of config.yaml that Hydra or a command reads."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 
@@ -155,9 +155,9 @@ def _unknown_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
 def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
     """A problem for each setting that was typed and that nothing of the run reads."""
     hints = {name: hint for _, _, rule in stand_ins() for name, hint in rule["unread"].items()}
-    known = {"world", *config_file()} - {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open()}
+    elsewhere = {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open(), *_taken_over(config)}
     typed = {str(name).partition(".")[0] for name in config.get(TYPED) or ()}
-    for name in sorted(known & typed - {*read}):
+    for name in sorted({*hints, *config_file()} & typed - {*read} - elsewhere):
         yield Problem(name, "nothing of this run reads it", hints.get(name, f"leave {name}=… away"))
 
 
@@ -290,8 +290,14 @@ def settings_read(config: Any) -> set[str]:
                 if each in config and each not in read:
                     read.add(each)
                     waiting.append(each)
-    taken_over = (str((spec or {}).get("set")) for spec in (raw["artifacts"] or {}).values())
-    return read - {*OF_THE_VARIANT, *(link[1] for link in map(LINK.fullmatch, taken_over) if link)}
+    return read - {*OF_THE_VARIANT, *_taken_over(config)}
+
+
+def _taken_over(config: Any) -> set[str]:
+    """The blocks of settings that an artifact's `set` is."""
+    specs: Any = OmegaConf.to_container(config, resolve=False)
+    given = (str((spec or {}).get("set")) for spec in (specs["artifacts"] or {}).values())
+    return {link[1] for link in map(LINK.fullmatch, given) if link}
 
 
 def _without_taken_out(config: dict[str, Any]) -> dict[str, Any]:
