@@ -9,6 +9,7 @@ from omninav.stages.geometry.arrays import Array, Ints
 
 from .camera_yaml import parse_camera
 from .recorded_images import RecordedImages
+from .stamps import SAME_TIME_S
 from .tables import NO_TIME, Time, read_table
 from .truth_file import trajectory_rows
 
@@ -16,8 +17,6 @@ POSES = ("poses.csv", "poses.tum")
 """Files that hold its poses: the first that is there."""
 COST = "cpu_ms"
 """The column of `poses.csv` with the processor time that each image took, which it may have."""
-SAME_TIME_S = 0.001
-"""A pose belongs to the image whose time is this near, seconds: programs write times with six digits and more."""
 
 
 def write_folder(folder: Path, map: RecordedImages, drive: RecordedImages) -> list[Path]:

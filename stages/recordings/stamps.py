@@ -11,6 +11,8 @@ from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import interpolate
 
 Stamps = npt.NDArray[np.int64]
+SAME_TIME_S = 0.001
+"""Times of one moment differ by less than this, seconds: programs write them with six digits and more."""
 LONE_S = 3600.0
 """A record further than this from all others of its kind tells of a broken clock, not of a drive."""
 
@@ -25,8 +27,12 @@ def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:
 
 
 def poses_near(times: Stamps, poses: Array, stamps: Stamps, max_gap_s: float) -> Array:
-    """Interpolates as `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away."""
-    at = poses_at(times, poses, stamps)
+    """Interpolates as `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away.
+
+    The first and the last pose are also those of stamps that rounding alone puts before and after them.
+    """
+    ends = np.clip(stamps, times[0], times[-1])
+    at = poses_at(times, poses, np.where(np.abs(stamps - ends) <= SAME_TIME_S * 1e9, ends, stamps))
     after = np.clip(np.searchsorted(times, stamps), 1, len(times) - 1)
     gap = np.minimum(np.abs(stamps - times[after - 1]), np.abs(times[after] - stamps))
     at[gap > max_gap_s * 1e9] = np.nan

@@ -55,9 +55,9 @@ def truth_from(
 ) -> tuple[Array, list[str]]:
     """The true poses (N, 3) that a file holds of a recording's images, interpolated at their times; and doubts.
 
-    An image taken at t is looked up at t + `clock_offset_s`; it has no truth where the file's nearest pose is more than
-    `max_gap_s` from that (a row of NaN), which is counted as `no_truth`, poses to which no robot gets as
-    `impossible_motion`, and orientations whose quaternion is no rotation as `impossible_pose`. Raises
+    An image taken at t is looked up at t + `clock_offset_s`; it has no truth before the file's first pose, after its
+    last, and more than `max_gap_s` from the nearest (a row of NaN), which is counted as `no_truth`, poses to which no
+    robot gets as `impossible_motion`, and orientations whose quaternion is no rotation as `impossible_pose`. Raises
     `UnreadableRecording` for a file that holds no trajectory, and where no image has a true pose.
     """
     stamps, poses, impossible, doubts = read_trajectory(file)
@@ -70,10 +70,11 @@ def truth_from(
             f"the images' {_span(shifted)}; clocks that differ: "
             "nodes.source.truth_clock_offset_s=SECONDS, the file's clock minus the log's"
         )
+    far = f"before its first pose, after its last or more than {max_gap_s:g} s from all"
     for kind, number, noun, what in (
         ("impossible_pose", impossible, "orientation", NO_ROTATION),
         ("impossible_motion", len(stamps) - len(likely), "pose", "not believed (nodes.source.limits)"),
-        ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", f"without a pose within {max_gap_s:g} s"),
+        ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", far),
     ):
         if number:
             recording.dropped[kind] += number

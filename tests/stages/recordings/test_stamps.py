@@ -22,3 +22,9 @@ def test_a_pose_counts_where_the_nearer_of_its_neighbours_is_near_enough() -> No
 
 def test_before_the_first_and_after_the_last_pose_nothing_is_known() -> None:
     assert known([-0.1, 0.0, 4.0, 4.1], 0.3) == [None, 0.0, 4.0, None]
+
+
+def test_rounding_puts_no_stamp_before_the_first_or_after_the_last_pose() -> None:
+    assert known([-4e-8, 4 + 4e-8, 4.0005], 0.3) == [0.0, 4.0, 4.0]
+    assert known([-0.002, 4.002], 0.3) == [None, None]
+    assert known([4.0005], 1e-4) == [None]

@@ -89,6 +89,7 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
         expected = pose_at((out.tick.stamp - START) / 1e9)
         assert (out.truth.x, out.truth.y, out.truth.heading) == pytest.approx(expected, abs=2e-2)
     assert 0 < ctx.counts["no_truth"] == FRAMES - len(known)
+    assert "before its first pose, after its last or more than 0.5 s from all" in ctx.details["no_truth"]
     assert ctx.facts["odometry"] == "measured"
     assert source.inputs_digest() != LogSource(log=log).inputs_digest()
 
