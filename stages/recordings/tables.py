@@ -100,6 +100,10 @@ class Angle:
     unit: Literal["rad", "deg"]
 
 
+class OutOfProportion(UnreadableRecording):
+    """A number that is too large for what it stands for: it may be of another unit."""
+
+
 class Block(NamedTuple):
     """Some rows in a row: their `cells` one after the other (a `pyarrow.StringArray`), and at which of them each row
     begins, with their number: `starts` (rows + 1,)."""
@@ -176,8 +180,9 @@ class CsvTable:
                 try:
                     value = _in_base_unit(text, column.unit)
                 except UnreadableRecording as error:
-                    where = f"{self.path}, line {self.lines[first + row]}: column '{column.column}'"
-                    raise UnreadableRecording(f"{where}: {error}") from None
+                    name = self.names[self.index(column.column)]
+                    where = f"{self.path}, line {self.lines[first + row]}: column '{name:.60}'"
+                    raise type(error)(f"{where}: {error}") from None
                 if value is not None:
                     found[row] = finish(value)
             first += len(texts)
@@ -306,22 +311,26 @@ def _plain_numbers(texts: Any, unit: str) -> tuple[Bools, npt.NDArray[Any]]:
 
 def _in_base_unit(text: str, unit: str) -> Decimal | None:
     """The number in a cell in metres, nanoseconds or radians; None where there is none."""
-    match = _CELL.match(text) if len(text) <= MAX_CELL else None
+    if len(text) > MAX_CELL:
+        return None
+    match = _CELL.match(text)
     if match is None:
+        if text.count(",") == 1 and "." not in text and _CELL.match(pointed := text.replace(",", ".")):
+            raise UnreadableRecording(f"{cut(text)} has a decimal comma, expected a point: {pointed}")
         return None
     try:
         number = Decimal(match[1])
     except InvalidOperation:
         return None
     if number and abs(number.adjusted()) > MAX_EXPONENT:
-        raise UnreadableRecording(f"{cut(text)} is out of all proportion")
+        raise OutOfProportion(f"{cut(text)} is out of all proportion")
     written = _SPELLINGS.get(match[2], match[2]) or unit
     family = next(family for family in _FAMILIES if unit in family)
     if written not in family:
         raise UnreadableRecording(f"{cut(text)} is not in {' or '.join(family)}")
     value, base = number * family[written], next(name for name in family if family[name] == 1)
     if abs(value) > _MAX_MAGNITUDE[base]:
-        raise UnreadableRecording(
+        raise OutOfProportion(
             f"{cut(text)} is out of all proportion, expected at most {_MAX_MAGNITUDE[base]:.0e} {base}"
         )
     return value

@@ -16,7 +16,18 @@ from .plausibility import MotionLimits, believed
 from .positions import track_directions
 from .recording import Recording, UnreadableRecording
 from .stamps import Stamps, ascending_rows, poses_near
-from .tables import MAX_TABLE_BYTES, NO_TIME, Angle, CsvTable, Length, Time, read_table, table_of, text_lines
+from .tables import (
+    MAX_TABLE_BYTES,
+    NO_TIME,
+    Angle,
+    CsvTable,
+    Length,
+    OutOfProportion,
+    Time,
+    read_table,
+    table_of,
+    text_lines,
+)
 
 COLUMNS = {
     "time": ("t", "time", "timestamp", "stamp", "sec", "seconds"),
@@ -117,8 +128,9 @@ def _tum(file: Path) -> Rows:
                 raise UnreadableRecording(f"{file}, line {number}: {what}")
             yield number, cells
 
-    table = table_of(file, tuple(map(str, range(8))), rows())
-    return _poses(table, {"time": 0, "x": 1, "y": 2, "qx": 4, "qy": 5, "qz": 6, "qw": 7}, DEFAULT_UNITS)
+    names = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
+    columns = {name: number for number, name in enumerate(names) if name != "z"}
+    return _poses(table_of(file, names, rows()), columns, DEFAULT_UNITS, "the times of a TUM file are in seconds")
 
 
 def _csv(file: Path) -> Rows:
@@ -144,11 +156,15 @@ def _csv(file: Path) -> Rows:
             f"{file}: no column for {' and '.join(missing)} among {cut(', '.join(table.names))}; a trajectory is a CSV "
             "with time, x, y and heading (or qx, qy, qz, qw) in its first line, or a TUM file (time x y z qx qy qz qw)"
         )
-    return _poses(table, found, units)
+    return _poses(table, found, units, "a column of times in other units is called time_ns, time_us or time_ms")
 
 
-def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str]) -> Rows:
-    times = table.nanoseconds(Time(columns["time"], units["time"]))  # type: ignore[arg-type]
+def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str], cure: str) -> Rows:
+    """The poses in a table. `cure`: advice where times are too large to be in their unit."""
+    try:
+        times = table.nanoseconds(Time(columns["time"], units["time"]))  # type: ignore[arg-type]
+    except OutOfProportion as error:
+        raise UnreadableRecording(f"{error}; {cure}") from None
     x, y = (table.numbers(Length(columns[axis], units[axis])) for axis in ("x", "y"))  # type: ignore[arg-type]
     heading, impossible = np.full(len(x), np.nan), 0
     doubts: list[str] = []

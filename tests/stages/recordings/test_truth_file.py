@@ -65,6 +65,13 @@ def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Pat
         ("name,x,z\na,1,2\n", "no column for time and y among 'name, x, z'; a trajectory is a CSV with time, x, y"),
         ("1 2 3 0 0 0 0 1\n2 3\n", "line 2: 2 numbers, expected time x y z qx qy qz qw"),
         ("t,x,y\n1,2,3\n", "fewer than two rows"),
+        ('time,x,y\n"1,25","2,5",3\n', r"csv, line 2: column 'time': '1,25' has a decimal comma, .* a point: 1\.25"),
+        ("time,x,y,yaw\n1,2,3,0.5\n2,2,3,'0,5'\n".replace("'", '"'), "line 3: column 'yaw': '0,5' has a decimal comma"),
+        (
+            "t,x,y\n1700000000000000000,2,3\n",
+            "line 2: column 't': .* out of all proportion.* called time_ns, time_us or",
+        ),
+        ("1700000000000000000 0 0 0 0 0 0 1\n", "line 1: column 'time': .* times of a TUM file are in seconds"),
         ("1 1 0 0 0 0 0 0\n" * 9, "9 orientations whose quaternion is shorter than"),
     ],
 )
