@@ -53,11 +53,13 @@ TANGENT_S = 1.0
 
 
 class Trajectory(NamedTuple):
-    """Ascending stamps (ns) and poses (N, 3) of a file; how many rows were `impossible`; and `doubts`, in sentences."""
+    """Ascending stamps (ns) and poses (N, 3) of a file; how many rows were `impossible`, and `lost` by what they lack;
+    and `doubts`, in sentences."""
 
     stamps: Stamps
     poses: Array
     impossible: int
+    lost: dict[str, int]
     doubts: list[str]
 
 
@@ -68,10 +70,11 @@ def truth_from(
 
     An image taken at t is looked up at t + `clock_offset_s`; it has no truth before the file's first pose, after its
     last, and more than `max_gap_s` from the nearest (a row of NaN), which is counted as `no_truth`, poses to which no
-    robot gets as `impossible_motion`, and orientations whose quaternion is no rotation as `impossible_pose`. Raises
-    `UnreadableRecording` for a file that holds no trajectory, and where no image has a true pose.
+    robot gets as `impossible_motion`, orientations whose quaternion is no rotation as `impossible_pose`, and rows that
+    lack something as `bad_truth_row`. Raises `UnreadableRecording` for a file that holds no trajectory, and where no
+    image has a true pose.
     """
-    stamps, poses, impossible, doubts = read_trajectory(file)
+    stamps, poses, impossible, lost, doubts = read_trajectory(file)
     likely = believed(stamps, poses, limits).rows
     shifted = recording.stamps + round(clock_offset_s * 1e9)
     truth = poses_near(stamps[likely], poses[likely], shifted, max_gap_s) if len(likely) > 1 else None
@@ -83,6 +86,7 @@ def truth_from(
         )
     far = f"before its first pose, after its last or more than {max_gap_s:g} s from all"
     for kind, number, noun, what in (
+        ("bad_truth_row", sum(lost.values()), "row", f"left out: {_listed(lost)}"),
         ("impossible_pose", impossible, "orientation", NO_ROTATION),
         ("impossible_motion", len(stamps) - len(likely), "pose", "not believed (nodes.source.limits)"),
         ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", far),
@@ -96,15 +100,29 @@ def truth_from(
 def read_trajectory(file: Path) -> Trajectory:
     """The trajectory in a file. Raises `UnreadableRecording` or another `BadInput`."""
     times, poses, impossible, doubts = trajectory_rows(file)
-    known = np.flatnonzero((times != NO_TIME) & np.isfinite(poses[:, :2]).all(axis=1))
+    placed, timed, headed = np.isfinite(poses[:, :2]).all(axis=1), times != NO_TIME, np.isfinite(poses[:, 2])
+    if not headed[placed & timed].any():  # one heading that is missing costs its own row, not the others' headings
+        headed[:] = True
+    known = np.flatnonzero(placed & timed & headed)
+    if 2 * (np.diff(times[known]) < 0).sum() > len(known) - 1:  # the file begins with its last pose
+        known = known[::-1]
     rows = known[ascending_rows(times[known])]
-    stamps, poses = times[rows], poses[rows]
+    lost = {
+        "without x or y": int((~placed).sum()) - impossible,
+        "without a time": int((placed & ~timed).sum()),
+        "without a heading": int((placed & timed & ~headed).sum()),
+        "not later than the row before": len(known) - len(rows),
+    }
+    lost = {what: number for what, number in lost.items() if number}
     if len(rows) < 2:
         without = f"; {counted(impossible, 'orientation')} {NO_ROTATION}" if impossible else ""
+        without += f"; of its {counted(len(times), 'row')} {_listed(lost)}" if lost else ""
         raise UnreadableRecording(f"{file}: fewer than two rows with a time and a pose{without}")
+    stamps, poses = times[rows], poses[rows]
     if np.isnan(poses[:, 2]).any():
         poses[:, 2] = track_directions((stamps - stamps[0]) / 1e9, poses[:, :2], TANGENT_S)
-    return Trajectory(stamps, poses, impossible, [f"{file}: {doubt}" for doubt in doubts])
+        doubts = [*doubts, "it has no headings; they are the direction of travel"]
+    return Trajectory(stamps, poses, impossible, lost, [f"{file}: {doubt}" for doubt in doubts])
 
 
 def trajectory_rows(file: Path) -> Rows:
@@ -193,3 +211,7 @@ def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str], cure
 
 def _span(stamps: Stamps) -> str:
     return f"{stamps[0] / 1e9:.3f} to {stamps[-1] / 1e9:.3f} s"
+
+
+def _listed(lost: dict[str, int]) -> str:
+    return ", ".join(f"{number:,} {what}" for what, number in lost.items())

@@ -56,7 +56,54 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
 
 def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Path) -> None:
     (tmp_path / "truth.csv").write_text("t,x,y\n" + "\n".join(f"{n},{n},{n}" for n in range(9)))
-    assert read_trajectory(tmp_path / "truth.csv")[1][:, 2] == pytest.approx(np.full(9, math.pi / 4))
+    found = read_trajectory(tmp_path / "truth.csv")
+    assert found.poses[:, 2] == pytest.approx(np.full(9, math.pi / 4))
+    assert not found.lost
+    assert ["no headings; they are the direction of travel" in doubt for doubt in found.doubts] == [True]
+
+
+@pytest.mark.parametrize(
+    ("row", "lost"),
+    [
+        ("4,4,0,", "without a heading"),
+        ("4,,0,1.5", "without x or y"),
+        (",4,0,1.5", "without a time"),
+        ("3,4,0,1.5", "not later than the row before"),
+        ("4 4 0 0 nan nan nan nan", "without a heading"),
+    ],
+)
+def test_a_row_that_lacks_something_costs_itself_alone(tmp_path: Path, row: str, lost: str) -> None:
+    tum = "," not in row
+    rows = [f"{n} {n} 0 0 0 0 1 0" if tum else f"{n},{n},0,{math.pi}" for n in range(9)]  # it drives backward
+    rows[4] = row
+    (tmp_path / "truth.txt").write_text("\n".join(rows if tum else ["time,x,y,yaw", *rows]))
+    found = read_trajectory(tmp_path / "truth.txt")
+    assert found.lost == {lost: 1}
+    assert found.poses == pytest.approx(np.array([(n, 0, math.pi) for n in range(9) if n != 4]))
+    assert not found.doubts
+
+
+def test_rows_that_were_lost_are_counted_with_what_they_lack(tmp_path: Path) -> None:
+    rows = [f"{START / 1e9 + at},{pose_at(at)[0]},{pose_at(at)[1]},{pose_at(at)[2]}" for at in SECONDS]
+    rows[50] = rows[50].rpartition(",")[0] + ","
+    (tmp_path / "truth.csv").write_text("\n".join(["time,x,y,yaw", *rows]))
+    ctx = Context("source")
+    found = list(ticks(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.csv")), ctx))
+    assert ctx.counts["bad_truth_row"] == 1
+    assert ctx.details["bad_truth_row"].endswith("truth.csv: 1 row left out: 1 without a heading")
+    for out in found:
+        expected = pose_at((out.tick.stamp - START) / 1e9)
+        assert out.truth is None or out.truth.heading == pytest.approx(expected[2], abs=2e-2)
+
+
+def test_a_file_that_begins_with_its_last_pose_is_read_from_its_end(tmp_path: Path) -> None:
+    lines = tum(tmp_path / "truth.tum").read_text().splitlines()
+    forward = read_trajectory(tmp_path / "truth.tum")
+    (tmp_path / "truth.tum").write_text("\n".join(lines[:0:-1]))
+    backward = read_trajectory(tmp_path / "truth.tum")
+    np.testing.assert_array_equal(backward.stamps, forward.stamps)
+    np.testing.assert_array_equal(backward.poses, forward.poses)
+    assert not backward.lost
 
 
 @pytest.mark.parametrize(
@@ -65,6 +112,7 @@ def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Pat
         ("name,x,z\na,1,2\n", "no column for time and y among 'name, x, z'; a trajectory is a CSV with time, x, y"),
         ("1 2 3 0 0 0 0 1\n2 3\n", "line 2: 2 numbers, expected time x y z qx qy qz qw"),
         ("t,x,y\n1,2,3\n", "fewer than two rows"),
+        ("t,x,y\n1,2,3\n1,2,3\n,2,3\n", "of its 3 rows 1 without a time, 1 not later than the row before"),
         ('time,x,y\n"1,25","2,5",3\n', r"csv, line 2: column 'time': '1,25' has a decimal comma, .* a point: 1\.25"),
         ("time,x,y,yaw\n1,2,3,0.5\n2,2,3,'0,5'\n".replace("'", '"'), "line 3: column 'yaw': '0,5' has a decimal comma"),
         (
