@@ -24,12 +24,18 @@ from .recording import UnreadableRecording
 from .stamps import Stamps
 
 PI = Decimal("3.14159265358979323846264338328")
-_LENGTHS = {"m": Decimal(1), "cm": Decimal("0.01"), "mm": Decimal("0.001"), "in": Decimal("0.0254")}
-_TIMES = {
+LENGTHS = {
+    "m": Decimal(1),
+    "cm": Decimal("0.01"),
+    "mm": Decimal("0.001"),
+    "km": Decimal(1000),
+    "in": Decimal("0.0254"),
+}
+TIMES = {
     name: Decimal(scale) for name, scale in (("ns", 1), ("us", 10**3), ("ms", 10**6), ("s", 10**9), ("min", 60 * 10**9))
 }
-_ANGLES = {"rad": Decimal(1), "deg": PI / 180}
-_FAMILIES = (_LENGTHS, _TIMES, _ANGLES)
+ANGLES = {"rad": Decimal(1), "deg": PI / 180}
+_FAMILIES = (LENGTHS, TIMES, ANGLES)
 MAX_TABLE_BYTES = 64_000_000
 """Largest accepted table, bytes."""
 MAX_LINES = 1_000_000
@@ -65,14 +71,19 @@ NO_TIME = np.iinfo(np.int64).min
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
 _CELL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*$")
 _SPELLINGS = {
-    "degrees": "deg",
-    "degree": "deg",
-    "°": "deg",
-    "radians": "rad",
-    "sec": "s",
-    "seconds": "s",
-    '"': "in",
-    "inch": "in",
+    spelling: unit
+    for unit, spellings in {
+        "deg": "degrees degree °",
+        "rad": "radians radian",
+        "s": "sec second seconds",
+        "ms": "msec millisecond milliseconds",
+        "us": "µs usec microsecond microseconds",
+        "ns": "nsec nanosecond nanoseconds",
+        "min": "minute minutes",
+        "m": "metre metres meter meters",
+        "in": '" inch inches',
+    }.items()
+    for spelling in spellings.split()
 }
 
 
@@ -81,7 +92,7 @@ class Length:
     """A column of lengths, by its name in the header or its number from 0. A unit inside a cell (`5 cm`) goes first."""
 
     column: str | int
-    unit: Literal["m", "cm", "mm", "in"]
+    unit: Literal["m", "cm", "mm", "km", "in"]
 
 
 @dataclass(frozen=True)
@@ -283,6 +294,11 @@ def _json_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
         ) from None
 
 
+def unit_named(written: str) -> str:
+    """The unit that a spelling stands for; the spelling itself where it stands for none."""
+    return _SPELLINGS.get(written, written)
+
+
 def by_numbers(name: str) -> list[str | tuple[int, str]]:
     """A key by which names come in the order of the numbers in them."""
     parts = ((part, part.lstrip("0")) for part in re.split(r"(\d+)", name))
@@ -297,7 +313,7 @@ def _plain_numbers(texts: Any, unit: str) -> tuple[Bools, npt.NDArray[Any]]:
     pattern, power = _PLAIN[unit]
     matching = pc.match_substring_regex(texts, pattern)
     cells, chosen = texts.filter(matching), matching.to_numpy(zero_copy_only=False).copy()
-    if unit in _TIMES:
+    if unit in TIMES:
         whole = pc.replace_substring_regex(cells, r"\..*", "")
         fraction = pc.replace_substring_regex(cells, r"^[^.]*\.?", "")
         values = pc.binary_join_element_wise(whole, pc.utf8_rpad(fraction, power, "0"), "").cast(pa.int64())
@@ -324,7 +340,7 @@ def _in_base_unit(text: str, unit: str) -> Decimal | None:
         return None
     if number and abs(number.adjusted()) > MAX_EXPONENT:
         raise OutOfProportion(f"{cut(text)} is out of all proportion")
-    written = _SPELLINGS.get(match[2], match[2]) or unit
+    written = unit_named(match[2]) or unit
     family = next(family for family in _FAMILIES if unit in family)
     if written not in family:
         raise UnreadableRecording(f"{cut(text)} is not in {' or '.join(family)}")

@@ -17,8 +17,11 @@ from .positions import track_directions
 from .recording import Recording, UnreadableRecording
 from .stamps import Stamps, ascending_rows, poses_near
 from .tables import (
+    ANGLES,
+    LENGTHS,
     MAX_TABLE_BYTES,
     NO_TIME,
+    TIMES,
     Angle,
     CsvTable,
     Length,
@@ -27,6 +30,7 @@ from .tables import (
     read_table,
     table_of,
     text_lines,
+    unit_named,
 )
 
 COLUMNS = {
@@ -40,7 +44,11 @@ COLUMNS = {
     "qw": ("qw", "q_w", "orientation_w", "q_rs_w"),
 }
 """What the columns of a CSV table may be called, in small letters, without units."""
-UNITS = {"time": ("ns", "us", "ms", "s"), "x": ("m", "cm", "mm"), "y": ("m", "cm", "mm"), "heading": ("rad", "deg")}
+QUATERNION = ("qx", "qy", "qz", "qw")
+LIKE_HEADING = re.compile(r"heading|hdg|yaw|theta|(?<![a-z])psi(?![a-z])|azimuth|bearing|orientation|rotation|quat")
+NO_HEADING = re.compile(r"rate|vel|speed|acc|std|sigma|var|cov|err|dot")
+"""Names of columns that may hold a heading, and those among them that hold its speed or its error."""
+UNITS = {"time": TIMES, "x": LENGTHS, "y": LENGTHS, "heading": ANGLES}
 DEFAULT_UNITS = {"time": "s", "x": "m", "y": "m"}
 MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
 """Tilt that no robot on a floor or a hillside has (degrees), and the share of a file's orientations that may have it.
@@ -154,27 +162,50 @@ def _tum(file: Path) -> Rows:
 def _csv(file: Path) -> Rows:
     """A table with a header: time, x, y and, where it has one, a heading or a quaternion."""
     table = read_table(file)
-    found: dict[str, int] = {}
-    units = dict(DEFAULT_UNITS)
-    for number, name in enumerate(table.names):
-        plain = re.sub(r"\s*\[[^\]]*\]", "", name.strip().lstrip("#").strip().lower())
-        unit = re.search(r"\[\s*(\w+)\s*\]", name.lower())
-        for meaning, options in COLUMNS.items():
-            bare, _, suffix = plain.rpartition("_")
-            known = UNITS.get(meaning, ())
-            short = bare if bare and suffix in known else plain
-            if short in options and meaning not in found:
-                found[meaning] = number
-                written = unit[1] if unit else suffix if short == bare else ""
-                if written in known:
-                    units[meaning] = written
+    found, units = _columns(table)
     missing = [meaning for meaning in ("time", "x", "y") if meaning not in found]
     if missing:
         raise UnreadableRecording(
             f"{file}: no column for {' and '.join(missing)} among {cut(', '.join(table.names))}; a trajectory is a CSV "
             "with time, x, y and heading (or qx, qy, qz, qw) in its first line, or a TUM file (time x y z qx qy qz qw)"
         )
+    turned = [table.names[found[part]] for part in QUATERNION if part in found]
+    if "heading" not in found and len(turned) < len(QUATERNION):
+        likely = [name for name in table.names if LIKE_HEADING.search(name.lower())]
+        unread = turned + [name for name in likely if not NO_HEADING.search(name.lower())]
+        if unread:
+            raise UnreadableRecording(
+                f"{file}: {cut(', '.join(unread))} may tell of headings, but is none by its name: a heading, counter-"
+                "clockwise from x, is a column yaw or yaw_deg, a quaternion qx, qy, qz and qw; rename it or drop it"
+            )
     return _poses(table, found, units, "a column of times in other units is called time_ns, time_us or time_ms")
+
+
+def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, str]]:
+    """Columns by their meaning, and the units that their names state. Raises `UnreadableRecording` for others."""
+    found: dict[str, int] = {}
+    units = dict(DEFAULT_UNITS)
+    unknown: dict[str, str] = {}
+    for number, name in enumerate(table.names):
+        plain, *rest = re.split(r"[\[(]", name.lower().strip("# "), maxsplit=1)
+        plain, bracketed = plain.strip().replace(" ", "_"), "".join(rest).strip(" ])")
+        bare, _, suffix = plain.rpartition("_")
+        for meaning, options in COLUMNS.items():
+            known = UNITS.get(meaning, {})
+            short = bare if bare and unit_named(suffix) in known else plain
+            if short not in options or meaning in found:
+                continue
+            written = unit_named(bracketed or (suffix if short == bare else "")) if known else ""
+            if written and written not in known:
+                unknown[meaning] = f"column {cut(name)}: {cut(bracketed)} is none of its units, {', '.join(known)}"
+                continue
+            found[meaning] = number
+            if written:
+                units[meaning] = written
+    for meaning, what in unknown.items():
+        if meaning not in found:  # else another column has it, in a unit that is known
+            raise UnreadableRecording(f"{table.path}: {what}; convert it, or rename the column")
+    return found, units
 
 
 def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str], cure: str) -> Rows:
@@ -194,8 +225,8 @@ def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str], cure
             doubts.append(
                 f"headings of up to {most:.3g} are read as radians; degrees are a column {cut(name + '_deg')}"
             )
-    elif all(part in columns for part in ("qx", "qy", "qz", "qw")):
-        qx, qy, qz, qw = (table.numbers(Length(columns[part], "m")) for part in ("qx", "qy", "qz", "qw"))
+    elif all(part in columns for part in QUATERNION):
+        qx, qy, qz, qw = (table.numbers(Length(columns[part], "m")) for part in QUATERNION)
         heading = np.arctan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
         squares = qx * qx + qy * qy + qz * qz + qw * qw
         wrong = (squares < 0.25) | (squares > 4.0)  # as of the messages of a topic

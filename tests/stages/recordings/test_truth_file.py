@@ -39,6 +39,10 @@ def tum(path: Path, shift_s: float = START / 1e9, seconds: tuple[float, ...] = S
             "{ns},{x},{y},{qw},0,0,{qz}",
         ),
         ("time_ms,x_mm,y_mm,heading_deg", "{ms},{x_mm},{y_mm},{deg}"),
+        ("timestamp (ms),x (mm),y [mm],yaw (deg)", "{ms},{x_mm},{y_mm},{deg}"),
+        ("time [milliseconds],pos x [km],pos y [km],Heading_Degrees", "{ms},{x_km},{y_km},{deg}"),
+        ("time [min],x [meters],y (m),heading [°]", "{min},{x},{y},{deg}"),
+        ("UTC,time [UTC],time_seconds,x,y,yaw [mils],yaw deg", "0,0,{t},{x},{y},0,{deg}"),
     ],
 )
 def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path, header: str, row: str) -> None:
@@ -47,6 +51,7 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
         x, y, h = pose_at(at)
         in_si = {"t": at, "x": x, "y": y, "h": h, "qw": math.cos(h / 2), "qz": math.sin(h / 2)}
         others = {"ns": round(at * 1e9), "ms": at * 1e3, "x_mm": x * 1e3, "y_mm": y * 1e3, "deg": math.degrees(h)}
+        others |= {"min": f"{at / 60:.15f}", "x_km": f"{x / 1e3:.15f}", "y_km": f"{y / 1e3:.15f}"}
         rows.append(row.format(**in_si, **others))
     (tmp_path / "truth.csv").write_text("\n".join(rows))
     stamps, poses, *_ = read_trajectory(tmp_path / "truth.csv")
@@ -54,8 +59,9 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
     np.testing.assert_allclose(poses, [pose_at(at) for at in SECONDS], atol=1e-9)
 
 
-def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Path) -> None:
-    (tmp_path / "truth.csv").write_text("t,x,y\n" + "\n".join(f"{n},{n},{n}" for n in range(9)))
+@pytest.mark.parametrize("others", ["", ",yaw", ",yaw_rate,heading_std"])
+def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Path, others: str) -> None:
+    (tmp_path / "truth.csv").write_text(f"t,x,y{others}\n" + "\n".join(f"{n},{n},{n}" for n in range(9)))
     found = read_trajectory(tmp_path / "truth.csv")
     assert found.poses[:, 2] == pytest.approx(np.full(9, math.pi / 4))
     assert not found.lost
@@ -112,6 +118,12 @@ def test_a_file_that_begins_with_its_last_pose_is_read_from_its_end(tmp_path: Pa
         ("name,x,z\na,1,2\n", "no column for time and y among 'name, x, z'; a trajectory is a CSV with time, x, y"),
         ("1 2 3 0 0 0 0 1\n2 3\n", "line 2: 2 numbers, expected time x y z qx qy qz qw"),
         ("t,x,y\n1,2,3\n", "fewer than two rows"),
+        ("t,x [ft],y [ft]\n", r"csv: column 'x \[ft\]': 'ft' is none of its units, m, cm, mm, km, in; convert it"),
+        ("t (days),x,y\n", "'days' is none of its units, ns, us, ms, s, min"),
+        ("t,x,y,yaw (mils)\n", r"column 'yaw \(mils\)': 'mils' is none of its units, rad, deg"),
+        ("t,x,y,yaw_rate,headingDeg\n", "csv: 'headingDeg' may tell of headings.* from x, is a column yaw or yaw_deg"),
+        ("t,x,y,robot.orientation.w\n", "'robot.orientation.w' may tell of headings.* a quaternion qx, qy, qz and qw"),
+        ("t,x,y,qz,qw\n", "'qz, qw' may tell of headings"),
         ("t,x,y\n1,2,3\n1,2,3\n,2,3\n", "of its 3 rows 1 without a time, 1 not later than the row before"),
         ('time,x,y\n"1,25","2,5",3\n', r"csv, line 2: column 'time': '1,25' has a decimal comma, .* a point: 1\.25"),
         ("time,x,y,yaw\n1,2,3,0.5\n2,2,3,'0,5'\n".replace("'", '"'), "line 3: column 'yaw': '0,5' has a decimal comma"),
