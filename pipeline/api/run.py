@@ -185,7 +185,7 @@ def load_artifact(file: str | os.PathLike[str]) -> Value:
     """The value in an `.omap` file, checked; its arrays are read-only (`np.array(…)` copies one).
 
     A large array is read, and checked, where it is needed. Raises `BadInput` naming the file where it is missing, cut
-    or changed, and where its content is no sound value.
+    or changed, and where its content is not a valid value.
     """
     loaded: Value = read_only(read_artifact(Path(file)))
     return loaded

@@ -142,7 +142,7 @@ def read_artifact(path: str | Path, whole: bool = False) -> Value:
             raise Unfit(f"does not fit {cls.__name__} of this version ({error!s:.160})") from None
         wrong = violation(value)
         if wrong is not None:
-            raise Unfit(f"it is no sound {cls.__name__}: {wrong}")
+            raise Unfit(f"it is not a valid {cls.__name__}: {wrong}")
         return value
 
 
@@ -255,7 +255,7 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
             raise
         except Exception as error:  # a sum that is right says nothing of what the content makes readers raise
             said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
-            raise BadInput(f"{path}: no sound artifact ({said:.160}); make it again") from None
+            raise BadInput(f"{path}: not a valid artifact ({said:.160}); make it again") from None
 
 
 def _checked_sum(path: Path, file: BinaryIO) -> tuple[int, int]:

@@ -79,7 +79,7 @@ def wrong_output(thing: Any, kind: Any, optional: bool) -> str | None:
     if not _is(thing, kind):
         return f"is {_shown(thing)}, expected {type_name(kind)}"
     wrong = violation(thing) if isinstance(thing, Value) else None
-    return None if wrong is None else f"is no sound {type(thing).__name__}: {wrong}"
+    return None if wrong is None else f"is not a valid {type(thing).__name__}: {wrong}"
 
 
 def _wrong_fields(value: Value) -> Iterator[str]:

@@ -107,7 +107,7 @@ def as_bad_input(error: BaseException) -> BadInput | None:
     mark, message = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error).split("\n")[0]
     where = f"{mark.name}, line {mark.line + 1}, column {mark.column + 1}" if mark else "a configuration file"
     return BadInput(
-        f"{where}: this is no YAML: {message}; mind indentation, colons, quotes and brackets around this place"
+        f"{where}: not valid YAML: {message}; check indentation, colons, quotes and brackets around this place"
     )
 
 

@@ -71,7 +71,7 @@ def parse_yaml(content: bytes | str, where: str) -> Any:
         mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
         line = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         raise BadInput(
-            f"{where}{line}: this is no YAML: {problem}; mind indentation, colons, quotes, brackets"
+            f"{where}{line}: not valid YAML: {problem}; check indentation, colons, quotes and brackets"
         ) from None
 
 

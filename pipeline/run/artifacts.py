@@ -109,7 +109,7 @@ def obtain(
 
 
 def found_value(cache: Cache, key: str, suffix: str, seed: int) -> tuple[Path, Value, Any] | None:
-    """A value's file in the cache, the value and its notes; None where there is none, or no sound one."""
+    """A value's file in the cache, the value and its notes; None where there is none, or no valid one."""
     for candidate in (key, seeded(key, seed)):
         found = cache.find(candidate, suffix)
         if found is not None:

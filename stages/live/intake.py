@@ -196,7 +196,7 @@ class Intake:
         except BadInput:
             raise
         except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
-            self._drop("bad_message", f"{arrival.topic}: a message is no sound {arrival.msgtype} ({error!s:.120})")
+            self._drop("bad_message", f"{arrival.topic}: a message is not a valid {arrival.msgtype} ({error!s:.120})")
             return
         self.unrecorded += items
 
@@ -244,7 +244,7 @@ class Intake:
             self._drop("undecodable_image", f"{where}: {error}")
             return None
         except Exception as error:  # as above
-            self._drop("bad_message", f"{where} is no sound {image.arrival.msgtype} ({error!s:.120})")
+            self._drop("bad_message", f"{where} is not a valid {image.arrival.msgtype} ({error!s:.120})")
             return None
         if isinstance(camera, str):
             camera = self.camera = named_camera(camera, lambda: pixels.shape[1::-1])[0]

@@ -175,7 +175,7 @@ def _missing(content: dict[str, Any], key: Key, known: Keys) -> str:
         key = Key("", key.section)
     part, prefix = (content[key.section], f"{key.section}.") if key.section else (content, "")
     near = nearest(str(key.name), [str(name) for name in part if name not in known[key.section]])
-    hint = f"; did you mean it by '{prefix}{near}'?" if near else ""
+    hint = f"; is '{prefix}{near}' meant to be '{prefix}{key.name}'?" if near else ""
     return f"key '{prefix}{key.name}' is missing{hint}"
 
 

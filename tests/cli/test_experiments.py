@@ -371,7 +371,7 @@ def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: 
     ours.write_text(EXPERIMENT + "  slow: [1\n")
     ended = omninav(*MINE)
     assert ended.returncode == 2
-    assert re.fullmatch(r"\S+/mine/experiment/dice.yaml, line \d+, column \d+: this is no YAML: .*\n", ended.stderr)
+    assert re.fullmatch(r"\S+/mine/experiment/dice.yaml, line \d+, column \d+: not valid YAML: .*\n", ended.stderr)
     assert not (place / "runs").exists()
 
 

@@ -110,6 +110,7 @@ def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path, mon
     row = next(line for line in ended.stdout.split("\n") if line.startswith("features.broken"))
     assert "[environment] cannot be used: module 'broken.py'" in row
     assert "features.hsv_histogram" in ended.stdout
+    assert "1 plugin cannot be loaded; all other stages can be used" in ended.stderr
     assert omninav("check", check=True).returncode == 0
     used = omninav("check", "features=broken")
     assert used.returncode == 2

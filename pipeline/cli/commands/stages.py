@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from omninav.pipeline.cli.config_groups import options_with
 from omninav.pipeline.graph.parameters import Parameter
 from omninav.pipeline.graph.ports import type_name
-from omninav.pipeline.graph.problems import suggest
+from omninav.pipeline.graph.problems import counted, suggest
 from omninav.pipeline.graph.registry import Entry, UnknownStage, entries, resolve
 from omninav.pipeline.graph.signature import signature
 
@@ -33,7 +33,7 @@ def command(arguments: list[str]) -> int:
         broken += bool(entry.problem)
         print("\n".join(_described(entry) if entry.name in arguments else _listed(entry)))
     if broken:
-        print(f"{broken} plugin(s) cannot be used; everything else can", file=sys.stderr)
+        print(f"{counted(broken, 'plugin')} cannot be loaded; all other stages can be used", file=sys.stderr)
     return 0
 
 

@@ -102,10 +102,10 @@ def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: d
 @pytest.mark.parametrize(
     ("members", "message"),
     [
-        ({"header.json": None}, "no sound artifact"),
+        ({"header.json": None}, "not a valid artifact"),
         ({"header.json": b"[1]"}, "written in format None"),
-        ({"header.json": b"[" * 100_000}, "no sound artifact"),
-        ({"rest.npy": b""}, "no sound artifact"),
+        ({"header.json": b"[" * 100_000}, "not a valid artifact"),
+        ({"rest.npy": b""}, "not a valid artifact"),
         ({"rest.npy": npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904,)}")}, "as long as"),
         ({"rest.npy": npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}")}, "as long as it says"),
         (
@@ -124,7 +124,7 @@ def test_a_file_whose_sum_is_right_and_whose_content_is_not_is_refused(file: Pat
 
 def test_a_value_that_does_not_hold_what_its_fields_state_is_refused_by_name(tmp_path: Path):
     write_artifact(tmp_path / "points.omap", Points(np.array([[0.0, np.nan]])))
-    with pytest.raises(BadInput, match="it is no sound Points: 'points' holds nan"):
+    with pytest.raises(BadInput, match="it is not a valid Points: 'points' holds nan"):
         read_artifact(tmp_path / "points.omap")
 
 

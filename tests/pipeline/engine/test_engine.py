@@ -281,7 +281,7 @@ def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, val
     graph = graph_of(nodes, {"doubt": {"number": "source.number"}})
     said = (
         rf"stage 'doubt' \(toys.Doubt\) failed at tick {since} \(log 0, frame {since}\): its output 'certainty' is"
-        r" no sound Certainty: 'share' holds nan, expected finite numbers"
+        r" not a valid Certainty: 'share' holds nan, expected finite numbers"
     )
     with pytest.raises(StageFailed, match=said):
         Engine(graph, {}, EngineOptions(validate=validate)).run()

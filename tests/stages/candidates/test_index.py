@@ -230,7 +230,7 @@ def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:
     lists[7] = len(index.centroids)
     broken = InvertedLists(index.mean, index.axes, index.centroids, index.codebooks, lists, index.codes)
     write_artifact(tmp_path / "index.omap", broken)
-    with pytest.raises(BadInput, match="no sound InvertedLists: 'lists'"):
+    with pytest.raises(BadInput, match="not a valid InvertedLists: 'lists'"):
         read_artifact(tmp_path / "index.omap")
 
 

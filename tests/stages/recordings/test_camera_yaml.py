@@ -59,7 +59,7 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("  a: 28.095", "  aa: 28.095", r"key 'mirror\.a' is missing"),
+        ("  a: 28.095", "  aa: 28.095", r"key 'mirror\.a' is missing; is 'mirror\.aa' meant to be 'mirror\.a'\?"),
         ("a: 28.095", "a: long", r"'mirror\.a': 'long' \(str\), expected float >= 1e-05"),
         ("a: 28.095", "a: -1", r"'mirror\.a': -1\.0 is out of bounds, expected float >= 1e-05"),
         ("a: 28.095", "a: 1.0e-300", r"'mirror\.a': 1e-300 is out of bounds"),
@@ -78,7 +78,7 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
         ("hyperbolic", "hyperbolik", "'projection' cannot be 'hyperbolik'; did you mean 'hyperbolic'"),
         ("yaw:", "yaww:", "key 'yaww' is not known; did you mean 'yaw'"),
         ("inner_radius_px: 34", "inner_radius_px: 340", "must be below"),
-        ("  width: 640", "  width: [", "this is no YAML"),
+        ("  width: 640", "  width: [", "not valid YAML"),
         ("497.0", "0", "'K' must be"),
     ],
 )

@@ -82,7 +82,7 @@ def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where
     [
         ("mode: pretty\n", r"mode: 'pretty' .* 'trinary' \| 'scale' \| 'raw'"),
         ("negate: 7\n", "negate: 7 .* expected bool"),
-        ("image: [\n", "no YAML"),
+        ("image: [\n", "not valid YAML"),
         ("image: other.pgm\n", "line 6: the key 'image' stands there twice"),
     ],
 )
