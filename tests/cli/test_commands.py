@@ -84,7 +84,7 @@ def test_check_says_who_reads_the_truth(omninav):
     assert "nothing wrong" in said
     readers = said.partition("ground truth is read by: ")[2].strip().split(", ")
     drawn = ["frames_plot", "shown", "trajectory_plot"]  # over the built-in world's floor plan
-    assert sorted(readers) == sorted(["drive", "prior", *drawn])  # prior only with start=truth
+    assert sorted(readers) == sorted(["drive", "prior (only with start=truth)", *drawn])
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def command(arguments: list[str]) -> int:
     sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
     print(f"{planned.variant}: nothing wrong with it. {sizes}")
     print(f"{counted(before, 'stage')} before the loop, {tick} in every tick, {after} after it")
-    print(f"ground truth is read by: {', '.join(truth_readers(graph)) or 'no stage'}")
+    print(_said_of_truth(truth_readers(graph)))
     return 0
 
 
@@ -132,5 +132,10 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     print(f"{counted(runs, 'run')} in all")
     print(f"claims to be judged: {len(experiment.claims)}")
     readers = sorted({name for each in run.conditions if each.planned for name in truth_readers(each.planned.graph)})
-    print(f"ground truth is read by: {', '.join(readers) or 'no stage'}")
+    print(_said_of_truth(readers))
     return 0
+
+
+def _said_of_truth(readers: list[str]) -> str:
+    named = ("prior (only with start=truth)" if name == "prior" else name for name in readers)
+    return f"ground truth is read by: {', '.join(named) or 'no stage'}"
