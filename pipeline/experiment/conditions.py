@@ -95,7 +95,7 @@ def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose
     problems: list[Problem] = []
     composed: dict[tuple[str, ...], dict[str, Any]] = {}
     name = f"{experiment.name}: checking"
-    with Progress(unit="conditions") as progress:
+    with Progress(unit="configurations") as progress:  # one for each condition in each scenario
         progress.begin(name, 0, len(runs))
         for number, run in enumerate(runs, 1):
             try:

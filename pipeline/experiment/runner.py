@@ -111,7 +111,7 @@ class ExperimentRun:
     def _record(self, workers: Workers) -> None:
         self.recordings = recordings_of(self.conditions, self.folder)
         jobs = [each.job(self.folder / "recordings") for each in self.recordings if not each.made]
-        failed = self._run_jobs(workers, jobs, "recordings")
+        failed = self._run_jobs(workers, jobs, "recording")
         for each in self.recordings:
             if each.name in failed:
                 for run, _ in each.readers:
@@ -121,7 +121,7 @@ class ExperimentRun:
 
     def _make_artifacts(self, workers: Workers) -> None:
         artifacts = artifacts_of([run for run in self.conditions if run.unfinished], self.folder)
-        failed = self._run_jobs(workers, [each.job() for each in artifacts if not each.made], "artifacts")
+        failed = self._run_jobs(workers, [each.job() for each in artifacts if not each.made], "artifact")
         for each in artifacts:
             if each.name in failed:
                 for run, name in each.readers:
@@ -181,12 +181,13 @@ class ExperimentRun:
         """Run jobs whose frames are counted. Returns the errors by the jobs' names."""
         if not jobs:
             return {}
-        frames, name = JobProgress(len(jobs)), f"{self.experiment.name}: {what}"
+        frames, name = JobProgress(len(jobs)), f"{self.experiment.name}: {what}s"
         with Progress() as progress:
 
             def show() -> None:
                 if frames.done != frames.total or frames.ended == len(jobs):
-                    progress.update(name, frames.done, frames.total, f"{frames.ended} of {len(jobs)} {what} done")
+                    note = f"{frames.ended} of {counted(len(jobs), what)} done"
+                    progress.update(name, frames.done, frames.total, note)
 
             def on_message(job: Job, message: Any) -> None:
                 frames.on_message(job.name, message)
@@ -198,7 +199,7 @@ class ExperimentRun:
                     print(f"{job.name}: {outcome.error}", flush=True)
                 show()
 
-            progress.say(f"{self.experiment.name}: {len(jobs)} {what} to make")
+            progress.say(f"{self.experiment.name}: {counted(len(jobs), what)} to make")
             progress.begin(name, 0)
             ended = workers.run(jobs, on_message, on_end)
             return {name: outcome.error for name, outcome in ended.items() if outcome.error}
