@@ -21,19 +21,20 @@ class Quantity(Value):
     better: Literal["lower", "higher"] | None = None
     """Which numbers are better; None where neither is, so that a comparison marks none as best."""
     absent: str = "–"
-    """Shown where it is None. A word (`never`) is a finding, and shown as off; a dash is none, and left out."""
+    """Text in place of a value that is None. A word (`never`) is shown and marked as bad; with a dash the entry is
+    left out."""
     zero: str | None = None
     """Shown where it stands by itself and is 0 (`at once`); None: the number."""
     before: str = ""
     """Word before the number (`after` 12 frames)."""
     least: float | None = None
-    """Lowest figure that is as it should be, before it is scaled to its unit; what is below is shown as off."""
+    """Smallest acceptable value, before it is scaled to its unit; a lower one is marked as bad. None: any."""
     most: float | None = None
-    """Highest figure that is as it should be, before it is scaled to its unit; what is above is shown as off."""
+    """Largest acceptable value, before it is scaled to its unit; a higher one is marked as bad. None: any."""
     setting: bool = False
-    """Whether it is no result but what another was measured with: no table shows it, only metrics.json."""
+    """True for an entry that states how another was measured, and is not a result: only metrics.json holds it."""
     context: bool = False
-    """Whether it says how large a run was (frames, length): an experiment's page states it for each condition."""
+    """True for a figure of the run's size (frames, length): an experiment's page states it for each condition."""
 
 
 class Metrics(Value):

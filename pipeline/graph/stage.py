@@ -68,8 +68,9 @@ class Context:
 
     `rng` is the only source of randomness, seeded by the run's seed and the node's name. `tick` is the current
     turn of the loop. `folder` is the run's folder, where an "after" stage may put files (through `files.write_whole`).
-    `count`, `fact` and `warn` go into the manifest: things dropped, by kind, things worth knowing about the run, and
-    what one has to know to judge its results, which is also said at the end and at the head of its page.
+    `count`, `fact` and `warn` write to the manifest. `count` records dropped items by kind. `fact` records a value that
+    describes the run. `warn` records what one must know to judge the results; it is also printed at the end of the run
+    and stands at the head of its report.
     `progress` (done, total or None) and `doing` (in words) are for a stage whose one step takes long: they are shown.
     """
 
