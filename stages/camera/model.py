@@ -29,7 +29,8 @@ mirror, has u along x and v along y, so its bearings atan2(v, u) grow clockwise 
 class Key(NamedTuple):
     """Place of a parameter in `camera.yaml`: a section and a name in it, or the matrix K and a place in it (row-major).
 
-    A parameter without one stands at the top under its own name; of several the first is written, any is read.
+    A parameter without a key stands at the top under its own name. Of several keys any is accepted when the file is
+    read, and the first is used when it is written.
     """
 
     section: str
@@ -83,14 +84,14 @@ class Camera(Value, ABC):
     """The camera's housing is seen in the middle of its own image, as under a mirror."""
 
     width: Annotated[int, Key("image", "width"), Bounds(gt=0, le=MAX_SIDE)]
-    """Columns of an image."""
+    """Columns of an image, pixels."""
     height_px: Annotated[int, Key("image", "height"), Bounds(gt=0, le=MAX_SIDE)]
-    """Rows of an image."""
+    """Rows of an image, pixels."""
     _: KW_ONLY
     height: Annotated[float, Bounds(ge=0, le=1000)] | None = None
-    """Metres of the projection centre above the floor; None where it is not known."""
+    """Height of the projection centre above the floor, m; None where it is not known."""
     yaw: Annotated[float, Bounds(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
-    """Radians, counter-clockwise, by which the camera is turned against the robot."""
+    """Angle by which the camera is turned against the robot, radians, counter-clockwise."""
 
     def __init_subclass__(cls, projection: str = "", **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -111,7 +112,7 @@ class Camera(Value, ABC):
 
     @abstractmethod
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
-        """Unit rays (..., 3) that pixels (..., 2) look along, and which of them (...,) look anywhere; NaN elsewhere."""
+        """Unit rays (..., 3) of pixels (..., 2), and a mask (...,) of those that have a ray; NaN where it is False."""
 
     @property
     def ring(self) -> Ring | None:
@@ -144,11 +145,11 @@ class Camera(Value, ABC):
 
     @property
     def complete(self) -> bool:
-        """Whether everything is known of it; else `found_in` finds the rest in an image."""
+        """True if every parameter is known; otherwise `found_in` estimates the missing ones from an image."""
         return True
 
     def found_in(self, pixels: Pixels) -> Self | None:
-        """The camera with what it leaves open as one of its images shows it; None where the image does not show it."""
+        """The camera with its missing parameters estimated from an image; None where the image does not show them."""
         return self
 
     def shows(self, pixels: Array) -> Bools:
