@@ -36,7 +36,8 @@ class ReferenceMatch(ABC):
     most similar image is nearer on average, yet a filter tracks worse (docs/experiments/words.md)."""
 
     class Out(Outputs):
-        """Similarities of view and references, and what they say of the place; the latter absent in a small map."""
+        """Similarities of view and references, and their calibration (the likelihood ratio of the right place), which
+        is absent for small maps."""
 
         similarities: Similarities
         calibration: SimilarityCalibration | None = None
@@ -70,7 +71,7 @@ class ReferenceMatch(ABC):
         def of_view(view: int, chosen: Ints) -> Floats:
             return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
 
-        weighed = words is not None and self.word_power > 0.0  # by words, which no last view has
+        weighed = words is not None and self.word_power > 0.0  # the last view has no similarity by words
         of_last = None if weighed or last is None else last.similarity(ctx, features.values, of_one)
         similarities = Similarities(values, *how, of_last)
         return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
@@ -85,7 +86,10 @@ class ReferenceMatch(ABC):
         return self.compare(one, features, None)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
-        """`exponent` and `colour_scale` of the similarities."""
+        """Gives `exponent` and `colour_scale` of the `Similarities`, for stages that compare as this match does.
+
+        (None, None): they cannot, and `sensor=expected_observation` refuses the match.
+        """
         return None, None
 
 

@@ -18,9 +18,13 @@ class Similarities(Value):
     compared one represents, where only a sample was compared; None: one each. Sums weighted by it are unbiased
     estimates for the whole map.
 
-    How they were compared, so that other stages can compare in the same way: S = max_k (sum of the k largest s_j)
-    k^-exponent n^-(1-exponent) over the n segments, where of all but histograms s_j = 1 - |difference| /
-    `colour_scale`; with `exponent` None S = 1 - |whole difference| / `colour_scale`, and with both something else.
+    `exponent` and `colour_scale` say how views of n segments were compared, so that other stages can do the same:
+
+    * with both, or of histograms with `exponent` alone: S = max_k (sum of the k largest s_j) k^-exponent
+      n^-(1-exponent), where s_j is the intersection of histograms, and of other features 1 - |difference| /
+      `colour_scale`, not below 0;
+    * `colour_scale` alone: S = 1 - |difference of the whole views| / `colour_scale`;
+    * neither: otherwise, as no other stage can.
 
     `last_view`: similarity to the view before, at the best heading; None at the first, and where nobody asks for it.
     """

@@ -41,12 +41,12 @@ MAX_DISTANCES: dict[FeatureKind, float] = {
 
 
 def turned_views(view: Floats, headings: int) -> Floats:
-    """A view as it would look to robots turned back by each heading: (segments, bins) -> (headings, segments, bins).
+    """Rotates a view by each heading: (segments, bins) -> (headings, segments, bins).
 
-    Row h compares with the view of a robot whose heading is 2 pi h / headings (counter-clockwise) *less*: a turn to the
-    left moves the scene to higher segments, so row h takes segment j from j + h segments / headings. Fractions of a
-    segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that histograms still sum to
-    1.
+    Row h is what a robot at the same place would see whose heading is 2 pi h / headings (counter-clockwise) *less*: a
+    turn to the left moves the scene to higher segments, so row h takes segment j from j + h segments / headings.
+    Fractions of a segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that
+    histograms still sum to 1.
     """
     return _shifted(view[None], np.arange(headings) * len(view) / headings)
 
