@@ -61,9 +61,9 @@ class Playback(Source, ABC):
     truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
     """Largest time between an image and a pose of the file, seconds."""
     first: Annotated[int, Bounds(ge=0)] = 0
-    """The first frame of each log that is used."""
+    """Number of the frame at which each log begins; 0: the first."""
     stop: Annotated[int, Bounds(ge=1)] | None = None
-    """The first frame of each log that is not used any more; null: none."""
+    """Number of the frame before which each log ends; null: all frames are used."""
     stride: Annotated[int, Bounds(ge=1)] = 1
     """Every how many frames one is used."""
     cuts: tuple[Cut, ...] = ()
