@@ -66,10 +66,10 @@ class LandmarkUpdate(Stage):
     errors of the same landmarks, and a robot that stands gains no information. With `kidnapping_probability` the
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
-    Where a log begins with a belief that may be anywhere, or once `track` says that the robot was carried, it is as
-    likely elsewhere as here, until poses that are together all but certain have been proposed. So a first pose of
-    probability 0.1 takes half of the belief, which cannot hold all other places; the confidence says how sure the robot
-    is.
+    Where a log begins with a belief that may be anywhere, or once `track` says that the robot was carried, it is
+    elsewhere with probability 0.5. Each fix multiplies this by one minus the total probability of the poses that it
+    proposes. So a first pose of probability 0.1 takes half of the belief, which cannot hold all other places; the
+    confidence says how sure the robot is.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """
@@ -131,7 +131,7 @@ class LandmarkUpdate(Stage):
                 alpha = alpha_of_min_determinant(spread, covariance)
                 centre = mean + covariance @ np.linalg.solve(both, away)
                 _, product = intersected(there, spread, mean, covariance, alpha)
-                # What the place has of both counts by its novelty, and is shared out as they stand to each other.
+                # The factor of this place, of belief and fix together, is raised to the novelty; both keep their ratio.
                 counted = (unsaid + agreement) ** (novelty - 1.0)
                 old[near] = belief.weights[near] * unsaid * counted
                 poses.append(self._drawn(ctx, centre, product))

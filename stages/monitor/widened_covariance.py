@@ -20,9 +20,10 @@ from omninav.stages.values.pose import Motion
 DRIFT_M = (0.1, 0.05)
 """Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""
 MAX_SQUARES = 16.0
-"""Squared Mahalanobis distance within which a pose by landmarks is the estimate: 99.9 % of right ones."""
+"""Largest squared Mahalanobis distance from the estimate at which a pose by landmarks is taken for it; 99.9 % of
+correct poses are within it (chi-square, 3 degrees of freedom)."""
 AGREES = 0.9
-"""Probability from which on a pose by landmarks is taken for one."""
+"""Smallest probability of a pose by landmarks that is taken for the estimate."""
 
 
 class WidenCovarianceState(State):
@@ -44,8 +45,9 @@ class WidenCovariance(Stage):
     """
 
     floor: Annotated[float, Bounds(ge=0)] = 0.6
-    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map;
-    after a pose from landmarks, odometry's drift limits it."""
+    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map. Its
+    square is added to the variances. After a pose from landmarks, the square of odometry's drift (`DRIFT_M`) is added
+    instead while it is smaller."""
     min_confidence: Annotated[float, Bounds(ge=0, le=1)] = 0.5
     """Confidence below which the covariance covers the whole map; 0: never."""
 

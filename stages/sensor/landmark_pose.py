@@ -57,7 +57,8 @@ class LandmarkPose(Stage):
     """
 
     min_inliers: Annotated[int, Bounds(ge=4)] = 8
-    """Landmarks that must agree on a pose; few ones count where the belief expects them."""
+    """Smallest number of landmarks that agree on a pose (inliers). A pose with few of them has a low probability, and
+    counts only near the belief."""
 
     class Out(Outputs):
         """Poses of the image; absent where too few landmarks agree on one."""

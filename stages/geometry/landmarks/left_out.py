@@ -23,9 +23,9 @@ MIN_INLIERS = 20
 MEDIAN_SQUARES = 2.366
 """Median of the chi-square distribution with 3 degrees of freedom."""
 VARIANCE_FACTOR = 2.5
-"""Variance of poses over that of their bearings where too few images were left out to tell: that of most maps."""
+"""Default variance factor, where fewer than `MIN_FOUND` left-out images were located: typical of most maps."""
 MIN_FOUND = 10
-"""Poses from which on this factor is measured."""
+"""Located images from which on the factor is measured."""
 
 
 class LeftOut(NamedTuple):
