@@ -4,7 +4,6 @@ import io
 import os
 import sys
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -72,17 +71,20 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     """
     fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
     swept = [f"{name}={_values(name, values)}" for name, values in settings.items() if name not in fixed]
-    place = Path(folder or Path("runs") / f"{datetime.now():%Y-%m-%d_%H-%M-%S}_sweep")
+    place = [f"hydra.sweep.dir={word_of(Path(folder))}"] if folder else []
+    made: list[Path] = []
     before = sys.argv
     try:
         with ExitStack() as quiet:
             if not progress:
                 quiet.enter_context(redirect_stdout(io.StringIO()))
                 quiet.enter_context(redirect_stderr(io.StringIO()))
-            command(["-m", *words_of(words, fixed), *swept, f"hydra.sweep.dir={word_of(place)}"])
+            command(["-m", *words_of(words, fixed), *swept, *place], on_sweep=made.append)
     finally:
         sys.argv = before  # it is what the manifests of jobs say
-    return Sweep(place)
+    if not made:
+        raise BadInput(f"{' '.join(words):.80}: a flag that shows something runs no sweep; leave it out")
+    return Sweep(made[0])
 
 
 def _values(name: str, values: list[Any] | tuple[Any, ...] | range) -> str:

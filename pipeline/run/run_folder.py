@@ -5,7 +5,7 @@ import platform
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -162,14 +162,27 @@ def was_started(folder: Path, planned: Plan) -> bool:
 
 def _named(folder: Path, root: Path, name: str) -> Path:
     """The folder under a name that no other has (two runs may start in the same second)."""
-    for number in range(1, 1000):
-        target = root / (name if number == 1 else f"{name}_{number}")
+    for target in _numbered(root / name):
         try:
             return folder.rename(target)
         except OSError as taken:  # by a folder with something in it
             if not target.exists():
                 raise BadInput(f"{target}: {taken.strerror}; give another folder: runs=FOLDER") from None
     raise BadInput(f"{root}: more than 1000 runs named {name}")
+
+
+def new_folder(folder: Path) -> Path:
+    """Make a folder that nobody else has made: of this name, or with a number behind it."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    for target in _numbered(folder):
+        with suppress(FileExistsError):
+            target.mkdir()
+            return target
+    raise BadInput(f"{folder.parent}: more than 1000 folders named {folder.name}")
+
+
+def _numbered(folder: Path) -> Iterator[Path]:
+    return (folder.with_name(f"{folder.name}_{number}") if number > 1 else folder for number in range(1, 1000))
 
 
 def _point_latest(folder: Path) -> None:

@@ -1,11 +1,15 @@
 """Where a run's files lie: where Hydra's settings say, with what Hydra's users look for."""
 
 import json
+import os
 import re
+from datetime import datetime
 from pathlib import Path
 
 import pytest
 import yaml
+
+from omninav.pipeline.files import locked
 
 VARIANT = """\
 # @package _global_
@@ -116,3 +120,31 @@ def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path:
     assert refused.returncode == 2
     assert refused.stderr.startswith("out: another sweep is in it (seed=0 variant=toy)")
     assert json.loads((tmp_path / "out" / "0" / "manifest.json").read_text())["seed"] == 0
+
+
+def test_sweeps_of_the_same_second_have_a_folder_each(toy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    class Now(datetime):
+        @classmethod
+        def now(cls, tz=None):
+            return cls(2020, 1, 1)
+
+    monkeypatch.setattr("hydra.core.utils.datetime", Now)
+    toy("--config-dir=mine", "-m", "seed=0,1", check=True)
+    again = toy("--config-dir=mine", "-m", "seed=2", check=True)
+    assert again.stdout.splitlines()[-1] == "sweep: runs/2020-01-01_00-00-00_sweep_2/sweep.html"
+    seeds = {
+        folder.name: [json.loads(file.read_text())["seed"] for file in sorted(folder.glob("*/manifest.json"))]
+        for folder in (tmp_path / "runs").glob("*_sweep*")
+    }
+    assert seeds == {"2020-01-01_00-00-00_sweep": [0, 1], "2020-01-01_00-00-00_sweep_2": [2]}
+
+
+def test_a_folder_in_which_a_sweep_runs_is_not_taken_by_another_nor_by_the_same(toy, tmp_path: Path):
+    where = ("--config-dir=mine", "-m", "hydra.sweep.dir=out")
+    with locked(tmp_path / "out" / ".sweep.lock"):
+        refused = toy(*where, "seed=0")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(f"out: process {os.getpid()} runs a sweep in it; wait until it has ended, or name")
+    assert not list((tmp_path / "out").glob("*/manifest.json"))
+    toy(*where, "seed=0", check=True)
+    assert "another sweep is in it" in toy(*where, "seed=1").stderr

@@ -5,11 +5,13 @@ import os
 import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import composed, offer_plugins
@@ -19,17 +21,26 @@ from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_engine
 from omninav.pipeline.cli.terminal import shown
-from omninav.pipeline.cli.words import condition_words, flags_parser, read_flags
+from omninav.pipeline.cli.words import condition_words, flags_parser, read_flags, word_of
+from omninav.pipeline.files import Taken, locked
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.run_folder import new_folder
 
 LAUNCHER = "hydra/launcher=omninav"
 """Word that sends the jobs of a sweep to the engine that was typed."""
 
 
-def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> int:
-    """Run one job, or all of a sweep. Hydra composes the configurations, and `check` makes a plan of each."""
+def command(
+    arguments: list[str],
+    check: Callable[[Mapping[str, Any]], Plan] = plan,
+    on_sweep: Callable[[Path], None] = lambda folder: None,
+) -> int:
+    """Run one job, or all of a sweep. Hydra composes the configurations, and `check` makes a plan of each.
+
+    `on_sweep` is told the folder of a sweep before its first job.
+    """
     flags = read_flags(arguments)
     words, folders = flags.overrides, [flags.config_dir] if flags.config_dir else []
     offer_plugins()  # which parameters there are depends on the stages that are offered
@@ -38,7 +49,6 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
         arguments = [listed[words.index(word)] if word in words else word for word in arguments]
         if flags.multirun:
             _refuse_misspelled_sweep(listed, folders)
-            _refuse_other_sweep(listed)
             if any(map(is_of_engine, listed)) and not _has_launcher(listed):
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
@@ -49,12 +59,18 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
         typed = [word for word in listed if word not in of_conditions]
         sys.argv = ["omninav", *(word for word in arguments if word not in of_conditions)]
         try:
-            return _handed_over(hydra, flags, typed, job)
+            return _handed_over(hydra, flags, typed, job, on_sweep)
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
 
 
-def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
+def _handed_over(
+    hydra: Any,
+    flags: Namespace,
+    words: list[str],
+    job: Callable[[Any], float | None],
+    on_sweep: Callable[[Path], None],
+) -> int:
     """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
     if flags.hydra_help:
         hydra.hydra_help(CONFIG, flags_parser(), flags)
@@ -67,7 +83,9 @@ def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[
             outcomes = Path(place) / "outcomes"
             os.environ[OUTCOMES] = str(outcomes)
             if flags.multirun:
-                _sweep(hydra, job, words, outcomes)
+                with _own_folder(hydra, words) as (folder, words_of_folder):
+                    on_sweep(folder)
+                    _sweep(hydra, job, [*words, *words_of_folder], outcomes)
             else:
                 hydra.run(CONFIG, job, [*words, RUN_ALONE])
             ends = _ends(outcomes)
@@ -111,16 +129,36 @@ def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> No
             pass
 
 
-def _refuse_other_sweep(words: Sequence[str]) -> None:
+@contextmanager
+def _own_folder(hydra: Any, words: Sequence[str]) -> Iterator[tuple[Path, list[str]]]:
+    """Keep other sweeps out of a sweep's folder while the block runs. Gives the folder, and words that set it.
+
+    A folder that is named by the second is a new one. Raises `BadInput` where another sweep is in it.
+    """
+    place = hydra.compose_config(CONFIG, [*words], RunMode.MULTIRUN).hydra.sweep
+    folder = Path(str(place.dir))
+    words_of_folder: list[str] = []
+    as_written: Any = OmegaConf.to_container(place, resolve=False)
+    if "%S" in str(as_written["dir"]):  # another one may begin in the same second
+        folder = new_folder(folder)
+        words_of_folder = [f"hydra.sweep.dir={word_of(folder)}"]
+    try:
+        with locked(folder / ".sweep.lock", wait=False):
+            _refuse_other_sweep(folder, words)
+            yield folder, words_of_folder
+    except Taken as taken:
+        raise BadInput(
+            f"{folder}: {taken} runs a sweep in it; wait until it has ended, or name another: hydra.sweep.dir=…"
+        ) from None
+
+
+def _refuse_other_sweep(folder: Path, words: Sequence[str]) -> None:
     """A sweep that was stopped goes on when it is typed again; another one does not take its folder."""
-    for folder in (word.partition("=")[2].strip("'\"") for word in words if word.startswith("hydra.sweep.dir=")):
-        file = Path(folder) / "multirun.yaml"
-        if not file.is_file():
-            continue
-        settings = read_yaml(file)
-        before = [str(word) for word in OmegaConf.select(OmegaConf.create(settings), "hydra.overrides.task") or ()]
-        given = [word for word in words if not word.startswith(("hydra.", "hydra/"))]
-        if sorted(itertools.filterfalse(is_of_engine, before)) != sorted(itertools.filterfalse(is_of_engine, given)):
-            raise BadInput(
-                f"{folder}: another sweep is in it ({' '.join(before):.200}); name another: hydra.sweep.dir=…"
-            )
+    file = folder / "multirun.yaml"
+    if not file.is_file():
+        return
+    settings = read_yaml(file)
+    before = [str(word) for word in OmegaConf.select(OmegaConf.create(settings), "hydra.overrides.task") or ()]
+    given = [word for word in words if not word.startswith(("hydra.", "hydra/"))]
+    if sorted(itertools.filterfalse(is_of_engine, before)) != sorted(itertools.filterfalse(is_of_engine, given)):
+        raise BadInput(f"{folder}: another sweep is in it ({' '.join(before):.200}); name another: hydra.sweep.dir=…")
