@@ -29,7 +29,7 @@ def measured(**changes):
     return Metrics({**VALUES, **changes}, QUANTITIES, HEADLINES, ("odometry_alone",))
 
 
-def sweep_row(job: int, metrics: Metrics | None, folder: Path = Path(), **manifest: str) -> dict[str, Any]:
+def sweep_row(job: int, metrics: Metrics | None, folder: Path = Path(), **manifest: Any) -> dict[str, Any]:
     """Makes the row of one job in a sweep's tables; one that failed has no metrics."""
     return {"job": str(job), "folder": folder, "manifest": {"status": "complete", **manifest}, "metrics": metrics}
 

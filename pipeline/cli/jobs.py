@@ -39,7 +39,7 @@ class SweepJob:
     sweep: Path
     folder: Path
     number: str
-    overrides: str
+    overrides: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def _run(
     check_objective(settings.get("objective"), planned.graph)
     if sweep is None and folder is not None:
         no_run_in(folder)
-    argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
+    argv = ["omninav", *(sweep.overrides if sweep else sys.argv[1:])]
     with Progress() as progress, compile_notice(progress.say):
         if sweep is not None and folder is not None and was_started(folder, planned):
             run, metrics = resume(folder, progress)  # the sweep was stopped and is typed again, or this job has died
@@ -187,7 +187,7 @@ def _sweep_job() -> SweepJob | None:
     if settings.mode != RunMode.MULTIRUN:
         return None
     sweep, own = Path(settings.sweep.dir).resolve(), Path(settings.runtime.output_dir)
-    return SweepJob(sweep, own, str(settings.job.num), " ".join(settings.overrides.task))
+    return SweepJob(sweep, own, str(settings.job.num), tuple(settings.overrides.task))
 
 
 def note_end(job: SweepJob, end: JobEnd) -> None:

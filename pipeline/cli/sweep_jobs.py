@@ -70,7 +70,7 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
     end = JobEnd(1, f"{outcome.error} (what it printed is in {LOGS}/{number}.log)", sweep=str(sweep), number=number)
     file = sweep / LOGS / f"{number}.folder"
     folder = Path(file.read_text(encoding="utf-8")) if file.is_file() else sweep / number
-    note_end(SweepJob(sweep, folder, number, " ".join(job.given["overrides"])), end)
+    note_end(SweepJob(sweep, folder, number, tuple(job.given["overrides"])), end)
     return end
 
 

@@ -30,7 +30,7 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     for number, (row, run) in enumerate(zip(rows, measured, strict=True)):
         manifest, own = row["manifest"], Path(row["folder"])
         cells = [{"text": run[path].text if path in run else "", "best": number in best[path]} for path in seen.paths]
-        settings = settings_of(str(manifest.get("overrides", "")))
+        settings = settings_of(manifest)
         lines.append(
             {
                 "job": row["job"],

@@ -62,16 +62,18 @@ class Condition:
     means: dict[str, Mean]
 
 
-def settings_of(overrides: str) -> dict[str, str]:
-    """Overrides of a job, as name and value."""
-    return {name.lstrip("+~"): value for name, _, value in (word.partition("=") for word in overrides.split())}
+def settings_of(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Overrides of a job, as name and value; older sweeps wrote them as one text."""
+    given = manifest.get("overrides", ())
+    words = given.split() if isinstance(given, str) else map(str, given)
+    return {name.lstrip("+~"): value for name, _, value in (word.partition("=") for word in words)}
 
 
 def conditions(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
     """Jobs by what they override beside the seed, in the order in which these first come; rows as on the page."""
     found: dict[tuple[tuple[str, str], ...], list[dict[str, Number]]] = {}
     for row in rows:
-        settings = settings_of(str(row["manifest"].get("overrides", "")))
+        settings = settings_of(row["manifest"])
         settings.pop(SEED, None)
         jobs = found.setdefault(tuple(settings.items()), [])
         if row["metrics"] is not None:
@@ -81,7 +83,7 @@ def conditions(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
 
 def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
     """A sweep as people read it, of rows as on the page."""
-    typed = [settings_of(str(row["manifest"].get("overrides", ""))) for row in rows]
+    typed = [settings_of(row["manifest"]) for row in rows]
     values = {name: {one.get(name) for one in typed} for name in dict.fromkeys(name for one in typed for name in one)}
     varied = tuple(name for name, those in values.items() if len(those) > 1)
     settings = tuple(name for name in varied if name != SEED)
@@ -154,7 +156,7 @@ def write_sweep_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         figures = {} if row["metrics"] is None else numbers(row["metrics"])
         jobs.append(
             {"job": int(row["job"]), "status": str(manifest.get("status", ""))}
-            | settings_of(str(manifest.get("overrides", "")))
+            | settings_of(manifest)
             | {path: value for path, one in figures.items() if (value := _number(one.value)) is not None}
         )
     means = []

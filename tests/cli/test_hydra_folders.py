@@ -1,5 +1,6 @@
 """Where a run's files lie: where Hydra's settings say, with what Hydra's users look for."""
 
+import csv
 import json
 import os
 import re
@@ -148,3 +149,11 @@ def test_a_folder_in_which_a_sweep_runs_is_not_taken_by_another_nor_by_the_same(
     assert not list((tmp_path / "out").glob("*/manifest.json"))
     toy(*where, "seed=0", check=True)
     assert "another sweep is in it" in toy(*where, "seed=1").stderr
+
+
+def test_values_with_spaces_are_whole_in_the_table_of_a_sweep_and_in_the_commands_of_its_jobs(toy, tmp_path: Path):
+    toy("--config-dir=mine", "-m", "hydra.sweep.dir=out", "cache='a b/one','a b/two'", check=True)
+    jobs = list(csv.DictReader((tmp_path / "out" / "sweep.csv").open()))
+    assert [(job["cache"], job["variant"]) for job in jobs] == [("'a b/one'", "toy"), ("'a b/two'", "toy")]
+    manifest = json.loads((tmp_path / "out" / "1" / "manifest.json").read_text())
+    assert manifest["argv"] == ["omninav", "cache='a b/two'", "variant=toy"]

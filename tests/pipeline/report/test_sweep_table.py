@@ -30,6 +30,16 @@ def test_means_are_over_the_seeds_of_each_condition_and_failed_jobs_are_left_out
     assert (second.settings, second.jobs, second.means["loss_rate"].mean) == ({"gain": "1"}, 2, pytest.approx(0.6))
 
 
+def test_a_value_with_spaces_is_whole_and_older_sweeps_are_read():
+    words = [["map='a b/one.omap'", "seed=0"], ["map='a b/two.omap'", "seed=0"], "gain=1 seed=0"]
+    typed = [sweep_row(n, measured(loss_rate=0.1), overrides=overrides) for n, overrides in enumerate(words)]
+    assert [each.settings for each in conditions(typed)] == [
+        {"map": "'a b/one.omap'"},
+        {"map": "'a b/two.omap'"},
+        {"gain": "1"},
+    ]
+
+
 def test_both_tables_are_files(tmp_path):
     write_sweep_tables(tmp_path, rows(0.1, 0.2, 0.3, None))
     jobs, means = (list(csv.DictReader((tmp_path / f"{name}.csv").open())) for name in ("sweep", "sweep_means"))
