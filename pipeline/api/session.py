@@ -4,7 +4,7 @@ import os
 import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -18,7 +18,7 @@ from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.run.execution import execute, running
 from omninav.pipeline.run.plan import Plan
 from omninav.pipeline.run.resume import reopened
-from omninav.pipeline.run.run_folder import RunFolder, start
+from omninav.pipeline.run.run_folder import STEPS, RunFolder, start
 
 from .configuration import Configuration, configured
 from .plain_errors import plain_errors
@@ -77,9 +77,10 @@ class Step(Mapping[str, Any]):
 class Session(AbstractContextManager["Session"]):
     """A run whose frames come one at a time. It is a run like any other: folder, checkpoints, metrics and report.
 
-    `with` closes it at the end of its block; without `with`, call `close`. What was interrupted goes on with `resume`,
-    from the last `save`, or from the last of the checkpoints that are written every few seconds. It belongs to the
-    process that opened it, and is used by one thread at a time.
+    `with` closes it at the end of its block; without `with`, call `close`. Where its block raises, `resume` goes on
+    with the next frame; where a stage failed or the process died, from the last `save`, or from the last of the
+    checkpoints that are written every few seconds. It belongs to the process that opened it, and is used by one thread
+    at a time.
     """
 
     def __init__(self, run: RunFolder, planned: Plan) -> None:
@@ -117,8 +118,9 @@ class Session(AbstractContextManager["Session"]):
             given = len(self._given)
             try:
                 self._engine.tick()
-            except BaseException:
-                if len(self._given) > given:  # the source took it, so some stages have run and others not
+            except BaseException as error:
+                # Some stages have run and others not, unless the source has refused the frame.
+                if len(self._given) > given or not isinstance(error, BadInput):
                     self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
                 raise
             self._say_warnings()
@@ -173,6 +175,11 @@ class Session(AbstractContextManager["Session"]):
         with self._alone(wait=True):
             if error is None and self._over is not None:
                 error = BadInput(self._over)
+            if error is not None:
+                self._run.manifest[STEPS] = self.steps
+                if self._over is None:
+                    with suppress(Exception):  # what has ended the block is raised; resume says what is missing
+                        self._engine.save()
             self._over = "the session is closed; omninav.resume goes on with one that was interrupted"
             self._stack.__exit__(type(error) if error is not None else None, error, trace)
             self._stack = ExitStack()

@@ -15,10 +15,11 @@ from typing import Any
 from omninav.pipeline.engine.artifact import artifact_digest, write_artifact
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.engine.damage import say_damaged
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
 from omninav.pipeline.files import DISK, digest_file, open_itself, whole_file, write_whole
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 
@@ -27,7 +28,7 @@ from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
-from .run_folder import CONFIG, Interrupted, RunFolder, recorded_name
+from .run_folder import CONFIG, STEPS, Interrupted, RunFolder, recorded_name
 from .timing import stage_times
 
 log = logging.getLogger("omninav")
@@ -93,6 +94,7 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
         try:
             with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, planned.seed):
                 engine.begin()
+            _say_what_is_missing(run, engine.ticks)
             yield engine
             last = engine.finish()
         except BaseException:
@@ -111,6 +113,14 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)
     _finish(run, engine, prefix.reason)
+
+
+def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
+    """Say how many frames of an interrupted session came after the checkpoint that it goes on from."""
+    steps = run.manifest.pop(STEPS, 0)
+    if steps > ticks:
+        what = f"{steps - ticks:,} of {counted(steps, 'frame')}"
+        say_damaged(f"{run.folder}: the last {what} were not kept; omninav.resume takes them again")
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:

@@ -20,7 +20,7 @@ from .artifacts import ProgressDisplay
 from .execution import execute
 from .metrics_files import MANIFEST, read_metrics
 from .plan import Plan, input_digests, plan
-from .run_folder import CONFIG, RunFolder
+from .run_folder import CONFIG, STEPS, RunFolder
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class Manifest:
     """Hashes of what the run reads, by node or artifact."""
     files: dict[str, str]
     """Hashes of a complete run's files."""
+    steps: int
+    """How many frames a session had when it was interrupted; 0 where it does not say."""
 
 
 def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFolder, Metrics]:
@@ -122,7 +124,7 @@ def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
         say_damaged(f"{damaged}; it is written again")
         run.manifest = dict(sealed["manifest"])
     known = {name: run.manifest[name] for name in Manifest.__dataclass_fields__ if name in run.manifest}
-    arguments, problems = convert_fields({"files": {}} | known, Manifest, MANIFEST)
+    arguments, problems = convert_fields({"files": {}, STEPS: 0} | known, Manifest, MANIFEST)
     if problems:
         raise BadInput(f"{folder}: {problems[0].where}: {problems[0].what}; start the run again")
     began = Manifest(**arguments)

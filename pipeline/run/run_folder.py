@@ -23,6 +23,8 @@ from .plan import Plan, input_digests
 from .provenance import git_commit
 
 CONFIG = "config.yaml"
+STEPS = "steps"
+"""Key of the manifest that says how many frames a session had when it was interrupted."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -4,6 +4,7 @@ import math
 import os
 import threading
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,6 @@ def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(r
             session.step(image=np.indices((210, 280, 3)).sum(0).astype(np.uint8))
         for frame in frames_of(recording, 0, 9):
             session.step(**frame)
-        session.save()
         session.__exit__(RuntimeError, RuntimeError("the program fails"), None)
     with omninav.resume(folder) as session:
         for frame in frames_of(recording, 9):
@@ -88,21 +88,51 @@ def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(r
     assert "its mirror's ring is the one in image 0" in pushed.manifest["warnings"][0]
 
 
-def test_an_interrupted_session_goes_on_from_where_it_was_saved(recording, camera, batch, tmp_path):
+@pytest.mark.parametrize("interruption", [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_a_session_whose_program_fails_goes_on_with_the_next_frame(recording, camera, batch, tmp_path, interruption):
     folder = tmp_path / "run"
     settings = {"map": batch.folder / "map.omap", "camera": camera, "checkpoint_s": 1e6}
     session = omninav.open("omniview_mcl", folder=folder, **settings)
     for frame in frames_of(recording, 0, 9):
         session.step(**frame)
-    session.save()
-    session.step(**next(frames_of(recording, 9)))
-    session.__exit__(RuntimeError, RuntimeError("the program fails"), None)
-    assert omninav.open_run(folder).status == "failed"
+    with suppress(KeyboardInterrupt):  # which it raises again with its folder
+        session.__exit__(interruption, interruption("the program fails"), None)
     with omninav.resume(folder) as session:
         assert session.steps == 9
         for frame in frames_of(recording, 9):
             session.step(**frame)
     assert same_files(batch, omninav.open_run(folder)) == []
+
+
+@pytest.mark.parametrize("failing", ["stage", "checkpoint"])
+def test_a_session_that_lost_frames_says_how_many_when_it_goes_on(
+    recording, camera, batch, tmp_path, capsys, monkeypatch, failing
+):
+    def fails(*_, **__):
+        raise ValueError("fails")
+
+    folder = tmp_path / "run"
+    settings = {"map": batch.folder / "map.omap", "camera": camera, "checkpoint_s": 1e6}
+    session = omninav.open("omniview_mcl", folder=folder, **settings)
+    for frame in frames_of(recording, 0, 9):
+        session.step(**frame)
+        if session.steps == 6:
+            session.save()
+    if failing == "stage":
+        monkeypatch.setattr(session._engine.calls["match"], "step", fails)
+        with pytest.raises(omninav.StageFailed):
+            session.step(**next(frames_of(recording, 9)))
+    else:
+        monkeypatch.setattr(session._engine, "save", fails)
+    session.__exit__(RuntimeError, RuntimeError("the program fails"), None)
+    capsys.readouterr()
+    with omninav.resume(folder) as session:
+        assert f"{folder}: the last 3 of 9 frames were not kept; omninav.resume takes" in capsys.readouterr().err
+        assert session.steps == 6
+        for frame in frames_of(recording, 6):
+            session.step(**frame)
+    assert same_files(batch, omninav.open_run(folder)) == []
+    assert "steps" not in omninav.open_run(folder).manifest
 
 
 def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, batch, tmp_path):
