@@ -111,7 +111,8 @@ class PushedSource(Source):
         the image before, or `odometry`: the robot's pose (x m, y m, heading rad) in the odometry's own frame, from
         which motion follows. `stamp`: nanoseconds; None: a tenth of a second after the image before. `truth`: the true
         pose in the map frame, for metrics only. `scan`: range readings, for variants that keep clear of obstacles.
-        `new_log`: the robot has been put elsewhere, or another drive begins: there is no motion from the image before.
+        `new_log`: the robot has been put elsewhere, or another drive begins: there is no motion from the image before,
+        and `stamp` may be earlier.
         """
         pixels = _pixels(image)
         if stamp is not None and (isinstance(stamp, bool) or not isinstance(stamp, int | np.integer)):
@@ -141,8 +142,11 @@ class PushedSource(Source):
         image, stamp, rows, scan, new_log = frame
         stamp = position.stamp + INTERVAL_NS if stamp is None else stamp
         first = position.ticks == 0 or new_log
-        if position.ticks and stamp <= position.stamp:
-            raise BadInput(f"step: stamp={stamp} is not after that of the image before ({position.stamp})")
+        if not first and stamp <= position.stamp:
+            raise BadInput(
+                f"step: stamp={stamp} is not after that of the image before ({position.stamp}); leave this frame out, "
+                "or start a new log with new_log=True"
+            )
         camera = self._camera(image.pixels)
         if not camera.complete:
             camera = self._completed(ctx, camera, image.pixels, position, new_log)

@@ -68,6 +68,18 @@ def test_a_map_that_is_learned_on_the_way_is_the_same_too(recording, camera, sha
     assert same_files(whole, session.close()) == []
 
 
+def test_a_log_that_was_recorded_before_the_last_is_the_same_pushed(recording, camera, batch, shared_cache, tmp_path):
+    settings, tour = {"map": batch.folder / "map.omap", "cache": shared_cache}, open_recording(str(TOUR))
+    assert tour.stamps[0] < recording.stamps[-1]
+    logs = [str(DRIVE), str(TOUR)]
+    whole = omninav.run("omniview_mcl", log=logs, folder=tmp_path / "batch", progress=False, **settings)
+    with omninav.open("omniview_mcl", camera=camera, folder=tmp_path / "run", **settings) as session:
+        for log in (recording, tour):
+            for k, frame in enumerate(frames_of(log)):
+                session.step(**frame, new_log=k == 0)
+    assert same_files(whole, omninav.open_run(tmp_path / "run")) == []
+
+
 def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(recording, shared_cache, tmp_path):
     whole = omninav.run(
         "omniview_cml", log=DRIVE, camera="donut", cache=shared_cache, folder=tmp_path / "batch", progress=False
