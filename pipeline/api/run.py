@@ -32,13 +32,24 @@ class Figures(dict[str, Any]):
 
     def __missing__(self, path: str) -> Any:
         inside: Any = dict(self)
-        for name in path.split("."):
+        for name in str(path).split("."):
             if not isinstance(inside, dict) or name not in inside:
                 raise KeyError(
                     f"no figure '{path}'; {suggest(name, inside if isinstance(inside, dict) else (), 'figures')}"
                 )
             inside = inside[name]
         return inside
+
+    def __contains__(self, path: object) -> bool:
+        nothing = object()
+        return self.get(path, nothing) is not nothing
+
+    def get(self, path: Any, default: Any = None) -> Any:
+        """The figure at a path, as `figures[path]` gives it; `default` where there is none."""
+        try:
+            return self[path]
+        except KeyError:
+            return default
 
 
 class Run:

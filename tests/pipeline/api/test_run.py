@@ -19,6 +19,10 @@ def test_a_run_gives_what_its_files_hold(run):
     assert run.status == "complete"
     assert run.metrics == json.loads((run.folder / "metrics.json").read_text())
     assert run.metrics["position_error_m.median"] == run.metrics["position_error_m"]["median"]
+    assert run.metrics.get("position_error_m.median") == run.metrics["position_error_m.median"]
+    assert "position_error_m.median" in run.metrics
+    assert not any(path in run.metrics for path in ("position_error_m.medan", "frames.median", 3))
+    assert (run.metrics.get("position_error_m.medan"), run.metrics.get("medan", 0)) == (None, 0)
     assert run.metrics["frames"] == len(run.frames) == len(run.trajectory)
     assert list(run.trajectory.columns)[:2] == ["stamp_ns", "estimate_x"]
     assert run.report.read_text().startswith("<!doctype html>")
