@@ -1,5 +1,6 @@
 """The source of a program's own loop: one tick for every image that is pushed."""
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -126,6 +127,10 @@ class PushedSource(Source):
         scan = _sound_scan(scan)
         rows = {"motion": motion, "odometry": odometry, "truth": truth}
         found = {name: None if row is None else _row(name, row) for name, row in rows.items()}
+        if motion is not None and odometry is not None:
+            raise BadInput(
+                "step: motion=… and odometry=… are both given, and one follows from the other; leave one out"
+            )
         self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, bool(new_log))
 
     def step(
@@ -228,6 +233,7 @@ def _pixels(image: Pixels | bytes) -> Pixels:
     if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
         kind = f"{image.dtype}{image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
         raise BadInput(f"step: image is {kind}, expected uint8 of (rows, columns, 3), or the bytes of an image file")
+    _refuse_masked("image", image)
     if image.ndim < 2 or not image.size:
         raise BadInput(f"step: image has the shape {image.shape}, expected (rows, columns, 3)")
     if image.shape[0] * image.shape[1] > MAX_PIXELS:
@@ -248,14 +254,24 @@ def _sound_scan(scan: Scan | None) -> Scan | None:
     wrong = wrong_output(scan, Scan, optional=False)
     if wrong is not None:
         raise BadInput(f"step: scan {wrong}")
+    _refuse_masked("scan", scan.ranges)
     return replace(scan, ranges=np.array(scan.ranges))
+
+
+def _refuse_masked(name: str, given: object) -> None:
+    """Refuse an array with values that its owner has masked: they are not known, and would be taken as they stand."""
+    if np.ma.is_masked(given):
+        raise BadInput(f"step: {name} has masked values, expected an array without a mask; fill them, or leave it out")
 
 
 def _row(name: str, given: Sequence[float]) -> Row:
     row = np.empty(0)
+    _refuse_masked(name, given)
     with suppress(TypeError, ValueError, OverflowError, LookupError):  # no three numbers; a large array is not copied
         if len(given) == 3 and np.ndim(given[0]) == 0 and not isinstance(given, str | bytes | Mapping):
-            row = np.array([float(number) for number in given])
+            row = np.array([math.nan if np.iscomplexobj(number) else float(number) for number in given])
     if row.shape != (3,) or not (np.abs(row) <= MAX_NUMBER).all():  # NaN too
-        raise BadInput(f"step: {name}={cut(given)}, expected three finite numbers (m, m, rad) within {MAX_NUMBER:g}")
+        raise BadInput(
+            f"step: {name}={cut(given)}, expected three finite numbers (m, m, rad), not complex, within {MAX_NUMBER:g}"
+        )
     return row

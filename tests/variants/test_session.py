@@ -149,6 +149,7 @@ def test_a_session_that_lost_frames_says_how_many_when_it_goes_on(
 
 def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, batch, tmp_path):
     first, second = frames_of(recording, 0, 2)
+    masked = np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False])
     with omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run") as session:
         session.step(**first)
         for wrong, what in (
@@ -162,7 +163,16 @@ def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, bat
             ({**second, "stamp": 10**9 << 31}, "expected nanoseconds since 1970"),
             ({**second, "motion": (1, 2)}, "expected three finite numbers"),
             ({**second, "motion": (1e300, 0, 0)}, "expected three finite numbers"),
-            ({**second, "motion": (1e4, 0, 0)}, "10000 m since the image before"),
+            ({**second, "odometry": None, "motion": (1e4, 0, 0)}, "10000 m since the image before"),
+            ({**second, "motion": (0.0, 0.0, 0.0)}, "motion=… and odometry=… are both given"),
+            (
+                {**second, "odometry": np.array([1 + 2j, 0, 0])},
+                "expected three finite numbers .*, not complex",
+            ),
+            ({**second, "odometry": [np.complex64(1), 0, 0]}, "not complex"),
+            ({**second, "odometry": masked}, "odometry has masked values, expected an array without a mask"),
+            ({**second, "image": np.ma.masked_greater(second["image"], 100)}, "image has masked values"),
+            ({**second, "scan": Scan(masked, 0.0, 0.1, 0.0, 1.0)}, "scan has masked values"),
             ({**second, "motion": (math.nan, 0, 0)}, "expected three finite numbers"),
             ({**second, "motion": (number for number in range(3))}, "expected three finite numbers"),
             ({**second, "motion": {0: 1, 1: 2, 2: 3}}, "expected three finite numbers"),
