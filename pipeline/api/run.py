@@ -1,6 +1,7 @@
 """Runs: started, and opened when they have ended."""
 
 import os
+import shlex
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -62,6 +63,12 @@ class Run:
         self.folder = Path(os.path.realpath(folder))
         """Folder of its files."""
         if not (self.folder / MANIFEST).is_file():
+            jobs = [file.parent.name for file in self.folder.glob(f"*/{MANIFEST}")]
+            if (self.folder / "sweep.html").is_file() and jobs:
+                job = Path(folder) / min(jobs, key=lambda job: (len(job), job))
+                raise BadInput(
+                    f"{folder}: a sweep, not a run folder; name a job of it, such as {shlex.quote(str(job))}"
+                )
             raise BadInput(f"{folder}: not a run folder (no {MANIFEST}); `ls runs` shows what there is")
 
     @property
@@ -135,7 +142,7 @@ class Run:
     def _file(self, name: str) -> Path:
         file = self.folder / name
         if not file.is_file():
-            hint = f"`omninav resume {self.folder}` goes on with a run that did not end"
+            hint = f"`omninav resume {shlex.quote(str(self.folder))}` goes on with a run that did not end"
             raise BadInput(f"{self.folder}: no {name} in it; {hint}")
         return file
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -91,7 +92,7 @@ def ended(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, A
         of_a_file = as_bad_input(failed.__cause__) if failed.__cause__ is not None else None
         code, error = (1, str(failed)) if of_a_file is None else (2, f"{of_a_file} ({failed})")
     except Interrupted as stopped:
-        code, error = 130, f"stopped; `omninav resume {shown(stopped.folder)}` goes on"
+        code, error = 130, f"stopped; `omninav resume {shlex.quote(shown(stopped.folder))}` goes on"
     except KeyboardInterrupt:
         code, error = 130, "stopped; the same command goes on" if of_experiment else "stopped before it had begun"
     except BrokenPipeError:

@@ -1,5 +1,6 @@
 """Tables and results on a terminal, and folders as one would type them."""
 
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,7 +39,7 @@ def show_results(folder: Path, metrics: Metrics, manifest: Mapping[str, Any]) ->
     show(key_table(metrics, read_timing(folder)))
     for sentence in grouped(warning_lines(manifest)):
         print(f"warning: {sentence}", file=sys.stderr, flush=True)
-    print(f"all figures: omninav report {shown(folder)}")
+    print(f"all figures: omninav report {shlex.quote(shown(folder))}")
     show_report(folder)
 
 

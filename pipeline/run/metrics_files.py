@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shlex
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -61,4 +62,6 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _damaged(file: Path) -> BadInput:
-    return BadInput(f"{file} is damaged or was changed; `omninav resume {file.parent}` makes the run again")
+    return BadInput(
+        f"{file} is damaged or was changed; `omninav resume {shlex.quote(str(file.parent))}` makes the run again"
+    )

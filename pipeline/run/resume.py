@@ -104,7 +104,9 @@ def complete_run(folder: Path) -> tuple[RunFolder, str]:
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
     began, config = _beginning(run, folder)
     if began.status != "complete":
-        raise BadInput(f"{folder}: the run is {began.status:.40}; `omninav resume {folder}` goes on with it")
+        raise BadInput(
+            f"{folder}: the run is {began.status:.40}; `omninav resume {shlex.quote(str(folder))}` goes on with it"
+        )
     return run, config
 
 

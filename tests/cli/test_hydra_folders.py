@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from omninav import BadInput, open_run
 from omninav.pipeline.files import locked
 
 VARIANT = """\
@@ -157,3 +158,16 @@ def test_values_with_spaces_are_whole_in_the_table_of_a_sweep_and_in_the_command
     assert [(job["cache"], job["variant"]) for job in jobs] == [("'a b/one'", "toy"), ("'a b/two'", "toy")]
     manifest = json.loads((tmp_path / "out" / "1" / "manifest.json").read_text())
     assert manifest["argv"] == ["omninav", "cache='a b/two'", "variant=toy"]
+
+
+def test_what_is_said_to_be_typed_is_quoted_for_the_shell(toy, omninav, tmp_path: Path):
+    ended = toy("--config-dir=mine", "hydra.run.dir='a b'", check=True)
+    assert "all figures: omninav report 'a b'\n" in ended.stdout
+    folder = tmp_path / "a b"
+    (folder / "report.html").unlink()
+    assert f"`omninav resume '{folder}'` goes on" in omninav("report", "a b").stderr
+    with pytest.raises(BadInput, match=f"`omninav resume '{folder}'` goes on"):
+        _ = open_run(folder).report
+    (folder / "metrics.json").write_text("{}")
+    with pytest.raises(BadInput, match=f"`omninav resume '{folder}'` makes"):
+        _ = open_run(folder).metrics

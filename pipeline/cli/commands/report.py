@@ -1,5 +1,6 @@
 """`omninav report`: a run's results, and where its report lies; with `plots=all` drawn again."""
 
+import shlex
 from pathlib import Path
 
 from omninav.pipeline.cli.jobs import show_sweep
@@ -32,7 +33,10 @@ def command(arguments: list[str]) -> int:
             raise BadInput(f"{folder}: there is no such folder; `ls runs` shows what there is")
         if not (folder / "manifest.json").is_file():
             raise BadInput(f"{folder}: there is no run in it; `ls runs` shows what there is")
-        raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
+        raise BadInput(
+            f"{folder}: no report.html in it; `omninav resume {shlex.quote(str(folder))}` goes on with a run that did "
+            "not end"
+        )
     show(results_table(read_metrics(folder)))
     print(f"report: {shown(folder / 'report.html')}")
     return 0

@@ -37,6 +37,12 @@ def test_a_sweep_is_opened_reported_and_compared_by_its_folder(sweep, capsys):
     assert "Position error" in capsys.readouterr().out
 
 
+def test_a_sweep_in_place_of_a_run_is_said_with_a_job_of_it(sweep, capsys):
+    assert main(["explain", str(sweep.folder)]) == 2
+    said = f"{sweep.folder}: a sweep, not a run folder; name a job of it, such as {sweep.folder}/0"
+    assert capsys.readouterr().err.splitlines()[-1] == said
+
+
 def test_what_is_no_sweep_is_said(tmp_path):
     with pytest.raises(omninav.BadInput, match="not a sweep's folder"):
         omninav.open_sweep(tmp_path)
