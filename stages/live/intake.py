@@ -234,6 +234,9 @@ class Intake:
 
     def _use(self, image: _Pending, camera: Camera | str) -> Taken | None:
         where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
+        if image.stamp == self.last_stamp:
+            self._drop("duplicate_frame", f"{where} has come before")
+            return None
         if not self._follows(image.stamp):
             self._drop("backward_stamp", f"{where} comes after one of {(self.last_stamp or 0) / 1e9:.3f} s")
             return None

@@ -40,6 +40,11 @@ DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
 """Metres by which a path counts as longer that leads closer than the radius to where it was found blocked."""
 RETRY_S, MAX_BLOCKED = 5.0, 20
 """Seconds from a blocked path to the next one, and how many are tried."""
+FAR_M = 5.0
+"""Largest distance of a point to drive to from the references, metres: nothing is known beyond."""
+NEAR_M, HOVER_S = 0.1, 10.0
+"""Distance of the estimate from a point, metres, and seconds of it after which the robot has arrived, though no
+landmarks say so."""
 SEARCH_S = 120.0
 """Seconds for which the robot may not know where it is, and wander, before it gives up."""
 
@@ -53,7 +58,8 @@ class RoadmapPlannerState(State):
     times, and from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
     None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
     planned. `leg`: its number, and `left`: metres to go when it began, inf before it does. `arrival`: metres from the
-    goal at which it docks; `unlike`: images in a row that did not look like it there. `asked`: goals before this one.
+    goal at which it docks; `unlike`: images in a row that did not look like it there. `near_since` (ns): since when the
+    estimate keeps to a point; None: it does not. `asked`: goals before this one.
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
@@ -72,6 +78,7 @@ class RoadmapPlannerState(State):
     docking: bool = False
     arrival: float = ARRIVAL_M
     unlike: int = 0
+    near_since: int | None = None
     asked: int = 0
     ended: Literal["", "arrived", "gave up"] = ""
     why: str = ""
@@ -121,6 +128,9 @@ class RoadmapPlanner(Stage):
         if point is not None:
             self._set_out(state, map, np.array([point.x, point.y, math.nan]))
             state.rivals, state.doubtful, state.asked = np.zeros((0, 3)), False, state.asked + 1
+            off = float(np.hypot(*(map.poses[:, :2] - state.goal[:2]).T).min())
+            if off > FAR_M:
+                state.ended, state.why = "gave up", f"the goal is {off:.0f} m from the nearest place of the map"
         elif not len(state.goal):
             poses, state.doubtful = goal_poses(self.goal, goal_fix, goal_features, map)
             self._set_out(state, map, poses[0])
@@ -137,6 +147,11 @@ class RoadmapPlanner(Stage):
         told = fix is not None and fix.probabilities[0] >= MIN_PROBABILITY
         at, known = fix.poses[0] if fix is not None and told else here, told or (state.doubtful and sure)
         away = math.dist(at[:2], state.goal[:2])
+        near = sure and math.isnan(state.goal[2]) and math.dist(here[:2], state.goal[:2]) <= NEAR_M
+        state.near_since = None if not near else tick.stamp if state.near_since is None else state.near_since
+        if state.near_since is not None and tick.stamp - state.near_since >= HOVER_S * 1e9:
+            state.ended = "arrived"
+            return _stopped(state)
         if status is None or status.state != "blocked":
             state.arrival = state.arrival if state.docking else ARRIVAL_M
         elif tick.stamp >= state.retry:
@@ -188,7 +203,7 @@ class RoadmapPlanner(Stage):
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra, state.places = goal, np.zeros(len(map)), np.zeros(0, np.int64)
         state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
-        state.lost_since, state.arrival, state.unlike = None, ARRIVAL_M, 0
+        state.lost_since, state.near_since, state.arrival, state.unlike = None, None, ARRIVAL_M, 0
         self._plan(state, map)
 
     def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:

@@ -152,7 +152,7 @@ def test_resume_runs_only_stages_that_are_listed_or_typed_again(
     from omninav.pipeline.graph.registry import UnknownStage, only_listed, resolve
 
     Path("evil_here.py").write_text(MARK + STAGE)
-    with only_listed(()), pytest.raises(BadInput, match="is not run unasked; if you trust it, name it behind the folder"):
+    with only_listed(()), pytest.raises(BadInput, match="is not run unasked; if you trust it, name it"):
         resolve(target)
     assert not Path("EXECUTED").exists()
     with only_listed(()):

@@ -113,6 +113,16 @@ def test_a_pose_and_a_goal_that_somebody_names_are_in_the_record_at_the_tick_tha
     assert [(out.goal.x, out.goal.y) for out in asked if out.goal] == [(3.0, -1.0)]
 
 
+def test_a_goal_in_a_frame_of_the_robot_is_refused(wire: Wire, tmp_path: Path):
+    messages = said()
+    goal = {"header": {"frame_id": "base_link"}, "pose": {"position": {"x": 1.0}, "orientation": {"w": 1.0}}}
+    half = len(messages) // 2
+    messages.insert(half, Arrival("/goal_pose", POSE_STAMPED, messages[half].received, encode(POSE_STAMPED, goal, 0)))
+    drive = driven(wire, tmp_path, messages)
+    assert not [out for out in drive.outs if out.goal]
+    assert drive.ctx.counts["bad_message"] == 1
+
+
 def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(wire: Wire, tmp_path: Path):
     messages = said()
     drive = Drive(tmp_path)

@@ -1,6 +1,7 @@
 """Driving to an image's place in a room of landmarks."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,14 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.planning.roadmap import MAX_BLOCKED, UNLIKE_IMAGES, RoadmapPlanner, RoadmapPlannerState, goal_poses
+from omninav.stages.planning.roadmap import (
+    HOVER_S,
+    MAX_BLOCKED,
+    UNLIKE_IMAGES,
+    RoadmapPlanner,
+    RoadmapPlannerState,
+    goal_poses,
+)
 from omninav.stages.sensor.landmark_pose import LandmarkPose
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GoalPoint
@@ -81,6 +89,25 @@ def test_only_landmarks_tell_that_it_has_arrived() -> None:
     drive = Drive(start=GOAL)
     assert not drive.step().progress.docking
     assert drive.step(fix=fix_at(GOAL)).route.state == "arrived"
+
+
+def test_a_robot_that_keeps_to_a_point_without_landmarks_has_arrived() -> None:
+    drive, point = Drive(start=GOAL), GoalPoint(GOAL[0] + 0.05, GOAL[1])
+    drive.step(point=point)
+    states = []
+    while drive.tick < 60:
+        drive.pose = np.array(GOAL)  # its way there is finer than its wheels
+        states.append(drive.step().route.state)
+    assert states.index("arrived") == round(HOVER_S / 0.2) - 1
+    assert "arrived" not in [Drive(start=WRONG).step(point=point).route.state for _ in range(60)]
+
+
+def test_a_point_far_from_the_map_is_no_goal() -> None:
+    drive = Drive()
+    out = drive.step(point=GoalPoint(5000.0, 2.0))
+    assert out.route.state == "gave up"
+    assert re.fullmatch(r"the goal is 49\d\d m from the nearest place of the map", out.route.why)
+    assert drive.step(point=GoalPoint(*GOAL[:2])).route.state == "under way"
 
 
 WRONG = (7.0, 3.2, -1.0)
