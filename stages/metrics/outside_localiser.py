@@ -117,7 +117,8 @@ class OutsideLocaliser(Stage):
             "lines": sum(bool(line.strip()) for line in lines) or None,
             "without_pose": float(np.isnan(poses[:, 0]).mean()),
         }
-        return self.Out(drive=drive, metrics=Metrics({"peer": values}, QUANTITIES))
+        missing = ("peer.without_pose",) if values["without_pose"] else ()
+        return self.Out(drive=drive, metrics=Metrics({"peer": values}, QUANTITIES, missing))
 
     def _words(self) -> list[str]:
         try:
