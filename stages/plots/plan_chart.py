@@ -9,6 +9,7 @@ from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import OWN_FRAMES
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -31,7 +32,12 @@ def plan_chart(extent: Extent | None, height: tuple[float, float] = (190.0, 520.
 
 
 def draw_surroundings(chart: Chart, map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None) -> None:
-    """Draws what stands on the floor, by the grid or else the plan, and the map's references or places over it."""
+    """Draws what stands on the floor, by the grid or else the plan, and the map's references or places over it.
+
+    A grid or plan in another frame than a map of odometry is left out.
+    """
+    if isinstance(map, ReferenceGraph) and map.pose_source in OWN_FRAMES:
+        grid, plan = grid if grid is not None and grid.made_from == "tour" else None, None
     if grid is not None:
         chart.base.raster(tinted(np.where(grid.cells[::-1] == OCCUPIED, 190, 0).astype(np.uint8)), grid_extent(grid))
         chart.name("occupied", "grey", "square")

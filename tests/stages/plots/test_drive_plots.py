@@ -92,6 +92,8 @@ def test_a_trajectory_stands_over_what_stands_on_the_floor():
     assert b"<image" not in bare.content
     assert b"obstacles" in furnished.content
     assert b"<image" in furnished.content
+    of_odometry = dataclasses.replace(run.map, pose_source="odometry")  # in a frame of its own
+    assert b"obstacles" not in TrajectoryOverMap().step(CTX, run.drive, of_odometry, plan=plan).figure.content
 
 
 def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
