@@ -93,7 +93,8 @@ class OdometryBuffer:
         if role in ("goal", "initial_pose") and (frame := message.header.frame_id.lstrip("/")) in self._robots_frames:
             raise ValueError(f"its frame is '{frame}', expected the map's; in RViz choose it as the fixed frame")
         if role == "odometry" and self.odometry is not None:
-            self._robots_frames |= {message.header.frame_id, message.child_frame_id} - {"map"}
+            own = {name.lstrip("/") for name in (message.header.frame_id, message.child_frame_id)}
+            self._robots_frames |= own - {"", "map"}
             return self.odometry.add(stamp, pose_of(message), item)
         if role == "truth" and self.truth is not None:
             return self.truth.add(stamp, pose_of(message), item)
