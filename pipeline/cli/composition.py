@@ -295,8 +295,8 @@ def settings_read(config: Any) -> set[str]:
 
 def _taken_over(config: Any) -> set[str]:
     """The blocks of settings that an artifact's `set` is."""
-    specs: Any = OmegaConf.to_container(config, resolve=False)
-    given = (str((spec or {}).get("set")) for spec in (specs["artifacts"] or {}).values())
+    specs: Any = OmegaConf.to_container(config.artifacts, resolve=False) if config.artifacts else {}
+    given = (str((spec or {}).get("set")) for spec in specs.values())
     return {link[1] for link in map(LINK.fullmatch, given) if link}
 
 

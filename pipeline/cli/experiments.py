@@ -40,7 +40,7 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     run = planned_experiment(config, arguments)
     well = run.run()
     for problem in unmeasured(run.experiment, results_by_condition(run.conditions)):
-        print(f"{problem}", file=sys.stderr)
+        print(problem, file=sys.stderr)
     verdicts = run.verdicts()
     if verdicts:
         show(verdict_table(run.experiment, verdicts))

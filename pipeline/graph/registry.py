@@ -214,7 +214,7 @@ def plugins() -> list[Entry]:
 def _plugin(name: str, target: str, origin: str) -> Entry:
     """The row of a plugin, with a problem where omninav has a file of its name, which would be taken in its place."""
     role, _, own = name.partition(".")
-    taken = own.isidentifier() and is_role(role) and importlib.util.find_spec(f"{BUILT_IN}.{role}.{own}") is not None
+    taken = _own_module(role, own) is not None
     problem = f"'{name}' is of omninav itself; give the {origin} one another name" if taken else ""
     return Entry(name, target, origin, problem=problem)
 
@@ -267,11 +267,16 @@ def of_role(role: str) -> Iterator[Entry]:
 
 def built_in_stage(role: str, name: str) -> Entry | None:
     """The stage `role.name` of omninav itself; None where the file does not exist or holds none, or several."""
-    module = f"{BUILT_IN}.{role}.{name}"
-    if not name.isidentifier() or not is_role(role) or importlib.util.find_spec(module) is None:
-        return None
-    found = list(_entries_of(module))
+    module = _own_module(role, name)
+    found = [] if module is None else list(_entries_of(module))
     return found[0] if len(found) == 1 else None
+
+
+def _own_module(role: str, name: str) -> str | None:
+    """The module of omninav itself for `role.name`; None where there is none."""
+    module = f"{BUILT_IN}.{role}.{name}"
+    there = name.isidentifier() and is_role(role) and importlib.util.find_spec(module) is not None
+    return module if there else None
 
 
 def _entries_of(module_name: str) -> Iterator[Entry]:

@@ -37,7 +37,7 @@ class Manifest:
     files: dict[str, str]
     """Hashes of a complete run's files."""
     steps: int
-    """How many frames a session had when it was interrupted; 0 where it does not say."""
+    """Number of frames that a session had when it was interrupted; 0: not stated."""
 
 
 def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFolder, Metrics]:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between, compose
 
 from .relative_errors import align
@@ -29,16 +30,11 @@ def in_map_frame(truth: Array, estimate: Array) -> Array:
     motions = compose(believed[rows], between(there[rows], origin))
     best, least = motions[0], np.inf
     for motion in motions:
-        distance = float(np.median(_distances(compose(motion, there), believed)))
+        distance = float(np.median(position_errors(compose(motion, there), believed)))
         if distance < least:
             best, least = motion, distance
-    near = _distances(compose(best, there), believed) <= FITS * least
+    near = position_errors(compose(best, there), believed) <= FITS * least
     if near.sum() > 1 and np.ptp(there[near, :2], axis=0).max() > 0.0:
         rotation, shift = align(there[near, :2], believed[near, :2])
         best = np.array([*shift, np.arctan2(rotation[1, 0], rotation[0, 0])])
     return compose(best, truth)
-
-
-def _distances(poses: Array, others: Array) -> Array:
-    distances: Array = np.hypot(*(poses[:, :2] - others[:, :2]).T)
-    return distances
