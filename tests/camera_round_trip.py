@@ -1,4 +1,4 @@
-"""What holds for every camera model: a pixel that is shown looks along the ray that it was projected from."""
+"""Checks of a camera model: a pixel that is shown looks along the ray that it was projected from."""
 
 import numpy as np
 import pytest

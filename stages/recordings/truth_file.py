@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,7 +49,7 @@ LIKE_HEADING = re.compile(r"heading|hdg|yaw|theta|(?<![a-z])psi(?![a-z])|azimuth
 NO_HEADING = re.compile(r"rate|vel|speed|acc|std|sigma|var|cov|err|dot")
 """Names of columns that may hold a heading, and those among them that hold its speed or its error."""
 UNITS = {"time": TIMES, "x": LENGTHS, "y": LENGTHS, "heading": ANGLES}
-DEFAULT_UNITS = {"time": "s", "x": "m", "y": "m"}
+DEFAULT_UNITS: dict[str, Any] = {"time": "s", "x": "m", "y": "m"}
 MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
 """Tilt that no robot on a floor or a hillside has (degrees), and the share of a file's orientations that may have it.
 With w first, headings become tilts, so that a drive in all directions has it in half of them."""
@@ -181,7 +181,7 @@ def _csv(file: Path) -> Rows:
     return _poses(table, found, units, "a column of times in other units is called time_ns, time_us or time_ms")
 
 
-def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, str]]:
+def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, Any]]:
     """Columns by their meaning, and the units that their names state. Raises `UnreadableRecording` for others."""
     found: dict[str, int] = {}
     units = dict(DEFAULT_UNITS)
@@ -208,17 +208,17 @@ def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, str]]:
     return found, units
 
 
-def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str], cure: str) -> Rows:
+def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, Any], cure: str) -> Rows:
     """The poses in a table. `cure`: advice where times are too large to be in their unit."""
     try:
-        times = table.nanoseconds(Time(columns["time"], units["time"]))  # type: ignore[arg-type]
+        times = table.nanoseconds(Time(columns["time"], units["time"]))
     except OutOfProportion as error:
         raise UnreadableRecording(f"{error}; {cure}") from None
-    x, y = (table.numbers(Length(columns[axis], units[axis])) for axis in ("x", "y"))  # type: ignore[arg-type]
+    x, y = (table.numbers(Length(columns[axis], units[axis])) for axis in ("x", "y"))
     heading, impossible = np.full(len(x), np.nan), 0
     doubts: list[str] = []
     if "heading" in columns:
-        heading = table.numbers(Angle(columns["heading"], units.get("heading", "rad")))  # type: ignore[arg-type]
+        heading = table.numbers(Angle(columns["heading"], units.get("heading", "rad")))
         most = float(np.abs(heading).max(where=np.isfinite(heading), initial=0.0))
         if "heading" not in units and most > 2 * math.pi:
             name = table.names[columns["heading"]]
