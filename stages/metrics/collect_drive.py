@@ -56,7 +56,7 @@ class CollectDrive(Stage):
     ) -> Out:
         """The whole run at once. Each sequence is read once, in order.
 
-        True poses are moved into the frame of a map whose own poses are not true ones (`in_map_frame`), with a warning.
+        It aligns true poses with a map whose own poses are not true ones (`in_map_frame`), with a warning.
         """
         absent = [None] * len(ticks)
         looked: list[Sequence[Any]] = [
@@ -92,6 +92,6 @@ class CollectDrive(Stage):
             columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
             ctx.warn(
                 f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own: the true poses "
-                "were moved into it as one, to fit most estimates; errors are those that remain"
+                "were aligned with the estimates by one rigid motion, and errors are those after alignment"
             )
         return self.Out(drive=Drive(**columns, conflicts=tuple(conflicts)))

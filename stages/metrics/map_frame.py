@@ -15,11 +15,11 @@ FITS = 2.0
 
 
 def in_map_frame(truth: Array, estimate: Array) -> Array:
-    """True poses (N, 3), moved as one so that they lie closest to most estimates (N, 3) in a map's frame.
+    """Aligns true poses (N, 3) with the estimates (N, 3) in a map's frame by one rigid motion, robustly.
 
-    Each estimate in turn is taken as right; of those motions the one with the least median distance is fitted to the
-    estimates that it brings near, by least squares. So a robot that is lost for less than half of the time moves
-    nothing. Rows of NaN are passed over.
+    Each estimate in turn proposes the motion for which it is exact. The one with the least median distance is refined
+    by least squares over the estimates near it (inliers), so that a robot that is lost for less than half of the time
+    does not change it. Rows of NaN stay NaN.
     """
     known = np.isfinite(truth[:, 0]) & np.isfinite(estimate[:, 0])
     if not known.any():
