@@ -18,6 +18,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 QUANTITIES = {
     "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),
+    "navigation.goals_reached_rate": Quantity(title="Goals reached, of all", better="higher", least=1.0),
     "navigation.collision_free_rate": Quantity(title="Goal reached without a collision", better="higher"),
     "navigation.collisions": Quantity(title="Collisions", better="lower", most=0.0),
     "navigation.end_error_m": Quantity(title="Distance to the goal at the end", better="lower"),
@@ -30,13 +31,23 @@ QUANTITIES = {
     "navigation.lost_m_per_km": Quantity(title="Metres driven while lost, per kilometre", better="lower"),
     "navigation.routes": Quantity(title="Routes planned", better="lower"),
     "navigation.goal": Quantity(setting=True),
+    "navigation.goals": Quantity(setting=True),
     "navigation.state": Quantity(title="Route at the end"),
     "navigation.reason": Quantity(title="Why it gave up"),
     "navigation.reached": Quantity(setting=True),
 }
 HEADLINES = tuple(
     f"navigation.{name}"
-    for name in ("reached_rate", "end_error_m", "collisions", "time_s", "path_length_ratio", "routes", "reason")
+    for name in (
+        "goals_reached_rate",
+        "reached_rate",
+        "end_error_m",
+        "collisions",
+        "time_s",
+        "path_length_ratio",
+        "routes",
+        "reason",
+    )
 )
 ENDS = ("arrived", "gave up")
 """States of a route after which the robot does not drive on."""
@@ -45,8 +56,9 @@ WITHIN_M = 0.5
 
 
 class Navigation(MetricStage):
-    """Measures how a drive to a goal ended: the entry `navigation` of metrics.json. Of several goals it is the last.
+    """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
 
+    Of several goals it is the last; `goals` is their number then, and `goals_reached_rate` the share that was reached.
     `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken, or to
     the point that is its goal; `end_error_m`: how far from there it ended. `collisions`, in a simulated world;
     `path_length_m`: driven, on a robot by its odometry; `shortest_m`: from where it began along the images of the map,
@@ -114,6 +126,13 @@ class Navigation(MetricStage):
                 found["path_length_ratio"] = driven / shortest
         if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
             found["lost_m_per_km"] = lost_metres(drive)
+        earlier = self.step(ctx, drive.at(slice(begun)), routes[:begun], map).metrics if begun else None
+        if earlier is not None:
+            figures = earlier.values["navigation"]
+            found["goals"] = figures.get("goals", 1) + 1
+            if "reached_rate" in found and "reached_rate" in figures:
+                reached_before = figures.get("goals_reached_rate", figures["reached_rate"]) * (found["goals"] - 1)
+                found["goals_reached_rate"] = (reached_before + found["reached_rate"]) / found["goals"]
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
 
 

@@ -111,7 +111,7 @@ class OutsideLocaliser(Stage):
         lines = [line for content in contents if b"\0" not in content for line in content.splitlines()]
         values = {
             "image_cpu_ms": float(np.median(images_ms)) if len(images_ms) else None,
-            "map_cpu_s": None if used is None or not len(images_ms) else used - float(images_ms.sum()) / 1e3,
+            "map_cpu_s": None if used is None or not len(images_ms) else max(0.0, used - images_ms.sum() / 1e3),
             "cpu_s": used,
             "kept_mb": size / 1e6,
             "lines": sum(bool(line.strip()) for line in lines) or None,

@@ -168,3 +168,14 @@ def test_after_a_new_goal_on_the_way_all_figures_are_of_that_one():
     found = ended(spots, ways, collisions=[0, 1, 1, 1], driven=[0.0, 3.0, 3.0, 7.5])
     assert (found["goal"], found["routes"], found["time_s"], found["collisions"]) == (2, 1, 1.0, 0)
     assert (found["shortest_m"], found["path_length_m"]) == pytest.approx((4.0, 4.5))
+    assert (found["goals"], found["goals_reached_rate"]) == (2, 1.0)
+
+
+def test_of_three_goals_the_share_that_was_reached_is_told_beside_the_last():
+    spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 0.0), (3.0, 2.0), (3.0, 2.0), (3.0, 0.0)]
+    to_corner, on = np.array([0, 1]), np.array([1, 2])
+    ways = [PlannedRoute(to_corner, state, 0) for state in ("under way", "arrived")]
+    ways += [PlannedRoute(on, "under way", 1), PlannedRoute(on, "gave up", 1, "tired")]
+    ways += [PlannedRoute(on[::-1], state, 2) for state in ("under way", "arrived")]
+    found = ended(spots, ways)
+    assert (found["goals"], found["reached_rate"], found["goals_reached_rate"]) == (3, 1.0, pytest.approx(2 / 3))
