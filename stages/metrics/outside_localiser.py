@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -128,6 +129,11 @@ class OutsideLocaliser(Stage):
         if not words:
             raise BadInput('command: no program; type command="python my_localiser.py"')
         refuse_untyped(self.command or "")
+        script = words[1] if words[0].startswith("python") and words[1:] and words[1].endswith(".py") else ""
+        if shutil.which(words[0], path=_path()) is None:
+            raise BadInput(f"command: {cut(words[0])} is no program that can be run; name one, or its path")
+        if script and not os.path.isfile(script):
+            raise BadInput(f"command: there is no file {cut(script)}")
         return words
 
     def _files(self) -> list[Path]:
@@ -148,7 +154,7 @@ class OutsideLocaliser(Stage):
 
 def wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
     """Run a program until it ends, or this process does, even killed: then nothing of it goes on."""
-    own = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])}
+    own = os.environ | {"PATH": _path()}
     own.pop("PYTHONSAFEPATH", None)  # which a command of ours sets for processes of ours
     process = subprocess.Popen(
         [sys.executable, "-I", "-S", "-c", SUPERVISOR, *words, str(folder)],
@@ -167,6 +173,10 @@ def wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
         assert process.stdin is not None
         process.stdin.close()
         process.wait()
+
+
+def _path() -> str:
+    return os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
 
 
 def _children_s() -> float | None:
