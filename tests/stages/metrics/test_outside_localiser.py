@@ -55,7 +55,8 @@ def test_its_poses_are_the_estimates_and_an_image_without_one_has_none(tmp_path:
     found = out.metrics.values["peer"]
     assert (found["without_pose"], found["kept_mb"], found["image_cpu_ms"]) == (0.25, 0.003, 12.0)
     assert found["lines"] == len([line for line in ECHO.splitlines() if line])
-    assert found["cpu_s"] == pytest.approx(found["map_cpu_s"] + 0.074)  # 10, 11, 40 and 13 ms
+    stated_s = 0.074  # 10, 11, 40 and 13 ms
+    assert found["map_cpu_s"] == pytest.approx(max(0.0, found["cpu_s"] - stated_s))
 
 
 def test_a_tum_file_will_do_and_an_empty_one_says_that_no_image_has_a_pose(tmp_path: Path):
