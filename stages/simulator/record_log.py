@@ -61,4 +61,8 @@ def record_log(
         ctx.fact(name, value)
     if collisions:
         print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
+    for drive in drives:
+        if drive.late:
+            ends = f"after {drive.times[-1] / 1e9 - drive.times[0] / 1e9:.1f} s, the robot is not carried at"
+            ctx.warn(f"{path}: day {drive.day} ends {ends} {', '.join(f'{late.at:g}' for late in drive.late)} s")
     print(f"{path}: {counted(images, 'image')}; beside it {camera.name}, {floor.name} and {grid}")

@@ -1,5 +1,6 @@
 """`omninav WORD WORD …`: run a tool, which writes files and leaves no run."""
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,6 +40,8 @@ def run_tool(name: str, words: Sequence[str]) -> None:
             if isinstance(error, BadInput) or as_bad_input(error) is not None:
                 raise
             raise StageFailed(f"omninav {name}: {type(error).__name__}: {error}") from error
+        for sentence in ctx.warnings:
+            print(f"warning: {sentence}", file=sys.stderr)
 
 
 def tool_from(cls: type[Tool], words: Sequence[str]) -> Tool:

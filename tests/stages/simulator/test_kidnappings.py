@@ -239,3 +239,9 @@ def test_what_a_written_log_states_does_not_count_the_metres_it_was_carried(tmp_
         "people": [EXACT.day(0).people, EXACT.day(1).people],
         "collisions": sum(drive.collisions for drive in drives),
     }
+
+
+def test_a_kidnapping_after_the_end_of_the_drive_is_told(tmp_path: Path):
+    said = Context("simulate")
+    record_log(tmp_path / "out.mcap", EXACT, "there", 1, (*KIDNAPPED, Kidnapping(at=600.0, turn=1.0)), said)
+    assert [warning.rpartition(", ")[2] for warning in said.warnings] == ["the robot is not carried at 600 s"]
