@@ -18,7 +18,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 QUANTITIES = {
     "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),
-    "navigation.goals_reached_rate": Quantity(title="Goals reached, of all", better="higher", least=1.0),
+    "navigation.goals_reached_rate": Quantity(title="Share of the goals reached", better="higher", least=1.0),
     "navigation.collision_free_rate": Quantity(title="Goal reached without a collision", better="higher"),
     "navigation.collisions": Quantity(title="Collisions", better="lower", most=0.0),
     "navigation.end_error_m": Quantity(title="Distance to the goal at the end", better="lower"),
