@@ -1,6 +1,6 @@
 """Results of a graph that has run: metrics, figures, tables, counts and facts."""
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
 from omninav.pipeline.engine.engine import Engine
@@ -8,8 +8,9 @@ from omninav.pipeline.graph.results import Figure, Metrics, Table, merged
 
 
 def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
-    """Metrics merged into one, figures and tables."""
+    """Metrics merged into one, figures and tables. A stage that replaces another's figure is warned of."""
     metrics: list[Metrics] = []
+    stated: dict[str, str] = {}
     figures: list[Figure] = []
     tables: list[Table] = []
     for node in engine.graph.nodes.values():
@@ -17,11 +18,24 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
             for value in _flat(engine.last(f"{node.name}.{port}")):
                 if isinstance(value, Metrics):
                     metrics.append(value)
+                    for path in _paths(value.values):
+                        if stated.get(path, node.name) != node.name:
+                            other = f"{path} in metrics.json is its own, not that of {stated[path]}"
+                            engine.calls[node.name].ctx.warn(f"{node.name}: {other}; give it another name")
+                        stated[path] = node.name
                 elif isinstance(value, Figure):
                     figures.append(value)
                 elif isinstance(value, Table):
                     tables.append(value)
     return merged(metrics), figures, tables
+
+
+def _paths(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _paths(value, f"{before}{key}.")
+        else:
+            yield before + key
 
 
 def _flat(value: Any) -> Iterator[Any]:
