@@ -63,8 +63,8 @@ class Navigation(MetricStage):
     the point that is its goal; `end_error_m`: how far from there it ended. `collisions`, in a simulated world;
     `path_length_m`: driven, on a robot by its odometry; `shortest_m`: from where it began along the images of the map,
     the shortest path that it could have known; `time_s`: until it said that it has arrived or given up, else all of it.
-    `routes`: how many it planned;
-    `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
+    `routes`: how many it planned; `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1
+    or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Of a simulated robot that
     knows poses: `lost_m_per_km`, metres per kilometre driven with an estimate more than 0.5 m off, or none, on the way
@@ -79,61 +79,73 @@ class Navigation(MetricStage):
         routes: Sequence[PlannedRoute | None],
         map: TopologicalMap | ReferenceGraph,
     ) -> MetricStage.Out:
-        """The whole drive at once."""
-        begun = first_of_last_goal(routes)
-        planned = [route for route in routes[begun:] if route is not None]
-        spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]
-        if not planned or not len(spots):
+        """The whole drive at once, from its last goal back to its first."""
+        found, begun = _of_last_goal(drive, routes, map)
+        if found is None:
             return self.Out()
-        last, former = planned[-1], routes[begun - 1] if begun else None
-        ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
-        ended = next(ends, len(drive) - 1)
-        tallied = np.flatnonzero(np.isfinite(drive.distance))
-        before = tallied[tallied <= begun][-1:] if begun else tallied[:0]
-        collisions = None
-        driven = float(np.nansum(np.hypot(*drive.motion[begun + 1 if begun else 0 :, :2].T)))
-        if len(tallied):
-            collisions = int(drive.collisions[tallied[-1]] - drive.collisions[before].sum())
-            driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
-        goal = int(last.places[-1]) if len(last.places) else None
-        apart = shortest = None
-        if map.pose_source == "truth" and isinstance(map, ReferenceGraph) and last.goal is not None:
-            apart = math.dist(spots[-1], (last.goal.x, last.goal.y))
-            shortest = metres_of_first(map, spots[0], planned)
-        elif map.pose_source == "truth" and isinstance(map, TopologicalMap) and goal is not None:
-            apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
-            shortest = shortest_metres(map, spots[0], goal)
-        found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
-        found |= {
-            "end_error_m": apart,
-            "path_length_m": driven,
-            "shortest_m": shortest,
-            "time_s": float(drive.seconds[ended] - (drive.seconds[begun] if begun else 0.0)),
-            "routes": last.number - (former.number if former else -1),
-            "goal": goal,
-            "state": last.state,
-            "reason": last.why,
-        }
-        if map.pose_source == "truth":
-            reached = last.state == "arrived" and apart is not None and apart <= WITHIN_M
-            found |= {"reached": reached, "reached_rate": float(reached)}
-            if collisions is not None:
-                found["collision_free_rate"] = float(reached and collisions == 0)
-            if reached:
-                found["reached_error_m"] = apart
-            if reached and shortest:
-                found["time_per_metre_s"] = found["time_s"] / shortest
-                found["path_length_ratio"] = driven / shortest
-        if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
-            found["lost_m_per_km"] = lost_metres(drive)
-        earlier = self.step(ctx, drive.at(slice(begun)), routes[:begun], map).metrics if begun else None
-        if earlier is not None:
-            figures = earlier.values["navigation"]
-            found["goals"] = figures.get("goals", 1) + 1
-            if "reached_rate" in found and "reached_rate" in figures:
-                reached_before = figures.get("goals_reached_rate", figures["reached_rate"]) * (found["goals"] - 1)
-                found["goals_reached_rate"] = (reached_before + found["reached_rate"]) / found["goals"]
+        reached = [found.get("reached_rate")]
+        while begun:
+            earlier, begun = _of_last_goal(drive.at(slice(begun)), routes[:begun], map)
+            reached.append((earlier or {}).get("reached_rate"))
+        told = [rate for rate in reached if rate is not None]
+        if len(reached) > 1:
+            found["goals"] = len(reached)
+        if len(reached) > 1 and told:
+            found["goals_reached_rate"] = sum(told) / len(told)
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
+
+
+def _of_last_goal(
+    drive: Drive, routes: Sequence[PlannedRoute | None], map: TopologicalMap | ReferenceGraph
+) -> tuple[dict[str, Any] | None, int]:
+    """Figures of the last goal, None where there are none, and the tick from which on all routes lead to it."""
+    begun = first_of_last_goal(routes)
+    planned = [route for route in routes[begun:] if route is not None]
+    spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]
+    if not planned or not len(spots):
+        return None, 0
+    last, former = planned[-1], routes[begun - 1] if begun else None
+    ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
+    ended = next(ends, len(drive) - 1)
+    tallied = np.flatnonzero(np.isfinite(drive.distance))
+    before = tallied[tallied <= begun][-1:] if begun else tallied[:0]
+    collisions = None
+    driven = float(np.nansum(np.hypot(*drive.motion[begun + 1 if begun else 0 :, :2].T)))
+    if len(tallied):
+        collisions = int(drive.collisions[tallied[-1]] - drive.collisions[before].sum())
+        driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
+    goal = int(last.places[-1]) if len(last.places) else None
+    apart = shortest = None
+    if map.pose_source == "truth" and isinstance(map, ReferenceGraph) and last.goal is not None:
+        apart = math.dist(spots[-1], (last.goal.x, last.goal.y))
+        shortest = metres_of_first(map, spots[0], planned)
+    elif map.pose_source == "truth" and isinstance(map, TopologicalMap) and goal is not None:
+        apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
+        shortest = shortest_metres(map, spots[0], goal)
+    found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
+    found |= {
+        "end_error_m": apart,
+        "path_length_m": driven,
+        "shortest_m": shortest,
+        "time_s": float(drive.seconds[ended] - (drive.seconds[begun] if begun else 0.0)),
+        "routes": last.number - (former.number if former else -1),
+        "goal": goal,
+        "state": last.state,
+        "reason": last.why,
+    }
+    if map.pose_source == "truth":
+        reached = last.state == "arrived" and apart is not None and apart <= WITHIN_M
+        found |= {"reached": reached, "reached_rate": float(reached)}
+        if collisions is not None:
+            found["collision_free_rate"] = float(reached and collisions == 0)
+        if reached:
+            found["reached_error_m"] = apart
+        if reached and shortest:
+            found["time_per_metre_s"] = found["time_s"] / shortest
+            found["path_length_ratio"] = driven / shortest
+    if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
+        found["lost_m_per_km"] = lost_metres(drive)
+    return found, begun
 
 
 def lost_metres(drive: Drive) -> float | None:
