@@ -8,9 +8,9 @@ from omninav.pipeline.graph.results import Figure, Metrics, Table, merged
 
 
 def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
-    """Metrics merged into one, figures and tables. A stage that replaces another's figure is warned of."""
+    """Metrics merged into one, figures and tables. A stage that changes another's figure is warned of."""
     metrics: list[Metrics] = []
-    stated: dict[str, str] = {}
+    stated: dict[str, tuple[str, Any]] = {}
     figures: list[Figure] = []
     tables: list[Table] = []
     for node in engine.graph.nodes.values():
@@ -18,11 +18,11 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
             for value in _flat(engine.last(f"{node.name}.{port}")):
                 if isinstance(value, Metrics):
                     metrics.append(value)
-                    for path in _paths(value.values):
-                        if stated.get(path, node.name) != node.name:
-                            other = f"{path} in metrics.json is its own, not that of {stated[path]}"
-                            engine.calls[node.name].ctx.warn(f"{node.name}: {other}; give it another name")
-                        stated[path] = node.name
+                    for path, figure in _leaves(merged([value]).values):
+                        other, others = stated.setdefault(path, (node.name, figure))
+                        if figure != others:
+                            what = f"{path} in metrics.json is its own, not that of {other}"
+                            engine.calls[node.name].ctx.warn(f"{node.name}: {what}; give it another name")
                 elif isinstance(value, Figure):
                     figures.append(value)
                 elif isinstance(value, Table):
@@ -30,12 +30,12 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
     return merged(metrics), figures, tables
 
 
-def _paths(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
+def _leaves(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in values.items():
         if isinstance(value, Mapping):
-            yield from _paths(value, f"{before}{key}.")
+            yield from _leaves(value, f"{before}{key}.")
         else:
-            yield before + key
+            yield before + key, value
 
 
 def _flat(value: Any) -> Iterator[Any]:

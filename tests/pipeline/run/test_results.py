@@ -17,8 +17,11 @@ def run_of(**stated: dict[str, object]) -> SimpleNamespace:
 
 
 def test_who_replaces_a_figure_of_another_stage_is_warned_of_and_its_own_is_kept():
-    engine = run_of(errors={"error_m": {"mean": 1.0}, "lost": 0}, mine={"error_m": {"mean": 2.0}, "cost": 3})
-    assert results_of(engine)[0].values == {"error_m": {"mean": 2.0}, "lost": 0, "cost": 3}
+    engine = run_of(
+        errors={"frames": 7, "error_m": {"mean": 1.0}, "lost": 0},
+        mine={"frames": 7, "error_m": {"mean": 2.0}, "cost": 3},
+    )
+    assert results_of(engine)[0].values == {"frames": 7, "error_m": {"mean": 2.0}, "lost": 0, "cost": 3}
     assert engine.calls["mine"].ctx.warnings == [
         "mine: error_m.mean in metrics.json is its own, not that of errors; give it another name"
     ]
