@@ -19,8 +19,8 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
                 if isinstance(value, Metrics):
                     metrics.append(value)
                     for path, figure in _leaves(merged([value]).values):
-                        other, others = stated.setdefault(path, (node.name, figure))
-                        if figure != others:
+                        other, before = stated.setdefault(path, (node.name, figure))
+                        if figure != before:
                             what = f"{path} in metrics.json is its own, not that of {other}"
                             engine.calls[node.name].ctx.warn(f"{node.name}: {what}; give it another name")
                 elif isinstance(value, Figure):

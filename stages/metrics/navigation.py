@@ -79,73 +79,80 @@ class Navigation(MetricStage):
         routes: Sequence[PlannedRoute | None],
         map: TopologicalMap | ReferenceGraph,
     ) -> MetricStage.Out:
-        """The whole drive at once, from its last goal back to its first."""
-        found, begun = _of_last_goal(drive, routes, map)
-        if found is None:
+        """The whole drive at once."""
+        begun = first_of_last_goal(routes)
+        planned = [route for route in routes[begun:] if route is not None]
+        spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]
+        if not planned or not len(spots):
             return self.Out()
-        reached = [found.get("reached_rate")]
-        while begun:
-            earlier, begun = _of_last_goal(drive.at(slice(begun)), routes[:begun], map)
-            reached.append((earlier or {}).get("reached_rate"))
-        told = [rate for rate in reached if rate is not None]
-        if len(reached) > 1:
-            found["goals"] = len(reached)
-        if len(reached) > 1 and told:
-            found["goals_reached_rate"] = sum(told) / len(told)
+        last, former = planned[-1], routes[begun - 1] if begun else None
+        ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
+        ended = next(ends, len(drive) - 1)
+        tallied = np.flatnonzero(np.isfinite(drive.distance))
+        before = tallied[tallied <= begun][-1:] if begun else tallied[:0]
+        collisions = None
+        driven = float(np.nansum(np.hypot(*drive.motion[begun + 1 if begun else 0 :, :2].T)))
+        if len(tallied):
+            collisions = int(drive.collisions[tallied[-1]] - drive.collisions[before].sum())
+            driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
+        goal = int(last.places[-1]) if len(last.places) else None
+        end_error = shortest = None
+        if map.pose_source == "truth":
+            end_error = metres_to_goal(map, spots[-1], last)
+        if end_error is not None and isinstance(map, ReferenceGraph):
+            shortest = metres_of_first(map, spots[0], planned)
+        elif end_error is not None and isinstance(map, TopologicalMap) and goal is not None:
+            shortest = shortest_metres(map, spots[0], goal)
+        found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
+        found |= {
+            "end_error_m": end_error,
+            "path_length_m": driven,
+            "shortest_m": shortest,
+            "time_s": float(drive.seconds[ended] - (drive.seconds[begun] if begun else 0.0)),
+            "routes": last.number - (former.number if former else -1),
+            "goal": goal,
+            "state": last.state,
+            "reason": last.why,
+        }
+        if map.pose_source == "truth":
+            of_goals = goals_reached(drive, routes, map)
+            reached = of_goals[0]
+            found |= {"reached": reached, "reached_rate": float(reached)}
+            if collisions is not None:
+                found["collision_free_rate"] = float(reached and collisions == 0)
+            if reached:
+                found["reached_error_m"] = end_error
+            if reached and shortest:
+                found["time_per_metre_s"] = found["time_s"] / shortest
+                found["path_length_ratio"] = driven / shortest
+            if len(of_goals) > 1:
+                found |= {"goals": len(of_goals), "goals_reached_rate": float(np.mean(of_goals))}
+        if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
+            found["lost_m_per_km"] = lost_metres(drive)
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
 
 
-def _of_last_goal(
+def goals_reached(
     drive: Drive, routes: Sequence[PlannedRoute | None], map: TopologicalMap | ReferenceGraph
-) -> tuple[dict[str, Any] | None, int]:
-    """Figures of the last goal, None where there are none, and the tick from which on all routes lead to it."""
-    begun = first_of_last_goal(routes)
-    planned = [route for route in routes[begun:] if route is not None]
-    spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]
-    if not planned or not len(spots):
-        return None, 0
-    last, former = planned[-1], routes[begun - 1] if begun else None
-    ends = (k for k, route in enumerate(routes[begun:], begun) if route is not None and route.state in ENDS)
-    ended = next(ends, len(drive) - 1)
-    tallied = np.flatnonzero(np.isfinite(drive.distance))
-    before = tallied[tallied <= begun][-1:] if begun else tallied[:0]
-    collisions = None
-    driven = float(np.nansum(np.hypot(*drive.motion[begun + 1 if begun else 0 :, :2].T)))
-    if len(tallied):
-        collisions = int(drive.collisions[tallied[-1]] - drive.collisions[before].sum())
-        driven = float(drive.distance[tallied[-1]] - drive.distance[before].sum())
-    goal = int(last.places[-1]) if len(last.places) else None
-    apart = shortest = None
-    if map.pose_source == "truth" and isinstance(map, ReferenceGraph) and last.goal is not None:
-        apart = math.dist(spots[-1], (last.goal.x, last.goal.y))
-        shortest = metres_of_first(map, spots[0], planned)
-    elif map.pose_source == "truth" and isinstance(map, TopologicalMap) and goal is not None:
-        apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
-        shortest = shortest_metres(map, spots[0], goal)
-    found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
-    found |= {
-        "end_error_m": apart,
-        "path_length_m": driven,
-        "shortest_m": shortest,
-        "time_s": float(drive.seconds[ended] - (drive.seconds[begun] if begun else 0.0)),
-        "routes": last.number - (former.number if former else -1),
-        "goal": goal,
-        "state": last.state,
-        "reason": last.why,
-    }
-    if map.pose_source == "truth":
-        reached = last.state == "arrived" and apart is not None and apart <= WITHIN_M
-        found |= {"reached": reached, "reached_rate": float(reached)}
-        if collisions is not None:
-            found["collision_free_rate"] = float(reached and collisions == 0)
-        if reached:
-            found["reached_error_m"] = apart
-        if reached and shortest:
-            found["time_per_metre_s"] = found["time_s"] / shortest
-            found["path_length_ratio"] = driven / shortest
-    if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
-        found["lost_m_per_km"] = lost_metres(drive)
-    return found, begun
+) -> list[bool]:
+    """Whether each goal was reached, from the last back to the first, in a map of true poses."""
+    found, end = [], len(routes)
+    while end:
+        begun = first_of_last_goal(routes[:end])
+        planned = [route for route in routes[begun:end] if route is not None]
+        truth = drive.truth[begun:end]
+        spots = truth[known(truth)][:, :2]
+        error = metres_to_goal(map, spots[-1], planned[-1]) if planned and len(spots) else None
+        found.append(error is not None and error <= WITHIN_M and planned[-1].state == "arrived")
+        end = begun
+    return found
+
+
+def metres_to_goal(map: TopologicalMap | ReferenceGraph, spot: Array, route: PlannedRoute) -> float | None:
+    """Distance (m) of a point (x, y) from a route's goal; None where it has none."""
+    if isinstance(map, ReferenceGraph):
+        return None if route.goal is None else math.dist(spot, (route.goal.x, route.goal.y))
+    return math.dist(spot, map.poses[map.places[route.places[-1]]][:2]) if len(route.places) else None
 
 
 def lost_metres(drive: Drive) -> float | None:

@@ -62,7 +62,8 @@ def record_log(
     if collisions:
         print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
     for drive in drives:
-        if drive.late:
-            ends = f"after {drive.times[-1] / 1e9 - drive.times[0] / 1e9:.1f} s, the robot is not carried at"
-            ctx.warn(f"{path}: day {drive.day} ends {ends} {', '.join(f'{late.at:g}' for late in drive.late)} s")
+        late = drive.kidnappings[len(drive.lifted) :]
+        if late:
+            ends = f"after {(drive.times[-1] - drive.times[0]) / 1e9:.1f} s, the robot is not carried at"
+            ctx.warn(f"{path}: day {drive.day} ends {ends} {', '.join(f'{each.at:g}' for each in late)} s")
     print(f"{path}: {counted(images, 'image')}; beside it {camera.name}, {floor.name} and {grid}")

@@ -95,8 +95,6 @@ class SimulatedRecording:
         bias = draw_bias(world.odometry, stream(world.draw_seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
-        self.late = self.kidnappings[len(driven.kidnappings) :]
-        """Kidnappings to come when the drive had ended."""
         self.lifted = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
         """Times (ns) at which the robot was put down again."""
         put = np.unique([row for row, _ in driven.kidnappings]).astype(np.int64)
