@@ -37,9 +37,10 @@ LEG_M = 2.0
 ARRIVAL_M, MAX_HEADING_ERROR_DEG = 0.02, 2.0
 """Distance to the goal at which the robot has only to turn, metres, and heading error with which it has arrived."""
 DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
-"""Metres by which a path counts as longer that leads closer than the radius to where it was found blocked."""
-RETRY_S, MAX_BLOCKED = 5.0, 20
-"""Seconds from a blocked path to the next one, and how many are tried."""
+"""Metres by which a path counts as longer that leads closer than the radius to where it was found blocked; ten times as
+many where it was blocked twice."""
+RETRY_S, BLOCKED_HERE, MAX_BLOCKED = 5.0, 3, 20
+"""Seconds from a blocked path to the next one, and how often it may be blocked at one place and in all."""
 FAR_M = 5.0
 """Largest distance of a point to drive to from the references, metres: nothing is known beyond."""
 NEAR_M, HOVER_S = 0.1, 10.0
@@ -92,9 +93,9 @@ class RoadmapPlanner(Stage):
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
     landmarks tell. It has arrived where landmarks in its present image say so. Where they are not sure of the goal, few
     are seen there: then its estimate tells too, and its image must show what the goal's does; else it goes on to the
-    other place that they name. Where a path is blocked, ways around are preferred, and after too many it gives up;
-    blocked within its own radius of the goal, it ends there. Raises BadInput for a goal that the map's landmarks cannot
-    place.
+    other place that they name. Where a path is blocked, ways around are preferred; where none leads past that place, it
+    gives up. Blocked within its own radius of the goal, it ends there. Raises BadInput for a goal that the map's
+    landmarks cannot place.
     """
 
     goal: str | int | None = None
@@ -161,7 +162,13 @@ class RoadmapPlanner(Stage):
             elif places is not None:
                 ctx.count("blocked_path")
                 ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
-                state.extra = state.extra + DETOUR_M * (np.hypot(*(map.poses[:, :2] - ahead).T) <= BLOCKED_RADIUS_M)
+                away_m = np.hypot(*(map.poses[:, :2] - ahead).T)
+                more = np.maximum(DETOUR_M, 10.0 * state.extra)
+                state.extra = np.where(away_m <= BLOCKED_RADIUS_M, more, state.extra)
+                if state.extra[away_m.argmin()] >= DETOUR_M * 10.0 ** (BLOCKED_HERE - 1):
+                    state.ended, (x, y) = "gave up", ahead
+                    state.why = f"{BLOCKED_HERE} times its way was blocked near ({x:.1f}, {y:.1f}) m: {status.why}"
+                    return _stopped(state)
                 self._plan(state, map)
                 places, new = self._path(state, map, here), True
         if places is None or state.blocked > MAX_BLOCKED:

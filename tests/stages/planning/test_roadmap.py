@@ -13,8 +13,8 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.planning.roadmap import (
+    BLOCKED_HERE,
     HOVER_S,
-    MAX_BLOCKED,
     UNLIKE_IMAGES,
     RoadmapPlanner,
     RoadmapPlannerState,
@@ -180,16 +180,24 @@ def test_a_robot_that_gets_lost_stops_at_once() -> None:
     assert drive.pose.tolist() == before.tolist()
 
 
-def test_where_the_way_is_blocked_another_is_preferred_and_in_the_end_it_gives_up() -> None:
+def test_where_the_way_is_blocked_another_is_preferred() -> None:
     drive = Drive(start=(3.0, 3.0, 0.0))  # between two passes of the tour
     before = set(drive.step().route.places.tolist())
     after = drive.step(status=BLOCKED).route
     assert after.number == 1
     assert not before & set(after.places.tolist())
-    for _ in range(26 * MAX_BLOCKED):
-        drive.pose = np.array((3.0, 3.0, 0.0))
+
+
+def test_where_no_other_way_leads_past_a_blocked_place_it_gives_up_there() -> None:
+    drive = Drive(start=(GOAL[0] - 0.4, GOAL[1], GOAL[2]))
+    numbers = [drive.step().route.number]
+    for _ in range(26 * BLOCKED_HERE):
+        drive.pose = np.array((GOAL[0] - 0.4, GOAL[1], GOAL[2]))
         out = drive.step(status=BLOCKED)
-    assert (out.route.state, out.route.why) == ("gave up", "a chair")
+        numbers.append(out.route.number)
+    assert out.route.state == "gave up"
+    assert out.route.why == f"{BLOCKED_HERE} times its way was blocked near ({GOAL[0]:.1f}, {GOAL[1]:.1f}) m: a chair"
+    assert max(numbers) == BLOCKED_HERE - 1
     assert drive.status.state == "waiting"
 
 
