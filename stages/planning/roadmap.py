@@ -39,8 +39,8 @@ ARRIVAL_M, MAX_HEADING_ERROR_DEG = 0.02, 2.0
 DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
 """Metres by which a path counts as longer that leads closer than the radius to where it was found blocked; ten times as
 many where it was blocked twice."""
-RETRY_S, BLOCKED_HERE, MAX_BLOCKED = 5.0, 3, 20
-"""Seconds from a blocked path to the next one, and how often it may be blocked at one place and in all."""
+RETRY_S, BLOCKED_HERE = 5.0, 3
+"""Seconds from a blocked path to the next one, and how often it may be blocked at one place."""
 FAR_M = 5.0
 """Largest distance of a point to drive to from the references, metres: nothing is known beyond."""
 NEAR_M, HOVER_S = 0.1, 10.0
@@ -55,8 +55,8 @@ class RoadmapPlannerState(State):
 
     `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `rivals` (K, 3): where else its image
     may have been taken; `doubtful`: whether the look of the place has to bear it out. `metres`, `next` (R,): of the
-    shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, `blocked`
-    times, and from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
+    shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, and
+    `retry`: from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
     None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
     planned. `leg`: its number, and `left`: metres to go when it began, inf before it does. `arrival`: metres from the
     goal at which it docks; `unlike`: images in a row that did not look like it there. `near_since` (ns): since when the
@@ -69,7 +69,6 @@ class RoadmapPlannerState(State):
     metres: Array = field(default_factory=lambda: np.zeros(0))
     next: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     extra: Array = field(default_factory=lambda: np.zeros(0))
-    blocked: int = 0
     retry: int = 0
     lost_since: int | None = None
     number: int = -1
@@ -156,7 +155,7 @@ class RoadmapPlanner(Stage):
         if status is None or status.state != "blocked":
             state.arrival = state.arrival if state.docking else ARRIVAL_M
         elif tick.stamp >= state.retry:
-            state.blocked, state.retry, state.why = state.blocked + 1, tick.stamp + int(RETRY_S * 1e9), status.why
+            state.retry = tick.stamp + int(RETRY_S * 1e9)
             if known and away <= self.robot_radius_m:  # what stands there today lets it no closer
                 state.arrival = away + ARRIVAL_M
             elif places is not None:
@@ -171,9 +170,8 @@ class RoadmapPlanner(Stage):
                     return _stopped(state)
                 self._plan(state, map)
                 places, new = self._path(state, map, here), True
-        if places is None or state.blocked > MAX_BLOCKED:
-            state.ended = "gave up"
-            state.why = "no path leads to the goal" if places is None else state.why
+        if places is None:
+            state.ended, state.why = "gave up", "no path leads to the goal"
             return _stopped(state)
         if new:
             state.number, state.places = state.number + 1, places
@@ -209,7 +207,7 @@ class RoadmapPlanner(Stage):
 
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra, state.places = goal, np.zeros(len(map)), np.zeros(0, np.int64)
-        state.blocked, state.docking, state.ended, state.why, state.left = 0, False, "", "", math.inf
+        state.docking, state.ended, state.why, state.left = False, "", "", math.inf
         state.lost_since, state.near_since, state.arrival, state.unlike = None, None, ARRIVAL_M, 0
         self._plan(state, map)
 
