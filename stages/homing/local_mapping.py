@@ -38,6 +38,10 @@ SAME_SHARE, SAME_SHARE_AT_TARGET, AT_TARGET = 0.5, 0.7, 0.03
 """Share of the matches that must have the target's bearings; and the share from this distance on, over the features'
 typical distance, at which the robot may stop: in 20 development drives 98 % of the images there have 0.77 and more, and
 those of four drives that stopped elsewhere 0.5 to 0.68 (docs/experiments/atlas.md)."""
+SECTORS, MIN_IN_SECTOR, SHOWN_OF_SECTOR, SHOWN_SECTORS = 12, 4, 0.1, 0.75
+"""Sectors of azimuth at the target, features of the target in one that count, and the share of them that must have the
+target's bearings in this share of the sectors: in development drives at least 0.88 of the sectors show that at the
+target, and at most 0.6 where a piece of furniture was taken for another like it (docs/experiments/atlas.md)."""
 MIN_INLIERS = 6
 """Features that must agree with a pose."""
 MIN_REBUILD_DISTANCE = 0.1
@@ -149,7 +153,9 @@ class LocalMapping(Stage):
         matches = matches_with(target, features, correspondences)
         before = state.map if state.map is not None and state.map.target == target.number else None
         local_map = LocalMap(-1, target.number, "lost") if before is None else before.moved(motion)
-        shown = self._tracked(ctx, state, local_map, tracks, matches)
+        shown = self._tracked(
+            ctx, state, local_map, tracks, matches, (target.features.point_bearings(), features.point_bearings())
+        )
         state.map = shown
         if shown.state == "lost":
             state.map, shown = self._begun(ctx, state, shown, matches, motion)
@@ -164,6 +170,7 @@ class LocalMapping(Stage):
         local_map: LocalMap,
         tracks: TrackedFeatures | None,
         matches: Matches,
+        views: tuple[Array, Array],
     ) -> LocalMap:
         """The map with the robot in it, or a better one; lost where it is not known."""
         if not len(local_map):
@@ -179,7 +186,7 @@ class LocalMapping(Stage):
             new, _ = self._made(ctx, state, local_map, fresh, round(more))
             if new is not None:
                 return new
-        if not self._contradicted(local_map, matches if self.verify else fresh):
+        if not self._contradicted(local_map, matches if self.verify else fresh, *views):
             return local_map
         ctx.count("false_map")
         state.witness = None
@@ -253,17 +260,20 @@ class LocalMapping(Stage):
             metres=metres,
         )
 
-    def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
+    def _contradicted(self, local_map: LocalMap, matches: Matches, there: Array, here: Array) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn and what is left of the way.
         nearness = local_map.distance() / max(local_map.depth(), 1e-9)
         if nearness > ARRIVAL_DISTANCE or (not self.verify and local_map.inliers > len(matches.rows) / 3):
             return False
-        turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
+        turn = local_map.rotation.T @ local_map.goal_rotation
+        turned = matches.second @ turn.T
         chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0 + nearness)
         same = np.linalg.norm(turned - matches.first, axis=1) < chord
         enough = MIN_VERIFIED_INLIERS if self.verify else 0
         share = SAME_SHARE_AT_TARGET if self.verify and nearness <= AT_TARGET else SAME_SHARE
-        return bool(np.count_nonzero(same) < max(share * len(matches.rows), enough))
+        if np.count_nonzero(same) < max(share * len(matches.rows), enough):
+            return True
+        return self.verify and shown_sectors(there @ turn.T, turned[same], here) < SHOWN_SECTORS
 
     def _verified(self, state: LocalMappingState, new: LocalMap, with_odometry: bool) -> bool:
         # Whether this image and one before bear each other out; without odometry place and heading do not count.
@@ -318,6 +328,20 @@ class LocalMapping(Stage):
             metres=metres,
         )
         return new, ""
+
+
+def shown_sectors(target: Array, same: Array, here: Array) -> float:
+    """Share of the sectors around the robot in which a tenth of the target's features have the same bearings.
+
+    All bearings (N, 3) are in the robot's frame. Sectors count in which both views have features, since a camera may
+    not see all around. Features of one object agree on a place beside another like it, but only in one direction.
+    """
+    number, agreed, seen = (
+        np.bincount(((np.arctan2(y, x) / math.tau) % 1.0 * SECTORS).astype(int) % SECTORS, minlength=SECTORS)
+        for x, y, _ in (each[np.isfinite(each).all(axis=1)].T for each in (target, same, here))
+    )
+    compared = (number >= MIN_IN_SECTOR) & (seen > 0)
+    return float((agreed >= SHOWN_OF_SECTOR * number)[compared].mean()) if compared.any() else 1.0
 
 
 def matches_with(target: HomingTarget, features: LocalFeatures, pairs: Correspondences | None) -> Matches:

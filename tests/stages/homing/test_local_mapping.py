@@ -19,7 +19,13 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
-from omninav.stages.homing.local_mapping import MIN_VERIFIED_INLIERS, LocalMapping, LocalMappingState, Matches
+from omninav.stages.homing.local_mapping import (
+    MIN_VERIFIED_INLIERS,
+    LocalMapping,
+    LocalMappingState,
+    Matches,
+    shown_sectors,
+)
 from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
@@ -275,7 +281,19 @@ def test_at_the_target_seven_of_ten_matches_must_have_its_bearings(share: int, n
     seen_here = seen_there @ (near.rotation.T @ near.goal_rotation).T
     seen_here[share:] *= -1.0
     matches = Matches(seen_here, np.zeros((100, 2)), seen_there, np.arange(100))
-    assert homing.mapping._contradicted(near, matches) is not believed
+    assert homing.mapping._contradicted(near, matches, seen_there, seen_here) is not believed
+    left = np.flatnonzero(seen_here[:share, 1] > 0)  # all agree, in one half of the directions
+    of_one_side = Matches(seen_here[left], np.zeros((len(left), 2)), seen_there[left], left)
+    assert homing.mapping._contradicted(near, of_one_side, seen_there, seen_here)
+
+
+def test_the_target_must_be_seen_in_three_quarters_of_the_directions() -> None:
+    azimuths = np.deg2rad(np.arange(0.0, 360.0, 2.0))
+    around = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(180)])
+    assert shown_sectors(around, around[::7], around) == 1.0  # 26 of 180 features, in all sectors of 30 degrees
+    assert shown_sectors(around, around[:90], around) == 0.5
+    assert shown_sectors(around, around[:90], around[:90]) == 1.0  # where the camera sees
+    assert shown_sectors(around[:3], around[:0], around) == 1.0  # three features tell nothing
 
 
 def covered(pose) -> Image:
