@@ -105,6 +105,9 @@ def test_half_of_a_first_belief_that_may_be_anywhere_goes_to_what_the_image_sugg
         ctx.tick = Tick(0, 0, first_of_log=first)
         out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE).belief
         assert share_there(out) == pytest.approx(expected, rel=1e-3)
+    ctx.tick, stage = Tick(0, 0, first_of_log=True), ImportanceResampling(kidnapping_probability=0.0)
+    out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE).belief
+    assert share_there(out) == 0.0
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_and_one_whose_view_breaks_off_more_often() -> None:

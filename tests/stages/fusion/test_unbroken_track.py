@@ -8,7 +8,7 @@ from made_beliefs import even
 from made_words import NOTHING, features_of
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState
+from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState, without_recovery
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
@@ -46,7 +46,7 @@ def driven(
     twin_from: int,
     jump_at: int | None = None,
     turned_at: int | None = None,
-    probability: float = 0.99,
+    probability: float = 0.96,
     scale: float = 0.5,
     dark_at: int | None = None,
     step: float = 0.3,
@@ -101,17 +101,60 @@ def test_an_image_of_other_surroundings_tells_that_the_robot_was_carried_and_bli
     assert not any(each.track.carried for each in driven(twin_from=10, probability=0.9, step=1.5))
 
 
-@pytest.mark.parametrize(("turn", "carried"), [(0.1, True), (1.0, False)])
-def test_a_narrow_view_that_has_turned_out_of_what_it_saw_was_not_carried(turn, carried):
+@pytest.mark.parametrize(("way", "turn", "carried"), [(0.99, 29.0, True), (0.0, 31.0, False), (1.01, 0.0, False)])
+def test_a_narrow_view_that_has_moved_or_turned_out_of_what_it_saw_was_not_carried(way, turn, carried):
     state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0))
     belief = even(np.zeros((2, 3)))
     first, other = seen_from(np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]))
     assert not stage.step(ctx, state, belief, first, None, None).track.carried
-    assert stage.step(ctx, state, belief, other, None, Motion(0.0, 0.0, turn)).track.carried is carried
+    motion = Motion(0.6 * way, 0.8 * way, math.radians(turn))
+    assert stage.step(ctx, state, belief, other, None, motion).track.carried is carried
 
 
 def test_a_track_that_was_never_sure_rules_nothing_out():
-    assert all(each.fix is not None and not each.track.unbroken for each in driven(10, probability=0.9))
+    assert all(each.fix is not None and not each.track.unbroken for each in driven(10, probability=0.94))
+
+
+def test_a_track_leads_as_far_off_as_odometry_may_drift_and_the_robot_may_have_been_carried():
+    # After 4 m: 0.3 + 0.5 + 4 / 4 m, and 30 + 4 x 5 degrees.
+    state = UnbrokenTrackState(pose=np.array([1.0, 2.0, math.pi]), confirmed=9.0, since=4.0, carried=0.5)
+    for way, turn, leads in ((1.79, 49.0, True), (1.81, 0.0, False), (0.0, 51.0, False)):
+        pose = np.array([1.0 + 0.6 * way, 2.0 + 0.8 * way, math.radians(turn) - math.pi])
+        assert state.leads_to(pose) is leads
+
+
+def test_each_pose_confirms_two_length_scales_of_the_track_at_most_and_all_of_them_twenty():
+    state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track")
+    confirmed = []
+    for n in range(12):
+        belief, motion = even([[3.0 * n, 0.0, 0.0]]), Motion(3.0, 0.0, 0.0) if n else None
+        stage.step(ctx, state, belief, NOTHING, fix_at(belief.poses[0]), motion, LengthScale(1.0))
+        confirmed.append(state.confirmed)
+    assert confirmed == [0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 20]
+
+
+def test_a_track_is_forgotten_after_a_hundred_length_scales_without_a_pose():
+    state, stage, ctx = UnbrokenTrackState(confirmed=5.0, since=49.0), UnbrokenTrack(), Context("track")
+    how = None, None, Motion(0.0, 0.6, 0.0), LengthScale(0.5)
+    unbroken = [stage.step(ctx, state, even(np.zeros((2, 3))), *how).track.unbroken for _ in range(2)]
+    assert unbroken == [True, False]
+
+
+@pytest.mark.parametrize(("probability", "against"), [(0.51, 0.5), (0.49, 0.0)])
+def test_only_a_pose_that_is_rather_right_counts_against_the_track(probability, against):
+    state, fix = UnbrokenTrackState(), fix_at(np.array([9.0, 0.0, 0.0]), probability)
+    UnbrokenTrack().step(Context("track"), state, even(np.zeros((2, 3))), NOTHING, fix, Motion(0.3, 0.4, 0.0))
+    assert state.against == pytest.approx(against)
+
+
+def test_without_recovery_particles_the_others_share_the_weight():
+    poses, weights = np.arange(12.0).reshape(4, 3), np.array([0.1, 0.1, 0.2, 0.6])
+    found = without_recovery(Particles(poses, weights, 1))
+    assert (found.poses == poses[:3]).all()
+    assert found.weights == pytest.approx([0.25, 0.25, 0.5])
+    assert found.recovery_particles == 0
+    lost = Particles(poses, np.array([0.0, 0.0, 0.0, 1.0]), 1)
+    assert without_recovery(lost) is lost  # they are all that is left
 
 
 def test_the_track_is_confirmed_for_twenty_length_scales_at_most():
