@@ -10,10 +10,11 @@ from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.track import Track
 
-HERE, THERE = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5])
+HERE, THERE, AWAY = np.array([2.0, 3.0, 1.0]), np.array([6.0, 2.5, -2.5]), np.array([20.0, 0.0, 0.0])
 SURE = np.diag([0.005, 0.005, math.radians(0.1)]) ** 2
 
 
@@ -84,7 +85,8 @@ def test_a_belief_far_away_gives_way_after_two_fixes() -> None:
 
 def test_one_fix_elsewhere_does_not_wipe_out_the_belief() -> None:
     once = updated(belief(HERE), fix_at(THERE))
-    assert share_at(once, HERE, 1.0) > 0.01
+    # 0.01 / 20 of it may be right all the same, and a robot is carried there with 0.001 x 0.99.
+    assert share_at(once, HERE, 1.0) == pytest.approx(0.0005 / (0.0005 + 0.00099), rel=1e-6)
     assert (np.hypot(*(once.poses - HERE)[:, :2].T) < 1.0).sum() >= 20
     back = updated(once, fix_at(HERE), fix_at(HERE))
     assert share_at(back, HERE) > 0.9
@@ -121,9 +123,10 @@ def test_a_pose_that_is_rather_wrong_proposes_no_place() -> None:
 
 def test_a_robot_that_was_carried_is_looked_for_by_poses_that_are_rather_wrong_until_one_is_sure() -> None:
     poor, sharp, still = fix_at(THERE, probabilities=(0.4,)), belief(HERE, 0.02), Motion(0.0, 0.0, 0.0)
-    assert share_at(updated(sharp, poor, motion=still), THERE) < 0.02
-    assert share_at(updated(sharp, poor, motion=still, carried_at=0), THERE) > 0.7
-    assert share_at(updated(sharp, None, None, poor, motion=still, carried_at=0), THERE) > 0.7  # also by a later image
+    assert share_at(updated(sharp, poor, motion=still), THERE) == 0.0
+    there = pytest.approx(0.5 * 0.4 / (0.5 * 0.4 + 0.6 / 20))
+    assert share_at(updated(sharp, poor, motion=still, carried_at=0), THERE) == there
+    assert share_at(updated(sharp, None, None, poor, motion=still, carried_at=0), THERE) == there  # also a later image
     found = updated(sharp, None, fix_at(HERE), poor, motion=still, carried_at=0)  # it was put down where it was
     assert share_at(found, HERE) > 0.9
 
@@ -133,6 +136,43 @@ def test_a_robot_that_may_start_anywhere_is_looked_for_by_poses_that_are_rather_
     assert share_at(updated(belief(HERE, 20.0), poor, first=True), THERE) > 0.7
     assert share_at(updated(belief(HERE, 20.0), poor), THERE) < 0.1  # later, it is the belief that knows
     assert share_at(updated(belief(HERE, 0.5), poor, first=True), THERE) == 0.0
+
+
+def heaps(*shares: float, at: tuple[np.ndarray, ...] = (HERE, THERE)) -> Particles:
+    """A hundred particles in one spot at each of some poses, which have these shares of the belief."""
+    return Particles(np.repeat(at, 100, axis=0), np.repeat(shares, 100) / 100)
+
+
+def test_what_landmarks_say_is_bayes_rule_over_the_poses_that_are_right_or_wrong() -> None:
+    # The fix is one standard deviation off in x, and one in heading, across the seam of the circle.
+    west, wide = np.array([2.1, 3.0, -math.pi + 0.05]), np.diag([0.1, 0.1, 0.1]) ** 2
+    fix = LandmarkFix(west[None], wide[None], np.array([60]), np.array([0.9]), 100)
+    out = updated(heaps(0.7, 0.3, at=(np.array([2.0, 3.0, math.pi - 0.05]), THERE)), fix)
+    assert (len(out.poses), out.recovery_particles) == (50 + 200 + 200, 200)
+    parts = np.array([0.1 / 20, 0.7 * 0.9 * math.exp(-0.5 * 2.0), 1e-3 * 0.9])  # as before, on the spot, carried
+    sums = [each.sum() for each in np.split(out.weights, [50, 250])]
+    assert sums == pytest.approx(parts / parts.sum(), rel=1e-6)
+
+
+def test_a_fix_that_repeats_the_last_one_counts_by_the_way_driven_since() -> None:
+    # 1.5 m of four length scales of 0.75 m: half of its evidence is new.
+    there, ctx = np.array([6.0, 2.5, 0.0]), Context("update", np.random.default_rng(0))
+    last = LandmarkUpdateState(poses=there[None] - [0.9, 1.2, 0.0])
+    how = fix_at(there, probabilities=(0.9,)), Motion(0.9, 1.2, 0.0), LengthScale(0.75)
+    out = LandmarkUpdate().step(ctx, last, heaps(0.6, 0.4, at=(HERE, there)), *how).belief
+    counted = 0.905**-0.5
+    new = 1e-3 * 0.5 * 0.9**0.5
+    parts = np.array([0.6 * 0.005**0.5 + 0.4 * 0.005 * counted, 0.4 * 0.9 * counted, new])
+    sums = [each.sum() for each in np.split(out.weights, [len(out.weights) - 400, len(out.weights) - 200])]
+    assert sums == pytest.approx(parts / parts.sum(), rel=1e-6)
+    assert last.driven == 0.0
+
+
+def test_a_carried_robot_is_elsewhere_the_less_the_likelier_the_poses_were_that_it_was_looked_for_at() -> None:
+    ctx, last = Context("update", np.random.default_rng(0)), LandmarkUpdateState(elsewhere=0.5)
+    few = fix_at(THERE, HERE, THERE + AWAY, probabilities=(0.3, 0.15, 0.05))
+    LandmarkUpdate().step(ctx, last, belief(HERE), few, Motion(0.0, 0.0, 0.0))
+    assert last.elsewhere == pytest.approx(0.5 * (1.0 - 0.45))  # one of 0.05 is no place to look
 
 
 def test_images_of_one_place_that_mislead_alike_do_not_add_up() -> None:
