@@ -11,8 +11,9 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.sensor.landmark_pose import LandmarkPose, covariance_of, probabilities_of, sectors_of
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
@@ -174,3 +175,18 @@ def test_a_map_that_was_saved_without_landmarks_is_said() -> None:
     assert "landmarks=sift, or type landmarks=none" in said
     LandmarkPose().step(ctx, seen_from(room(), FIRST), mapped_room())
     assert len(ctx.warnings) == 1
+
+
+def test_a_pose_is_the_likelier_the_more_sectors_of_the_view_its_landmarks_lie_in() -> None:
+    azimuths = np.radians([1.0, 14.0, 16.0, -1.0, 179.0])
+    assert sectors_of(np.column_stack([np.cos(azimuths), np.sin(azimuths), azimuths])) == 4
+    odds = np.exp([0.375, -0.375])  # 0.75 nats each sector, even at 7.5
+    assert probabilities_of(np.array([8, 7])) == pytest.approx(odds / (1.0 + odds.sum()))
+    assert probabilities_of(np.array([24])) == pytest.approx(1.0 / (1.0 + np.exp(-8.0)))
+
+
+@pytest.mark.parametrize(("sigma", "larger"), [(0.01, 0.02), (0.03, 0.03)])
+def test_the_variance_of_a_pose_is_that_of_bearings_by_map_or_image_and_never_below_a_floor(sigma, larger) -> None:
+    pose = BearingPose(np.zeros(3), np.diag([1.0, 2.0, 0.0]), 0.02, np.ones(9, np.bool_), 0.0)
+    expected = [4.0 * larger**2 + 9e-8, 8.0 * larger**2 + 9e-8, math.radians(0.003) ** 2]
+    assert covariance_of(pose, sigma, 4.0) == pytest.approx(np.diag(expected))
