@@ -1,7 +1,5 @@
 """The belief over places, against sums done by hand."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.motion.place_transitions import transitions
-from omninav.stages.sensor.place_likelihood import place_likelihoods, word_likelihoods
+from omninav.stages.sensor.place_likelihood import place_likelihoods
 from omninav.stages.values.belief import PlaceBelief
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
@@ -20,24 +18,6 @@ def test_links_are_counted_along_the_shortest_way_in_either_direction():
     assert apart[:4, :4].tolist() == [[0, 1, 2, 1], [1, 0, 1, 2], [2, 1, 0, 1], [1, 2, 1, 0]]
     assert np.isinf(apart[4, :4]).all()
     assert apart[4, 4] == 0
-
-
-def test_likelihood_is_a_gaussian_of_visual_distance_that_never_falls_to_nothing():
-    values = place_likelihoods(np.array([0.0, 0.5, math.inf]), 0.5, 0.01, "gaussian")
-    assert values == pytest.approx([1.0, 0.01 + 0.99 * math.exp(-1), 0.01])
-
-
-def test_with_a_heavy_tail_the_least_unlike_of_unlike_places_is_still_the_likeliest():
-    far = np.array([10.0, 20.0, math.inf])  # in units of sigma
-    assert place_likelihoods(far, 1.0, 0.001, "gaussian") == pytest.approx([0.001] * 3)
-    heavy = place_likelihoods(far, 1.0, 0.001, "heavy")
-    assert heavy == pytest.approx([0.001 + 0.999 / 101, 0.001 + 0.999 / 401, 0.001])
-
-
-def test_words_tell_places_apart_by_how_much_less_similar_they_are_than_the_best():
-    found = word_likelihoods(np.array([0.4, 0.5, 0.0], np.float32), 20.0, 0.001)
-    assert found == pytest.approx([0.001 + 0.999 * math.exp(-2), 1.0, 0.001 + 0.999 * math.exp(-10)], rel=1e-5)
-    assert word_likelihoods(np.zeros(3, np.float32), 20.0, 0.001) == pytest.approx([1.0] * 3)  # an image without words
 
 
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
