@@ -9,7 +9,7 @@ from made_beliefs import along_x
 from made_references import references
 
 from omninav.pipeline import Context
-from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong
+from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong, spacing
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.features import SegmentHistograms
@@ -47,6 +47,30 @@ def test_a_large_map_is_sampled_and_the_sample_stands_for_all():
     assert set(range(2490, 2500)) <= set(chosen.tolist())
     assert len(chosen) < 1100
     assert each.sum() == pytest.approx(4999)
+
+
+def test_a_sample_is_all_that_is_near_and_an_even_choice_of_what_is_far(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.stages.match.calibration.MAX_COMPARED", 3)
+    chosen, each = compared_with(along_x(*range(10)).means, 5, 1.0)
+    assert chosen.tolist() == [0, 3, 4, 6, 9]  # of 0, 1, 2, 3, 7, 8, 9 the first, the middle, and the last
+    assert each == pytest.approx([7 / 3, 7 / 3, 1.0, 1.0, 7 / 3])
+    chosen, each = compared_with(along_x(*range(4)).means, 1, 1.0)
+    assert (chosen.tolist(), each.tolist()) == ([0, 2, 3], [1.0] * 3)
+
+
+def test_the_spacing_of_a_map_is_the_median_way_to_the_next_place():
+    assert spacing(along_x(0.0, 1.0, 3.0, 3.0, 7.0, 7.0).means) == 1.5  # 1, 1, 2 and 4 m
+    assert spacing(along_x(2.0, 2.0).means) == 0.0
+
+
+def test_views_of_one_heading_are_of_the_right_place_within_30_degrees_and_of_a_wrong_one_beyond_60():
+    turns = np.radians([29.0, -31.0, 59.0, -61.0])
+    right, wrong = right_and_wrong(np.zeros(3), np.column_stack([np.zeros((4, 2)), turns]), 1, 0.5)
+    assert right[:, 0].tolist() == [True, False, False, False]
+    assert wrong[:, 0].tolist() == [False, False, False, True]
+    right, wrong = right_and_wrong(np.zeros(3), along_x(0.5, 0.51, 1.5, 1.51).means, 1, 0.5)
+    assert right[:, 0].tolist() == [True, False, False, False]
+    assert wrong[:, 0].tolist() == [False, False, False, True]
 
 
 @pytest.mark.parametrize("match", [SelectiveMatch(headings=HEADINGS), Retrieval(headings=HEADINGS)])
