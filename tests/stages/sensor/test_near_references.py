@@ -11,6 +11,7 @@ from omninav.stages.sensor.near_references import (
     NearReferences,
     background_similarity,
     expected_similarity,
+    fading,
     similarity_field,
     weighted_quantile,
 )
@@ -53,6 +54,11 @@ def test_the_kernel_agrees_with_a_plain_implementation(fade: float) -> None:
     assert (found > 0.3).any()
     not_compared = np.full(40, -1)
     assert np.allclose(expected_similarity(poses, REFERENCES, cells.of(poses), not_compared, FIELD, fade, 0.3), 0.3)
+
+
+def test_references_fade_as_a_gaussian_or_never() -> None:
+    assert fading(2.0) == pytest.approx((4e-4, -0.125))  # (2 cm)^2, and 1 / (2 x 2^2)
+    assert fading(None) == (1e-4, 0.0)
 
 
 def step(

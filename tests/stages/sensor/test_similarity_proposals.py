@@ -7,7 +7,9 @@ from made_references import references
 from omninav.pipeline import Context
 from omninav.stages.sensor.near_references import similarity_field
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals, draw_cells
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.track import Track
 
 RNG = np.random.default_rng(0)
 REFERENCES = np.column_stack([RNG.uniform(0, 4, (40, 2)), RNG.uniform(-3, 3, 40)])
@@ -57,5 +59,21 @@ def test_poses_are_drawn_around_the_best_reference_and_heading(
     assert ((gap < 0.2) & (np.abs(turn) < 0.09)).mean() > 0.9
 
 
-def test_without_a_field_there_are_no_proposals() -> None:
+def test_poses_spread_by_a_share_of_the_length_scale_and_evenly_over_one_step_of_heading(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("omninav.stages.sensor.similarity_proposals.NUMBER", 20_000)
+    field = similarity_field(Similarities(np.array([[0.0, 0.9, 0.0, 0.0]], np.float32)), 0.0, 1.0, 1.0)
+    map, ctx = references(np.array([[1.0, 2.0, 3.0]])), Context("proposals", np.random.default_rng(0))
+    found = SimilarityProposals().step(ctx, field, map, LengthScale(0.5), Track(False, False)).proposals
+    assert found.weights == pytest.approx(np.full(20_000, 1 / 20_000))
+    assert found.poses[:, :2].mean(axis=0) == pytest.approx([1.0, 2.0], abs=0.01)
+    assert found.poses[:, :2].std(axis=0) == pytest.approx([0.4 * 0.5] * 2, rel=0.02)
+    turns = np.sort(found.poses[:, 2] + 2 * np.pi - 3.0 - np.pi / 4)  # 3 + pi / 2 lies beyond the seam
+    assert turns == pytest.approx((np.arange(20_000) + 0.5) / 20_000 * np.pi / 2, abs=0.03)
+
+
+def test_without_a_field_and_while_the_track_is_unbroken_there_are_no_proposals() -> None:
+    field = similarity_field(Similarities(np.ones((40, 4), np.float32)), 0.0, 1.0, 1.0)
     assert SimilarityProposals().step(Context("proposals"), None, MAP).proposals is None
+    assert SimilarityProposals().step(Context("proposals"), field, MAP, None, Track(True, False)).proposals is None
