@@ -85,6 +85,13 @@ def test_contrast_does_not_know_how_bright_the_lamps_are(contrast: Contrast) -> 
     assert dim.std() == pytest.approx(1.0, abs=0.1)
 
 
+def test_contrast_is_in_standard_deviations_with_noise_of_five_grey_levels() -> None:
+    pixels = np.tile(np.array([100, 124], np.uint8)[:, None], (8, 18, 3))
+    assert np.abs(averaged_strip(pixels, 8, 36, "colour", "whole")) == pytest.approx(12.0 / 13.0)  # of 5, 12, 13
+    # Its parts are 24 apart and narrow against the surroundings, which are grey on average.
+    assert np.abs(averaged_strip(pixels, 8, 36, "colour", "local")) == pytest.approx(12.0 / 13.0, rel=0.02)
+
+
 def test_local_contrast_goes_around_the_circle_and_counts_a_lit_side_as_little() -> None:
     strip = np.random.default_rng(10).uniform(50, 100, (16, 72, 1)).astype(np.float32)
     contrast = local_contrast(strip, 4.0, 4.0)
