@@ -88,6 +88,14 @@ def test_background_references_represent_the_whole_map(x: float) -> None:
     assert (value[references] * weight).sum() == pytest.approx(value.sum(), rel=0.02)
 
 
+def test_others_are_at_even_steps_and_stand_for_all_that_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.stages.candidates.around_belief.BACKGROUND_REFERENCES", 3)
+    references, weight = chosen(AroundBelief().with_others(np.array([4, 5]), a_map(9)))
+    assert references.tolist() == [0, 4, 5, 8]  # 0, 4 and 8, of which 4 is chosen itself
+    assert weight.tolist() == [3.5, 1.0, 1.0, 3.5]
+    assert AroundBelief().with_others(np.array([4, 5]), a_map(5)).references is None
+
+
 def test_all_are_compared_where_none_is_near_and_without_a_belief() -> None:
     assert near(a_map(), particles_at(500.0), 2.0).references is None
     assert near(a_map(), None, 2.0).references is None
