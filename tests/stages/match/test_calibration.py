@@ -10,11 +10,12 @@ from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong, spacing
-from omninav.stages.match.retrieval import Retrieval
+from omninav.stages.match.retrieval import Retrieval, normalised_intersections
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
 
 HEADINGS, SEGMENTS = 8, 8
 
@@ -86,6 +87,21 @@ def test_a_match_calibrates_its_map_once_and_the_same_each_time(match: Selective
     assert ctx.facts["similarity_calibration"]["images"] == 80
     assert first.slope > 1.0
     assert first.right_distance_m == pytest.approx(0.3)
+    walk.insert(Pose(8.0, 0.0, 0.0), walk.features[0], "histograms")
+    grown = match.step(ctx, view, walk).calibration  # without a length scale, one and a half of its spacings of 0.1 m
+    assert (grown.images, grown.right_distance_m) == (81, pytest.approx(0.15))
+
+
+def test_single_windows_are_calibrated_at_the_one_heading_at_which_they_are_compared():
+    poses = a_walk().poses + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]] * 40)
+    walk = references(poses, a_walk().features[:, :1])
+
+    def compare(view: int, chosen: np.ndarray) -> np.ndarray:
+        return normalised_intersections(walk.features, walk.features[view][None], 1, chosen)
+
+    seen = SegmentHistograms(walk.features[7], np.zeros(1))
+    found = Retrieval().step(Context("match"), seen, walk, length_scale=LengthScale(0.3)).calibration
+    assert vars(found) == vars(calibrated(walk, compare, 0.3))
 
 
 def test_nothing_is_compared_where_nobody_reads_the_calibration():

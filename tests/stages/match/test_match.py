@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from made_references import references
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.histogram_intersection import HistogramIntersection
 from omninav.stages.match.l2 import L2Match
+from omninav.stages.match.last_view import LastView
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.candidates import Candidates
@@ -69,3 +70,10 @@ def test_visual_words_are_a_factor_of_each_reference() -> None:
     both = HistogramIntersection(word_power=0.5).step(*given, words).similarities.values
     assert both == pytest.approx(plain * [[1.0], [0.2]])
     assert np.array_equal(HistogramIntersection(word_power=0.0).step(*given, words).similarities.values, plain)
+    assert np.array_equal(HistogramIntersection(word_power=0.5).step(*given).similarities.values, plain)
+    for power, compared in ((0.0, True), (0.5, False)):  # the last view has no similarity by words
+        ctx, last, stage = Context("match"), LastView(), HistogramIntersection(word_power=power)
+        for index in range(2):
+            ctx.tick = Tick(index, index)
+            found = stage.step(ctx, given[1], map, None, words, last=last).similarities
+        assert (found.last_view is not None) is compared
