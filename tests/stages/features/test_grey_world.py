@@ -44,6 +44,16 @@ def test_the_window_goes_around_the_circle():
     assert np.abs(turned.astype(int) - np.roll(grey_world_pixels(SCENE, 0.25), 100, axis=1)).max() <= 1
 
 
+def test_a_column_is_scaled_by_the_mean_of_a_quarter_of_the_circle_around_it():
+    view = np.full((2, 40, 3), 55, np.uint8)
+    view[:, 2] = 165
+    expected = np.full(40, 128.0)
+    expected[np.arange(-3, 8)] = 108.0  # 55 x 128 / 65: the mean of ten columns of 55 and one of 165 is 65
+    expected[2] = 255.0
+    described = MeanRgb(segments=40, grey_world="local").step(CTX, Panorama(view)).features.values
+    assert described == pytest.approx(np.repeat(expected[:, None], 3, axis=1))
+
+
 def test_black_stays_black_and_what_is_too_bright_is_cut():
     assert not grey_world_pixels(np.zeros_like(SCENE), 0.25).any()
     view = np.zeros_like(SCENE)
