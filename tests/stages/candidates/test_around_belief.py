@@ -28,11 +28,11 @@ def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
 def near(
     map: ReferenceGraph, belief: Particles | None, radius: float, recovery: float = 0.0, background: int = 20
 ) -> Candidates:
-    some = AroundBelief(radius=radius, recovery_radius=recovery)
+    some = AroundBelief(radius=radius / 2.0, recovery_radius=recovery / 2.0)
     some.setup(Context("candidates"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("omninav.stages.candidates.around_belief.BACKGROUND_REFERENCES", background)
-        return some.with_others(some.around(map, belief, LengthScale(1.0)), map)
+        return some.with_others(some.around(map, belief, LengthScale(2.0)), map)
 
 
 def chosen(candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:

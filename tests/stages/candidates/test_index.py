@@ -221,6 +221,8 @@ def test_without_faiss_all_references_of_a_large_map_are_looked_through_and_it_i
 def test_an_index_of_another_map_is_refused(index: ReferenceIndex) -> None:
     with pytest.raises(BadInput, match=r"index is of another map; wire reference_index\.map"):
         selected(index, MAP.features[0], a_map(3000))
+    with pytest.raises(BadInput, match="12 segments x 16 bins, the current one of 12 x 5"):
+        selected(index, MAP.features[0][:, :5])
 
 
 def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:

@@ -148,13 +148,10 @@ def test_only_a_pose_that_is_rather_right_counts_against_the_track(probability, 
 
 
 def test_without_recovery_particles_the_others_share_the_weight():
-    poses, weights = np.arange(12.0).reshape(4, 3), np.array([0.1, 0.1, 0.2, 0.6])
-    found = without_recovery(Particles(poses, weights, 1))
-    assert (found.poses == poses[:3]).all()
-    assert found.weights == pytest.approx([0.25, 0.25, 0.5])
-    assert found.recovery_particles == 0
-    lost = Particles(poses, np.array([0.0, 0.0, 0.0, 1.0]), 1)
-    assert without_recovery(lost) is lost  # they are all that is left
+    found = without_recovery(Particles(np.eye(3), np.array([0.125, 0.375, 0.5]), 1))
+    assert (found.weights.tolist(), found.recovery_particles) == ([0.25, 0.75], 0)
+    lost = Particles(np.eye(3), np.array([0.0, 0.0, 1.0]), 1)
+    assert without_recovery(lost) is lost  # it is all that is left
 
 
 def test_the_track_is_confirmed_for_twenty_length_scales_at_most():
