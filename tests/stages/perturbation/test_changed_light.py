@@ -19,6 +19,8 @@ def test_as_it_is_by_default():
 
 def test_gamma_gain_and_colour():
     assert (changed_light(GREY, 1.0, (0.5, 1.0, 3.0), 0.0, 0.0, AROUND)[0, 0] == [50, 100, 255]).all()
+    warm = ChangedLight(gain=0.5, blue=0.5, red=3.0).step(CTX, Panorama(GREY)).panorama
+    assert (warm.pixels == [25, 50, 150]).all()
     assert (changed_light(GREY, 2.0, (1.0, 1.0, 1.0), 0.0, 0.0, AROUND) == round(255 * (100 / 255) ** 2)).all()
 
 

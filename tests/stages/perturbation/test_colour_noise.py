@@ -25,6 +25,12 @@ def test_the_share_that_is_asked_for_is_covered(share):
         assert mask.mean() == pytest.approx(share, abs=1 / 360)
 
 
+@pytest.mark.parametrize(("share", "number"), [(0.04, 1), (0.4, 4)])
+def test_there_are_as_many_sectors_as_their_mean_width_allows_and_never_none(share, number):
+    masks = [sectors(np.random.default_rng(seed), 1, 360, share, 0.1)[0] for seed in range(100)]
+    assert max(np.count_nonzero(mask & ~np.roll(mask, 1)) for mask in masks) == number
+
+
 def test_sectors_reach_over_the_full_height():
     mask = sectors(np.random.default_rng(1), 60, 360, 0.4, 40 / 360)
     assert (mask == mask[0]).all()
@@ -59,6 +65,9 @@ def test_noise_has_the_mean_and_spread_asked_for_and_the_rest_is_untouched(monke
     assert noisy.mean() == pytest.approx(0.5, abs=0.01)
     assert pixels[noisy].mean(axis=0) == pytest.approx([120.0] * 3, abs=1.0)
     assert pixels[noisy].std(axis=0) == pytest.approx([20.0] * 3, abs=1.0)
+    for mean, cut in ((-300.0, 0), (500.0, 255)):
+        monkeypatch.setattr("omninav.stages.perturbation.colour_noise.MEAN", mean)
+        assert (covered(ColourNoise(share=1.0)) == cut).all()
 
 
 def test_no_share_changes_nothing():
