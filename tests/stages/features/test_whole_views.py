@@ -104,6 +104,15 @@ def test_local_contrast_goes_around_the_circle_and_counts_a_lit_side_as_little()
     assert inside == pytest.approx(contrast[:, 32:38], abs=0.15)
 
 
+def test_a_wave_around_the_robot_is_one_coefficient_of_its_row_and_channel() -> None:
+    sizes = np.arange(1.0, 7.0)
+    waves = sizes * (10.0 + np.cos(np.arange(8) * np.pi / 4)[:, None])
+    expected = np.outer(sizes, [10.0, 0.5, 0.0]) * np.sqrt(8.0)
+    strip = waves.reshape(8, 2, 3).swapaxes(0, 1)
+    assert spectrum_around(strip, 3) == pytest.approx(expected, abs=1e-9)
+    assert spectrum_around(strip, 3, mean=False) == pytest.approx(expected * [0.0, 1.0, 1.0], abs=1e-9)
+
+
 def test_a_spectrum_has_the_energy_of_its_strip() -> None:
     strip = np.random.default_rng(6).normal(size=(2, 9, 3)).astype(np.float32)
     sizes = np.abs(spectrum_around(strip, 5)) ** 2
