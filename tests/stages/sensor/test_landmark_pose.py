@@ -178,8 +178,8 @@ def test_a_map_that_was_saved_without_landmarks_is_said() -> None:
 
 
 def test_a_pose_is_the_likelier_the_more_sectors_of_the_view_its_landmarks_lie_in() -> None:
-    azimuths = np.radians([1.0, 14.0, 16.0, -1.0, 179.0])
-    assert sectors_of(np.column_stack([np.cos(azimuths), np.sin(azimuths), azimuths])) == 4
+    azimuths = np.radians([1.0, 14.0, 16.0, -1.0, 164.0, 166.0])
+    assert sectors_of(np.column_stack([np.cos(azimuths), np.sin(azimuths), 0 * azimuths])) == 5
     odds = np.exp([0.375, -0.375])  # 0.75 nats each sector, even at 7.5
     assert probabilities_of(np.array([8, 7])) == pytest.approx(odds / (1.0 + odds.sum()))
     assert probabilities_of(np.array([24])) == pytest.approx(1.0 / (1.0 + np.exp(-8.0)))
