@@ -58,6 +58,13 @@ def test_a_view_sees_the_face_of_the_closest_occupied_cell_ahead_of_it():
     assert AREAS.points[0] == pytest.approx([4.5, 3.0], abs=0.01)
 
 
+def test_views_to_all_four_sides_see_the_faces_there_wherever_the_grid_lies():
+    grid = OccupancyGrid(ROOM.cells, 1.0, (10.0, -20.0))
+    areas = visibility_areas(np.array([[14.5, -18.5, math.pi / 4]]), grid, axes_of(4))
+    faces = np.array([[11.0, -18.5], [14.5, -17.0], [18.0, -18.5], [14.5, -19.0]])
+    assert areas.points[areas.target[0]] == pytest.approx(faces, abs=0.01)
+
+
 def test_what_is_unknown_or_outside_blocks_and_shows_nothing():
     grid = drawn("..?#", "....", "...#")
     cells, _ = first_occupied(
