@@ -237,6 +237,7 @@ def test_calibrated_views_count_less_the_farther_off_they_were_taken_and_an_unkn
     assert np.allclose(found.likelihood.values, expected, atol=1e-5)
     assert found.field is not None
     assert found.field.floor == pytest.approx(1.0 / float(ratios.max()))
+    assert found.field.mean == pytest.approx(np.maximum(raised, found.field.floor).mean())
 
 
 def test_the_field_of_view_follows_from_the_match():
