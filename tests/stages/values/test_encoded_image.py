@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from omninav.stages.values.encoded_image import Undecodable, decode_image, size_of
+from omninav.stages.values.encoded_image import Undecodable, decode_image, orientation_of, size_of
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)
 
@@ -38,7 +38,42 @@ def test_the_size_of_a_progressive_jpeg_and_of_a_lossless_webp_is_read():
     assert size_of(b"P5\n# a comment\n20 # and one more\n12\n255\n") == (20, 12)
 
 
-@pytest.mark.parametrize(("width", "height"), [(30_000, 30_000), (2**31 - 1, 1), (0, 4), (2**32 - 1, 2**32 - 1)])
+SKIPPED = b"".join(b"\xff%c\0\x0a\0\0\1\0\0\1\0\1" % marker for marker in (0xE0, 0xC4, 0xC8, 0xCC, 0xDB))
+JPEG = b"\xff\xd8" + SKIPPED + b"\xff\1\xff\xd0\xff\xd7\xff\0\xff\xff\xc2\0\x0b\x08" + struct.pack(">HH", 300, 515)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        JPEG,
+        b"BM" + bytes(12) + struct.pack("<IHH", 12, 515, 300),
+        b"BM" + bytes(12) + struct.pack("<Iii", 40, 515, -300),
+        b"RIFF....WEBPVP8X" + bytes(8) + b"\2\2\0" + b"\x2b\1\0",
+        b"MM\0*" + struct.pack(">I2xHHHIHHHHII", 10, 2, 256, 3, 1, 515, 0, 257, 4, 1, 300),
+    ],
+)
+def test_heads_that_opencv_does_not_write_say_their_size(head: bytes):
+    assert size_of(head + bytes(9)) == (515, 300)
+
+
+def with_exif(orientation: int, kind: int) -> bytes:
+    """A JPEG with other segments before its EXIF, in which another entry stands first."""
+    tags = struct.pack("<HHHIIHHIHH", 2, 0x010F, 3, 1, 7, 0x0112, kind, 1, orientation, 0)
+    body, data = b"Exif\0\0II*\0\x08\0\0\0" + tags, encoded(".jpg")
+    other = b"\xff\xe1\0\x0aother\0\0\0"
+    return data[:2] + other + b"\xff\xe1" + struct.pack(">H", len(body) + 2) + body + data[2:]
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_jpeg_is_turned_as_its_exif_says_and_as_opencv_turns_it(orientation: int):
+    data = with_exif(orientation, 3)
+    assert orientation_of(data) == orientation
+    expected = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert (decode_image(data) == expected).all()
+    assert orientation_of(with_exif(orientation, 4)) == 1
+
+
+@pytest.mark.parametrize(("width", "height"), [(8193, 4096), (2**31 - 1, 1), (0, 4), (2**32 - 1, 2**32 - 1)])
 def test_an_image_that_says_it_is_too_large_is_not_decoded(width: int, height: int):
     with pytest.raises(Undecodable, match=f"{width} x {height} pixels, at most"):
         decode_image(png_saying(width, height))
