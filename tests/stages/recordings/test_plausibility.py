@@ -28,7 +28,13 @@ from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.plausibility import MotionLimits, believed, seconds_within, without_jumps
+from omninav.stages.recordings.plausibility import (
+    MotionLimits,
+    believed,
+    possible_between,
+    seconds_within,
+    without_jumps,
+)
 from omninav.stages.recordings.recording import Recording
 from omninav.stages.source.log import LogSource
 from omninav.stages.values.pose import BridgedMotion, Motion
@@ -182,6 +188,15 @@ def test_stretches_are_told_apart_by_hand() -> None:
     np.testing.assert_allclose(joined[:, 0], [0.0, 0.5, 1.5, 2.5, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0])
     at = np.array([0, 2, 4, 10, 15, 21], np.int64) * 5 * 10**8
     np.testing.assert_allclose(seconds_within(track.gaps, at), [0.0, 0.5, 1.5, 4.5, 6.0, 7.5])
+
+
+def test_a_robot_gets_as_far_as_its_speeds_allow_and_turns_the_shorter_way() -> None:
+    for way, turn, seconds, possible in (
+        (2.0, 0.0, 1.01, True), (2.0, 0.0, 0.99, False), (0.09, 0.0, 0.0, True), (0.11, 0.0, 0.0, False),
+        (0.0, 3.0, 1.01, True), (0.0, 3.0, 0.99, False), (0.0, 2 * math.pi - 0.3, 0.11, True),
+    ):  # fmt: skip
+        start, end = np.array([1.0, 1.0, 0.5]), np.array([1.0 + 0.6 * way, 1.0 - 0.8 * way, 0.5 + turn])
+        assert possible_between(start, end, seconds, MotionLimits(speed=2.0, turn=3.0)) == possible
 
 
 def test_a_pose_that_only_one_lost_message_makes_possible_costs_no_other() -> None:
