@@ -1,4 +1,4 @@
-"""Occupancy grids from files, from the built-in world and from a tour's path."""
+"""Occupancy grids from files and from the built-in world."""
 
 from pathlib import Path
 
@@ -9,13 +9,12 @@ from landmark_tour import graph_of
 from world_files import DEMO
 
 from omninav.pipeline import Context
-from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
+from omninav.stages.recordings.occupancy_grid import boxes, coarser, read_grid, read_occupancy
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 from omninav.stages.simulator.world_grid import WorldGrid
-from omninav.stages.source.occupancy_grid_loader import OccupancyGridLoader, along_path, free_space
+from omninav.stages.source.occupancy_grid_loader import OccupancyGridLoader
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
-from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 from .conftest import refused
@@ -65,6 +64,16 @@ def test_row_0_is_the_images_last_and_cells_are_found_by_their_points(tmp_path):
     assert grid.cells_of(points).tolist() == [[0, 0], [1, 1], [2, 1]]
     assert states_at(grid, points[:2]).tolist() == [UNKNOWN, OCCUPIED]
     assert grid.centres(np.array([1]), np.array([0])).tolist() == [[-0.75, 2.75]]
+
+
+def test_runs_that_stand_in_the_next_row_as_well_are_one_box(tmp_path):
+    rows = [[0, 0, 254, 0, 0], [0, 0, 254, 254, 0]]  # the lower one first
+    assert sorted(boxes(np.array(rows) == 0).tolist()) == [[0, 0, 2, 2], [3, 0, 5, 1], [4, 1, 5, 2]]
+    plan = read_grid(written(tmp_path, [rows[1], [254, 254, 0, 254, 254]]))
+    # one cell of half a metre, from (-1, 2) on two to the right
+    assert plan.outlines.shape == (3, 4, 2)
+    assert [[0.0, 2.0], [0.5, 2.0], [0.5, 2.5], [0.0, 2.5]] in plan.outlines.tolist()
+    assert (plan.width, plan.depth) == (1.5, 3.0)
 
 
 def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where_any_is():
@@ -138,19 +147,6 @@ def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path, monkeypatch)
     assert stage.inputs_digest() == OccupancyGridLoader(grid=str(file)).inputs_digest()
 
 
-def test_free_space_keeps_clear_of_obstacles_and_is_what_is_connected_to_the_references():
-    cells = np.full((7, 15), FREE, np.uint8)
-    cells[:, 7] = OCCUPIED
-    grid = OccupancyGrid(cells, 0.1, (0.0, 0.0))
-    assert len(free_space(grid, 0.0, None).centres) == 14 * 7
-    assert len(free_space(grid, 0.0, np.array([[0.25, 0.25]])).centres) == 7 * 7
-    # 0.25 m from the wall, whose face lies at x = 0.7: the centres 0.05 to 0.45
-    kept = free_space(grid, 0.25, np.array([[0.25, 0.25]])).centres
-    assert kept[:, 0].max() == pytest.approx(0.45)
-    assert free_space(grid, 5.0, None) is None
-    assert free_space(grid, 0.0, np.array([[9.0, 9.0]])) is None
-
-
 def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
     space = FreeSpace(np.array([[0.5, 0.5], [2.5, 0.5]]), 1.0)
     poses = space.draw(np.random.default_rng(0), 40_000)
@@ -192,32 +188,6 @@ def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
 def test_a_grid_that_is_not_there_is_named(tmp_path):
     with refused(r"none.yaml is no file"):
         OccupancyGridLoader(grid=str(tmp_path / "none.yaml")).inputs_digest()
-
-
-def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
-    ctx = Context("grid")
-    stage = OccupancyGridLoader(grid="from_tour", log="drive.mcap", resolution_m=0.1)
-    out = stage.step(ctx, None, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
-    assert out.grid.made_from == "tour"
-    assert ctx.counts["grid_is_a_stand_in"] == 1
-    assert "stand-in" in ctx.facts["grid"]
-    # free to 2 reaches = 0.5 m from the path, a cell of wall behind, unknown beyond
-    found = states_at(out.grid, np.array([[2.0, 0.0], [2.0, 0.4], [2.0, 0.55], [2.0, 0.8], [3.6, 2.0], [-0.55, 0.0]]))
-    assert found.tolist() == [FREE, FREE, OCCUPIED, UNKNOWN, FREE, OCCUPIED]
-    # two straight pieces of 4 and 3 m, 1 m wide, and round ends: 7 + pi / 4, less half the corner they share
-    assert len(out.free.centres) * 0.01 == pytest.approx(7 + np.pi / 4 - 0.25, abs=0.25)
-    assert stage.inputs_digest() is None
-
-
-def test_a_stand_in_without_edges_is_free_around_the_references_alone():
-    poses = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
-    grid = along_path(poses, np.zeros((0, 2), np.int64), 0.5, 0.1)
-    assert states_at(grid, np.array([[2.0, 0.0], [4.3, 0.0]])).tolist() == [UNKNOWN, FREE]
-
-
-def test_a_stand_in_without_a_map_is_refused():
-    with refused("from_tour needs a map"):
-        OccupancyGridLoader(grid="from_tour").step(CTX)
 
 
 def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path, monkeypatch):
