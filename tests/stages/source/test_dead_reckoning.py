@@ -11,6 +11,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.visual_compass import turn_between
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.source.dead_reckoning import assumed_motion
 from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.pose import AssumedMotion, Motion
@@ -80,6 +81,16 @@ def test_a_guessed_motion_is_as_uncertain_as_it_says():
     measured, guessed = noise.model(Motion(0.5, 0.0, 0.0)), noise.model(AssumedMotion(0.5, 0.0, 0.0, 0.5, 0.1))
     assert guessed.sigmas[1] == pytest.approx(math.hypot(measured.sigmas[1], 0.5))
     assert guessed.sigmas[0] == pytest.approx(math.hypot(measured.sigmas[0], 0.1 / math.sqrt(2)))
+
+
+def test_a_slow_guess_is_as_uncertain_as_one_of_half_a_metre_per_second():
+    motion = assumed_motion(None, None, 4.0, 0.25)
+    assert (motion.x, motion.y, motion.turn, motion.sigma_m, motion.sigma_turn) == (1.0, 0.0, 0.0, 2.0, 2.0)
+    around = np.sin(np.linspace(0, 2 * math.pi, 360, endpoint=False), dtype=np.float32)[None]
+    turned = assumed_motion(around, np.roll(around, 90, axis=1), 4.0, 0.75)  # to the left
+    eighth = 3.0 / math.sqrt(2.0)  # half of the turn is before the way
+    found = (turned.x, turned.y, turned.turn, turned.sigma_m, turned.sigma_turn)
+    assert found == pytest.approx((eighth, eighth, math.pi / 2, 3.0, math.radians(3.0)), abs=1e-3)
 
 
 def test_a_rate_takes_the_first_image_of_each_period(turning: str) -> None:
