@@ -7,6 +7,7 @@ from made_places import made_map
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.planning.shortest_path import (
+    SETTLE_S,
     ShortestPathPlanner,
     ShortestPathPlannerState,
     place_in_image,
@@ -14,6 +15,7 @@ from omninav.stages.planning.shortest_path import (
     shortest_route,
 )
 from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -31,7 +33,7 @@ def plans_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def a_map() -> TopologicalMap:
     names = ("hall", "", "kitchen", "", "kitchen", "")
-    return made_map([(0.0, 0.0)] * 6, BETWEEN, [(3, 0)], names)
+    return made_map([(float(n), 2.0 * n) for n in range(6)], BETWEEN, [(3, 0)], names)
 
 
 def believed(place: int, share: float = 0.9) -> PlaceBelief:
@@ -46,7 +48,14 @@ class Planner:
     def __init__(self, goal: int | str, **parameters: float) -> None:
         self.stage, self.state, self.ticks = ShortestPathPlanner(goal=goal, **parameters), ShortestPathPlannerState(), 0
 
-    def look(self, belief: PlaceBelief | int, status: str | None = None, at: int | None = None, share: float = 0.9):
+    def look(
+        self,
+        belief: PlaceBelief | int,
+        status: str | None = None,
+        at: int | None = None,
+        share: float = 0.9,
+        point: GoalPoint | None = None,
+    ):
         """The route of a robot that believes itself at a place, and drives, or does not, to the view `at` of it."""
         tick = Tick(0, 200_000_000 * self.ticks)
         self.ticks += 1
@@ -57,7 +66,7 @@ class Planner:
         if at is not None:
             views = int(self.state.views[-1])
             progress = PathProgress(self.state.number, at, views, at, at >= views - 1, False, status == "arrived")
-        return self.stage.step(Context("planning"), self.state, tick, belief, a_map(), None, doing, progress)
+        return self.stage.step(Context("planning"), self.state, tick, belief, a_map(), None, doing, progress, point)
 
 
 def planned(outs) -> list[bool]:
@@ -105,7 +114,7 @@ def distances(*values: float) -> VisualDistances:
 
 def test_a_picture_is_of_the_place_that_looks_most_like_it():
     stage = ShortestPathPlanner(goal="there.png")
-    told = distances(0.4, np.inf, 0.2, 0.3, 0.5, np.inf)
+    told = distances(0.6, np.inf, 0.5, 0.7, 0.8, np.inf)
     out = stage.step(Context("planning"), ShortestPathPlannerState(), Tick(0, 0), believed(0), a_map(), told)
     assert out.route.places.tolist() == [0, 1, 2]
 
@@ -113,6 +122,9 @@ def test_a_picture_is_of_the_place_that_looks_most_like_it():
 def test_a_picture_of_no_place_is_refused_with_the_nearest():
     with pytest.raises(BadInput, match=r"there\.png is of no place .* place 4, kitchen, at a visual distance of 0\.70"):
         place_in_image("there.png", distances(0.9, np.inf, np.inf, np.inf, 0.7, np.inf), 0.5, a_map())
+    with pytest.raises(BadInput, match=r"at a visual distance of 0\.51, where 0\.5 is allowed"):
+        stage, told = ShortestPathPlanner(goal="there.png"), distances(0.51, *[np.inf] * 5)
+        stage.step(Context("planning"), ShortestPathPlannerState(), Tick(0, 0), believed(0), a_map(), told)
     with pytest.raises(BadInput, match="too little in common with any"):
         place_in_image("there.png", distances(*[np.inf] * 6), 0.5, a_map())
 
@@ -131,15 +143,14 @@ def test_it_plans_once_it_is_sure_and_not_again(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_even_if_it_is_sure_it_looks_for_a_moment(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.6)
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", SETTLE_S)
     planner = Planner(3)
-    assert planned(planner.look(1) for _ in range(4)) == [False, False, False, True]
+    assert planned(planner.look(1) for _ in range(6)) == [*5 * [False], True]
 
 
-def test_who_looks_long_enough_goes_by_the_most_probable_place(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 0.6)
+def test_who_looks_long_enough_goes_by_the_most_probable_place():
     planner = Planner(3)
-    assert planned(planner.look(2, share=0.3) for _ in range(4)) == [False, False, False, True]
+    assert planned(planner.look(2, share=0.3) for _ in range(26)) == [*25 * [False], True]
 
 
 def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
@@ -163,8 +174,9 @@ def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is(monkeypatch
 def test_around_a_link_that_failed_there_may_be_another_way():
     planner = Planner("hall")
     assert planner.look(2).route.places.tolist() == [2, 1, 0]
+    planner.state.failed_links, planner.state.failures = np.array([[0, 1]]), np.array([1])  # the other way round
     out = planner.look(1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
-    assert planner.state.failed_links.tolist() == [[1, 0]]
+    assert (planner.state.failed_links.tolist(), planner.state.failures.tolist()) == ([[0, 1]], [2])
     assert out.route.places.tolist() == [1, 2, 3, 0]
 
 
@@ -179,7 +191,7 @@ def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_st
         "the last route ended because it was blocked: a chair"
     )
     assert last.path is not None
-    assert not last.path.views  # there is nothing to drive to any more
+    assert (last.path.number, last.path.views) == (3, ())  # there is nothing to drive to any more
     assert planner.look(2, "blocked", at=1).path is None
 
 
@@ -192,9 +204,14 @@ def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from
     assert out.route.places.tolist() == [1, 0, 3]
     planner.look(1, "blocked", at=0)  # the picture that it began with
     assert planner.state.failed_links.tolist() == [[1, 1], [1, 0]]
-    planner.state.failures = np.array([1, 1])
-    found = planner.look(PlaceBelief(np.array([0.1, 0.5, 0.3, 0.0, 0.1, 0.0]), np.zeros((6, 3))), "lost", at=0)
-    assert found.route.places.tolist() == [2, 3]  # 0.3 against half of 0.5
+    for other, places in ((0.12, [1, 2, 3]), (0.13, [2, 3])):  # against a quarter of 0.5, after the second time
+        planner.state.failures = np.array([1, 1])
+        found = planner.look(PlaceBelief(np.array([0.1, 0.5, other, 0.0, 0.1, 0.0]), np.zeros((6, 3))), "lost", at=0)
+        assert found.route.places.tolist() == places
+        assert planner.state.failures.tolist() == [2, 1]
+    there = Planner(1, search_s=0.0)
+    there.look(1)
+    assert there.look(1, "lost", at=0).path.names == ("place 1",)  # the goal's own medoid is always gone to
 
 
 def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_place(monkeypatch: pytest.MonkeyPatch):
@@ -205,6 +222,7 @@ def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_pl
     again = [planner.look(1, "lost", at=0) for _ in range(11)]
     assert planned(again) == 10 * [False] + [True]
     assert again[9].route.state == "locating"
+    assert again[10].path.names[0] == "place 1"  # with the medoid again
     assert planner.state.failed_links.tolist() == [[1, 1]]  # no link has failed: it may not be there at all
     assert planner.state.failures.tolist() == [2]
 
@@ -214,8 +232,9 @@ def test_sure_of_another_place_it_looks_around_no_longer(monkeypatch: pytest.Mon
     planner = Planner(3, search_s=2.0)
     for _ in range(2):
         planner.look(1)
-    for _ in range(3):
+    for _ in range(2):
         planner.look(1, "lost", at=0)
+    assert planner.look(4, "lost", at=0).path is None  # for a moment
     assert planner.look(4, "lost", at=0, share=0.45).path is None  # likelier, but not sure
     out = planner.look(4, "lost", at=0)
     assert out.path is not None
@@ -223,9 +242,9 @@ def test_sure_of_another_place_it_looks_around_no_longer(monkeypatch: pytest.Mon
 
 
 def test_lost_again_on_the_same_link_it_looks_around_too():
-    planner = Planner(4, search_s=1.0)
+    planner = Planner(4)
     planner.look(2)
-    assert planned(planner.look(2, "lost", at=1) for _ in range(7)) == [True, *5 * [False], True]
+    assert planned(planner.look(2, "lost", at=1) for _ in range(77)) == [True, *75 * [False], True]
     assert planner.state.failed_links.tolist() == [[2, 4]]
     assert planner.look(2, "blocked", at=1).path is not None  # who stands before something need not look around
 
@@ -234,6 +253,8 @@ def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
     planner = Planner(3)
     planner.look(1)
     planner.look(1, "lost", at=0)
+    planner.look(1, "driving", at=0)
+    assert len(planner.state.failed_links) == 1
     planner.look(1, "driving", at=1)
     assert not len(planner.state.failed_links)
 
@@ -255,9 +276,28 @@ def test_it_arrives_and_stays():
 
 
 def test_after_so_many_ways_it_gives_up_and_says_why():
-    planner = Planner(3, search_s=0.0, max_routes=2)
+    planner = Planner(3, search_s=0.0)
     planner.look(1)
-    planner.look(1, "lost", at=0)
+    for _ in range(19):
+        planner.look(1, "driving", at=1)
+        assert planner.look(1, "lost", at=0).path is not None
     route = planner.look(1, "lost", at=0).route
     assert route.state == "gave up"
-    assert route.why == "2 routes were tried; the last route ended because it was lost: too few matches"
+    assert route.why == "20 routes were tried; the last route ended because it was lost: too few matches"
+
+
+def test_a_robot_that_is_sent_elsewhere_looks_anew_and_goes_to_the_place_nearest_to_there(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.4)
+    planner = Planner(3)
+    for _ in range(3):
+        planner.look(1)
+    planner.look(1, "lost", at=1)
+    outs = [planner.look(1, "lost", at=1, point=point) for point in (GoalPoint(0.9, 4.4), None, None)]
+    assert planned(outs) == [False, False, True]
+    assert outs[-1].route.places.tolist() == [1, 2]
+    assert not len(planner.state.failed_links)  # no link was at fault
+    assert planner.look(2, "arrived", at=1).route.state == "arrived"
+    outs = [planner.look(2, point=point) for point in (GoalPoint(0.0, 0.1), None, None)]
+    assert outs[-1].route.places.tolist() == [2, 1, 0]
