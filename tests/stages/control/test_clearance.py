@@ -37,7 +37,7 @@ def test_a_range_beside_or_behind_is_not_ahead(cosine: float, free: float):
 
 def test_the_roomier_side_is_the_mean_of_what_is_in_front():
     # Left 4 m at 30 degrees, right 2 m at 90; 9 m behind to the right do not count.
-    ranges, azimuths = np.array([4.0, 2.0, 9.0]), np.radians([30.0, -90.0, -120.0])
+    ranges, azimuths = np.array([4.0, 2.0, 9.0]), np.radians([30.0, -90.0, -98.0])
     assert roomier_side(ranges, azimuths) == pytest.approx((4.0 * 0.5 - 2.0) / 2)
     assert roomier_side(ranges[:2], -azimuths[:2] / 2) == pytest.approx(
         (-4.0 * math.sin(math.radians(15)) + 2.0 * math.sin(math.radians(45))) / 2

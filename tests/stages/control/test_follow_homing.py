@@ -1,6 +1,7 @@
 """From homing vectors to commands."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.control.stall_monitor import StallMonitor, StallMonitorState
-from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
+from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState, wandering
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
@@ -40,8 +41,8 @@ def scan(*blocks: tuple[float, float, float]) -> Scan:
 class Robot:
     """The stages of driving, wired as in the variants, at five ticks a second."""
 
-    def __init__(self, wanders=False, search_s=60.0) -> None:
-        self.monitor, self.follow, self.wanders = StallMonitor(), FollowHoming(search_s=search_s), wanders
+    def __init__(self, wanders=False, **how) -> None:
+        self.monitor, self.follow, self.wanders = StallMonitor(), FollowHoming(**how), wanders
         self.monitored, self.followed, self.wandered = StallMonitorState(), FollowHomingState(), WallAvoiderState()
         self.ticks = 0
 
@@ -59,7 +60,7 @@ def drive(said, at=None, ring=None) -> FollowHoming.Out:
     return Robot().drive(said, at, ring)
 
 
-def command(out: FollowHoming.Out) -> tuple[float, float]:
+def command(out: FollowHoming.Out | WallAvoider.Out) -> tuple[float, float]:
     return out.command.speed, out.command.turning
 
 
@@ -69,9 +70,12 @@ def test_it_drives_where_the_vector_points_within_its_limits() -> None:
     left = drive(vector(0.3), progress(), scan())
     assert left.command.speed == pytest.approx(0.4 * math.cos(0.3))
     assert left.command.turning == pytest.approx(1.5 * 0.3)
-    behind = drive(vector(-2.8), progress(), scan())
-    assert command(behind) == (0.0, -0.8)
-    assert behind.status.state == "driving"
+    for ring in (None, scan()):
+        behind = drive(vector(math.tau - 2.8), progress(), ring)
+        assert command(behind) == (0.0, -0.8)
+        assert behind.status.state == "driving"
+    speeds = [drive(vector(math.radians(degrees)), progress()).command.speed for degrees in (34.0, 36.0)]
+    assert speeds == pytest.approx([0.4 * math.cos(math.radians(34.0)), 0.0])
 
 
 def test_towards_the_last_view_it_slows_down_but_on_the_way_it_does_not() -> None:
@@ -79,6 +83,7 @@ def test_towards_the_last_view_it_slows_down_but_on_the_way_it_does_not() -> Non
     assert drive(vector(ratio=0.15), progress(last=True)).command.speed == pytest.approx(0.2)
     assert drive(vector(metres=0.01), progress(last=True)).command.speed == 0.05
     assert drive(vector(metres=0.2), progress()).command.speed == 0.4
+    assert drive(vector(metres=0.2)).command.speed == pytest.approx(0.7 * 0.2)
 
 
 def test_it_docks_by_turning_alone_and_then_stands() -> None:
@@ -105,6 +110,7 @@ def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
         assert command(out) == STAND
         states.append(out.status.state)
     assert states == ["driving"] * 10 + ["blocked"] * 2
+    assert drive(vector(), progress(), closed).status.why == "waiting for a way through"
     assert out.status.why == "nothing is free for 0.8 m towards the target"
     assert robot.drive(vector(), progress(), scan()).command.speed == 0.4
 
@@ -141,13 +147,13 @@ def test_neither_may_it_turn_and_turn_in_the_open_for_ever(monkeypatch: pytest.M
     assert said[-1].status.why == "6 s have led no closer"
 
 
-def test_who_is_lost_for_long_wanders_until_the_target_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("omninav.stages.control.follow_homing.WANDER_AFTER_S", 1.0)
+def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
     robot = Robot(wanders=True)
-    said = [robot.drive(lost(), progress(), scan((-20.0, 0.0, 0.6))) for _ in range(7)]
-    assert [command(out) for out in said[:5]] == [STAND] * 5
-    assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
-    assert (said[-1].status.state, said[-1].status.why) == ("lost", "it wanders: 2 of 9 matches agree")
+    said = [robot.drive(lost(), progress(), scan((-20.0, 0.0, 0.6))) for _ in range(301)]
+    assert [command(out) for out in said[:25]] == [STAND] * 25
+    assert said[25].command.turning > 0.0  # away from what stands ahead, a little to the right
+    assert (said[299].status.state, said[299].status.why) == ("lost", "it wanders: 2 of 9 matches agree")
+    assert said[300].status.why == "the target was not seen in 60 s: 2 of 9 matches agree"
     assert robot.drive(vector(), progress(), scan()).status.state == "driving"
 
 
@@ -156,7 +162,7 @@ def test_towards_a_doubtful_target_it_goes_slowly_for_a_while_and_again_as_it_wa
     doubtful = vector(state="doubtful", why="8 of 20 matches agree")
     said = [robot.drive(doubtful, progress(), scan()) for _ in range(60)]
     assert [out.status.state for out in said] == ["driving"] * 25 + ["lost"] * 35  # a planner waits from then on
-    assert {out.command.speed for out in said[:25] + said[50:]} == {0.2}
+    assert [out.command.speed for out in said] == [0.2] * 25 + [0.4] * 25 + [0.2] * 10
     assert said[30].status.why == "it wanders: 8 of 20 matches agree"
     assert said[50].status.why == "it drives towards what may be its target: 8 of 20 matches agree"
     another = vector(number=1, state="doubtful")
@@ -199,12 +205,14 @@ def test_it_docks_at_a_wall_closer_than_it_stops_on_the_way() -> None:
     assert drive(vector(metres=0.08), progress(last=True), wall).command.speed > 0.0
 
 
-def test_it_stops_before_what_stands_straight_ahead_while_it_turns_to_a_free_direction() -> None:
-    post = scan((-2.0, 2.0, 0.38))
-    out = drive(vector(0.6, metres=2.0), progress(), post)
+@pytest.mark.parametrize(("metres", "speed"), [(0.42, 0.0), (0.47, 0.4 * math.cos(math.radians(30.0)))])
+def test_it_stops_before_what_stands_straight_ahead_while_it_turns_to_a_free_direction(
+    metres: float, speed: float
+) -> None:
+    # A post on the right lets it go 0.114 or 0.157 m straight on, and as far as it likes to the left.
+    out = drive(vector(math.radians(30.0), metres=2.0), progress(), scan((-31.0, -29.0, metres)))
     assert out.status.state == "driving"
-    assert out.command.turning > 0.0
-    assert out.command.speed == 0.0
+    assert command(out) == pytest.approx((speed, 1.5 * math.radians(30.0)))
 
 
 def test_time_in_which_the_target_is_lost_does_not_count_as_stalled(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,12 +224,13 @@ def test_time_in_which_the_target_is_lost_does_not_count_as_stalled(monkeypatch:
     assert said == ["driving"] * 10 + ["blocked"] * 3
 
 
-def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly() -> None:
+@pytest.mark.parametrize(("side", "speed"), [(0.26, 0.0), (0.28, 0.2), (0.34, 0.2), (0.36, 0.4)])
+def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly(side: float, speed: float) -> None:
     azimuths = scan().azimuths()
     beside = np.abs(np.sin(azimuths)) > 0.05
-    ranges = np.where(beside, 0.3 / np.maximum(np.abs(np.sin(azimuths)), 1e-9), np.inf)  # walls 0.3 m left and right
+    ranges = np.where(beside, side / np.maximum(np.abs(np.sin(azimuths)), 1e-9), np.inf)  # walls left and right
     narrow = Scan(ranges, -math.pi, math.radians(2.0), 0.05, 8.0)
-    assert drive(vector(), progress(), narrow).command.speed == pytest.approx(0.2)
+    assert drive(vector(), progress(), narrow).command.speed == pytest.approx(speed)
 
 
 def test_a_lost_target_is_followed_a_little_where_metres_are_known_and_then_it_stands() -> None:
@@ -236,3 +245,60 @@ def test_a_lost_target_is_followed_a_little_where_metres_are_known_and_then_it_s
 def test_without_a_target_it_waits() -> None:
     out = drive(None, None, scan())
     assert (out.command.speed, out.status.state) == (0.0, "waiting")
+
+
+def blocked_after(ring: Scan, at: PathProgress | None = None, later: float = 0.8, **how) -> float:
+    """Seconds after which a robot is said to be blocked of whose way 0.8 are left, and `later` from 15 s on."""
+    monitor, state = StallMonitor(), StallMonitorState()
+    for tick in range(500):
+        now = Tick(tick, 10**15 + tick * 200_000_000)
+        said = vector(ratio=0.8 if tick < 75 else later, **how)
+        if monitor.step(Context("stall"), state, now, ring, said, at).status is not None:
+            return tick / 5
+    return math.inf
+
+
+def post_beside(metres: float) -> Scan:
+    """A post so far to the left of the line ahead, 60 degrees from it."""
+    return scan((59.0, 61.0, metres / math.sin(math.radians(60.0))))
+
+
+@pytest.mark.parametrize(
+    ("ring", "how", "seconds"),
+    [
+        (scan(), {}, 30.2),
+        (scan(), {"later": 0.73}, 30.2),  # less than a tenth closer is not closer
+        (scan(), {"later": 0.71}, 45.2),
+        (scan(), {"at": progress(docking=True)}, math.inf),
+        (scan(), {"at": progress(arrived=True)}, math.inf),
+        (scan((-20.0, 20.0, 0.5)), {}, 10.2),
+        (scan((-20.0, 20.0, 0.5)), {"metres": 0.2}, 30.2),  # the target is closer
+        (scan((-20.0, 20.0, 1.15)), {}, 30.2),
+        (scan((30.0, 80.0, 0.5)), {"direction": math.radians(55.0)}, 10.2),
+        (post_beside(0.265), {}, 10.2),  # within the radius and a fifth of the margin
+        (post_beside(0.275), {}, 30.2),
+    ],
+)
+def test_who_comes_no_closer_is_blocked_after_ten_seconds_around_something_or_thirty_in_all(
+    ring: Scan, how: dict[str, Any], seconds: float
+) -> None:
+    assert blocked_after(ring, **how) == seconds
+
+
+def test_who_wanders_turns_away_the_more_the_less_room_there_is_and_keeps_its_side() -> None:
+    assert wandering(1.5, 0.3, -1) == pytest.approx((1.0, 0.5 * math.tanh(0.3), 0))
+    assert wandering(0.6, 0.0, 0) == pytest.approx((0.6, 0.7, 1))
+    assert wandering(0.6, 0.3, -1) == pytest.approx((0.6, -0.7, -1))
+    assert wandering(-0.5, -0.3, 0) == pytest.approx((0.0, -1.0, -1))
+
+
+def test_a_wandering_robot_is_as_fast_as_what_is_free_ahead_allows() -> None:
+    def wander(*rings: Scan) -> list[tuple[float, float]]:
+        stage, state = WallAvoider(), WallAvoiderState()
+        return [command(stage.step(Context("wander"), ring, state)) for ring in rings]
+
+    # 0.725 m are free before a post: half of the way from 0.25 m, where it stops, to 1.2 m. A wall is on its left.
+    post = scan((-1.0, 1.0, 0.975), (60.0, 90.0, 2.0))
+    slow, straight = pytest.approx((0.2, -0.6)), pytest.approx((0.4, 0.0))
+    assert wander(post, scan(), scan()) == [slow, slow, straight]  # what was seen once counts twice
+    assert [wander(post_beside(side))[0][0] for side in (0.39, 0.41)] == [0.0, 0.4]  # 0.4 m to both sides are kept free
