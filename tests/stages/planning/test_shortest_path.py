@@ -112,19 +112,20 @@ def distances(*values: float) -> VisualDistances:
     return VisualDistances(np.array(values), np.zeros(len(values)), np.zeros(len(values), np.int64))
 
 
+def places_to(told: VisualDistances) -> list[int]:
+    stage, state = ShortestPathPlanner(goal="there.png"), ShortestPathPlannerState()
+    return stage.step(Context("planning"), state, Tick(0, 0), believed(0), a_map(), told).route.places.tolist()
+
+
 def test_a_picture_is_of_the_place_that_looks_most_like_it():
-    stage = ShortestPathPlanner(goal="there.png")
-    told = distances(0.6, np.inf, 0.5, 0.7, 0.8, np.inf)
-    out = stage.step(Context("planning"), ShortestPathPlannerState(), Tick(0, 0), believed(0), a_map(), told)
-    assert out.route.places.tolist() == [0, 1, 2]
+    assert places_to(distances(0.6, np.inf, 0.5, 0.7, 0.8, np.inf)) == [0, 1, 2]
 
 
 def test_a_picture_of_no_place_is_refused_with_the_nearest():
     with pytest.raises(BadInput, match=r"there\.png is of no place .* place 4, kitchen, at a visual distance of 0\.70"):
         place_in_image("there.png", distances(0.9, np.inf, np.inf, np.inf, 0.7, np.inf), 0.5, a_map())
     with pytest.raises(BadInput, match=r"at a visual distance of 0\.51, where 0\.5 is allowed"):
-        stage, told = ShortestPathPlanner(goal="there.png"), distances(0.51, *[np.inf] * 5)
-        stage.step(Context("planning"), ShortestPathPlannerState(), Tick(0, 0), believed(0), a_map(), told)
+        places_to(distances(0.51, *[np.inf] * 5))
     with pytest.raises(BadInput, match="too little in common with any"):
         place_in_image("there.png", distances(*[np.inf] * 6), 0.5, a_map())
 
