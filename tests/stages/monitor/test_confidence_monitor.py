@@ -16,6 +16,7 @@ from omninav.stages.monitor.confidence_monitor import (
     by_landmarks,
     leads_of_best,
     mass_within,
+    share_counted,
     share_found,
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
@@ -269,14 +270,15 @@ def test_the_best_place_is_the_most_similar_references_turned_as_the_view_is(col
 
 def test_the_best_match_leads_matches_elsewhere_and_those_near_the_estimate():
     values = np.full((40, 36), 0.2, np.float32)
-    values[4, 0], values[5, 0], values[30, 0], values[20, 0] = 0.8, 0.7, 0.5, 0.4  # row 5 lies near the best
+    # Row 5 lies near the best one, turned by 20 degrees.
+    values[4, 0], values[5, 34], values[2, 0], values[20, 0] = 0.8, 0.7, 0.5, 0.4
     unit = values.max(axis=1).std()
     leads = leads_of_best(Similarities(values), LINE, np.array([20.0, 1.0, 2.0]), 1.5)
     assert leads.place == pytest.approx((4.0, 0.0, 0.0))
     assert leads.over_elsewhere * unit == pytest.approx(0.3, rel=1e-5)
     assert leads.over_estimate * unit == pytest.approx(0.4, rel=1e-5)
     assert leads_of_best(Similarities(values), LINE, np.array([20.0, 9.0, 2.0]), 1.5).over_estimate == 0.0
-    values[5, 9] = 0.75  # seen from another heading it is elsewhere
+    values[5, 32] = 0.75  # seen from another heading it is elsewhere
     assert leads_of_best(Similarities(values), LINE, np.zeros(3), 1.5).over_elsewhere * unit == pytest.approx(
         0.05, rel=0.1
     )
@@ -284,7 +286,7 @@ def test_the_best_match_leads_matches_elsewhere_and_those_near_the_estimate():
 
 def test_the_mass_within_a_tolerance_counts_position_and_heading_by_weight():
     poses = np.array([[0.3, 0.3, math.pi], [0.3, 0.3, -math.pi + 0.1], [0.3, 0.3, 0.0], [0.5, 0.5, math.pi]])
-    belief = Particles(poses, np.array([0.1, 0.2, 0.3, 0.4]))
+    belief = Particles(poses, np.array([0.2, 0.4, 0.6, 0.8]))
     assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.5, 0.2) == pytest.approx(0.3)
     assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.5, 0.05) == pytest.approx(0.1)
     assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.8, 0.2) == pytest.approx(0.7)
@@ -337,16 +339,31 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     here, gate = np.zeros(3), (0.5, math.radians(10.0))
 
     agreeing, sure = by_landmarks(0.0, fix(0.0, 0.99), 1.0, here, gate, 1.0, 2.0)
-    assert agreeing > 5.0
+    assert agreeing == pytest.approx(math.log(0.992 / 0.002))  # it may be wrong however many agree
     assert sure == pytest.approx(0.99)
-    assert by_landmarks(8.0, fix(8.0, 0.99), 1.0, here, gate, 1.0, 2.0)[0] < -0.5  # at once, whatever was known before
-    assert by_landmarks(8.0, fix(8.0, 0.7), 1.0, here, gate, 1.0, 2.0)[0] > 2.0  # as far as it may be wrong itself
+    # At once, whatever was known before: 1 % of what is left of that, and of the rest at most one in fifty.
+    kept = math.log(0.998665 / 0.001335)  # of 0.999665, a robot that may have been carried since
+    known = 0.01 * kept + 0.99 * math.log(50.0)
+    against = by_landmarks(8.0, fix(8.0, 0.99), 1.0, here, gate, 1.0, 2.0)[0]
+    assert against == pytest.approx(known + (0.99 + 0.01 * 0.2) * math.log(0.01), abs=1e-3)
+    opposite = by_landmarks(-8.0, fix(0.0, 0.7), 1.0, here, gate, 1.0, 2.0)[0]
+    assert opposite == pytest.approx(-0.3 * kept - 0.7 * math.log(50.0) + math.log(0.715 / 0.015), abs=1e-3)
+    two = replace(fix(8.0, 0.3), poses=np.array([[8.0, 0.0, 0.0], here]), probabilities=np.array([0.3, 0.6]))
+    by_chance = 0.1 * (0.6 / 20.0 + 0.3) / 0.9
+    assert by_landmarks(0.0, two, 1.0, here, gate, 1.0, 2.0)[0] == pytest.approx(
+        math.log((0.6 + by_chance) / (0.3 + by_chance)), abs=1e-5
+    )
     few, elsewhere, again = (
         by_landmarks(0.0, fix(x, 0.1), 1.0, here, gate, new, 2.0)[0] for x, new in ((0.0, 1.0), (8.0, 1.0), (0.0, 0.0))
     )
     assert few == pytest.approx(math.log(0.145 / 0.045))  # a wrong one lies at the estimate once in twenty times
-    assert -0.05 < elsewhere < 0.0  # it is rather wrong than right, and wrong in the next image too
-    assert 0.0 < again < 0.2 * few
+    # It is rather wrong than right, and wrong in the next image too.
+    assert elsewhere == pytest.approx((0.1 + 0.9 * 0.2) * math.log(0.9))
+    assert again == pytest.approx(0.1 * few)
+    once = by_landmarks(4.0, None, 1.0, here, gate, 1.0, 2.0)[0]
+    kept = math.log(0.98105 / 0.01895)  # of 0.98201, less a 500th of what is above a half
+    assert once == pytest.approx(kept + 0.2 * math.log(0.5 / 0.95), abs=1e-3)
+    assert by_landmarks(-1.95, None, 1.0, here, gate, 1.0, 2.0)[0] == -2.0
     odds = 4.0
     for _ in range(60):
         odds, sure = by_landmarks(odds, None, 1.0, here, gate, 1.0, 2.0)
@@ -358,7 +375,24 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
 
 def test_landmarks_are_missed_beside_references_and_not_where_the_map_shows_nothing():
     shares = [share_found(distance) for distance in (0.0, 2.0, 5.0, 8.0, math.inf)]
-    assert shares == pytest.approx([1.0, 0.98, 0.5, 0.01, 0.0], abs=0.01)
+    assert shares == pytest.approx([1.0, 0.9824, 0.5, 0.0106, 0.0], abs=1e-4)  # halved by (distance / 5)^4
+
+
+def test_an_image_counts_by_its_lead_fully_at_twice_that_at_which_it_counts_half():
+    assert [share_counted(lead) for lead in (0.0, 0.35, 0.7, 1.4)] == pytest.approx([0.0, 1 / 17, 0.5, 16 / 17])
+
+
+def test_an_image_fades_by_what_the_later_ones_count_and_is_carried_along():
+    state, here = ConfidenceMonitorState(), np.zeros(3)
+    for x in range(501):
+        state.add(np.array([x, 0.0, 0.0]), here, 1.0, 0.5, 1.0)
+    assert len(state.weights) == len(state.novelties) == len(state.estimates) == 500
+    fading = np.exp(-np.array([2.0, 1.0, 0.0]) / 20.0)
+    assert state.weights[-3:] == pytest.approx(0.5 * fading)
+    assert state.contradictions[-3:] == pytest.approx(fading)
+    state.move(Motion(1.0, 2.0, 0.5))
+    assert state.places[0] == pytest.approx((2.0, 2.0, 0.5))
+    assert state.estimates[0] == pytest.approx((1.0, 2.0, 0.5))
 
 
 def test_a_dark_image_does_not_take_back_what_landmarks_said_against_an_estimate():
