@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.probability.consistency import log_odds_of_right
 from omninav.stages.monitor.confidence_monitor import (
     ConfidenceMonitor,
     ConfidenceMonitorState,
@@ -21,6 +22,7 @@ from omninav.stages.monitor.confidence_monitor import (
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks
@@ -245,14 +247,14 @@ def test_a_pose_at_the_same_place_is_wrong_where_it_is_turned_away(heading: floa
 
 def test_inputs_that_mislead_lower_the_confidence():
     def sure(conflicts: Conflicts | None) -> float:
-        return judged(ConfidenceMonitor(right_in_conflict=0.3), HERE, alike(), conflicts=conflicts).probability
+        return judged(ConfidenceMonitor(), HERE, alike(), conflicts=conflicts).probability
 
     alone = sure(None)
     assert alone > 0.5
     said = ("the camera is frozen",)
     assert sure(Conflicts(said, (), False)) == alone
     assert sure(Conflicts(said, said, False)) == alone
-    assert sure(Conflicts(said, said, True)) == pytest.approx(0.3 * alone)
+    assert sure(Conflicts(said, said, True)) == pytest.approx(0.2 * alone)
 
 
 @pytest.mark.parametrize("column", [0, 9, 30])
@@ -314,14 +316,18 @@ def features(number: int) -> LocalFeatures:
     )  # fmt: skip
 
 
-def test_until_landmarks_are_found_matches_that_agree_are_not_believed():
-    """Images of another building agree with each other too, and have as many features."""
+def line_with_landmarks(found_rate: float) -> ReferenceGraph:
     words = words_of([np.full((1, 128), 1, np.uint8)], np.ones((1, 128), np.float32))
     landmarks = Landmarks(
         np.zeros((1, 3), np.float32), np.zeros((1, 128), np.uint8), np.zeros(41, np.int64), np.zeros(0, np.int32),
-        0.001, words, 1.0, "",
+        0.001, words, found_rate, "",
     )  # fmt: skip
-    map = replace(LINE, landmarks=landmarks)
+    return replace(LINE, landmarks=landmarks)
+
+
+def test_until_landmarks_are_found_matches_that_agree_are_not_believed():
+    """Images of another building agree with each other too, and have as many features."""
+    map = line_with_landmarks(1.0)
     way = list(range(20))
     found = [fix(float(x), 0.99) for x in range(10)]
     told = stated(way, map=map, features=features(200), fixes=[*found, None, None, fix(12.0, 0.99)], carried_at=10)
@@ -371,6 +377,48 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     assert sure == 0.0
     assert by_landmarks(0.0, None, 0.0, here, gate, 1.0, 2.0)[0] == 0.0  # of a map without landmarks nothing follows
     assert by_landmarks(4.0, None, 1.0, here, gate, 0.0, 2.0)[0] == pytest.approx(4.0)  # nor from the same image again
+
+
+def test_missed_landmarks_take_away_what_agreement_says_and_not_what_disagreement_does():
+    def told(x: float, number: int, seen: LandmarkFix | None = None) -> float:
+        """Log odds after an image whose best match lies at x, then one that has as many features."""
+        state = ConfidenceMonitorState()
+        state.add(np.array([x, 0.0, 0.0]), HERE[0], 1.0, 1.0, 0.0)
+        map = line_with_landmarks(0.6)
+        right = judged(ConfidenceMonitor(), HERE, None, state, map=map, features=features(number), fix=seen).probability
+        return math.log(right / (1.0 - right))
+
+    agreeing, disagreeing = told(0.0, 99), told(9.0, 99)  # the second image is dark
+    one, none = np.ones(1), np.zeros(1)
+    assert agreeing == pytest.approx(log_odds_of_right(one, none, one, 0.02, 20.0, 0.02))
+    assert disagreeing == pytest.approx(log_odds_of_right(none, one, one, 0.02, 20.0, 0.02))
+    assert told(0.0, 100) == pytest.approx(0.4 * agreeing + math.log(1.0 - 0.95 * 0.6))
+    assert told(9.0, 100) == pytest.approx(disagreeing + math.log(1.0 - 0.95 * 0.6))
+    alone, _ = by_landmarks(0.0, fix(0.0, 0.5), 0.0, np.zeros(3), (0.5, math.radians(10.0)), 0.0, 6.0)
+    assert told(0.0, 99, fix(0.0, 0.5)) == pytest.approx(0.5 * agreeing + alone)
+
+
+def test_a_robot_is_on_the_map_from_the_first_sure_pose_on_and_landmarks_say_less_far_from_references():
+    def after(odds: float, found: bool, seen: LandmarkFix | None = None, step: float = 0.15) -> ConfidenceMonitorState:
+        state, poses = ConfidenceMonitorState(geometry=odds, found=found), HERE + np.array((3.0, -1.5, 0.0))
+        inputs = {"motion": Motion(step, 0.0, 0.0), "features": features(200), "fix": seen}
+        judged(ConfidenceMonitor(), poses, None, state, map=line_with_landmarks(0.6), **inputs)
+        return state
+
+    # At five length scales from the nearest reference half as many are found, and half a scale is half an image.
+    expected, _ = by_landmarks(3.0, None, 0.5 * 0.6, np.zeros(3), (0.5, 0.2), 0.5, 1.0)
+    assert after(3.0, True).geometry == pytest.approx(expected)
+    assert (after(-0.999, True).geometry, after(-6.2, False).geometry) == (-1.0, -6.0)  # no more is said against it
+    assert [after(odds, False, step=0.0).found for odds in (4.58, 4.62)] == [False, True]
+    assert [after(0.0, False, fix(50.0, sure)).found for sure in (0.89, 0.91)] == [False, True]
+
+
+def test_a_robot_that_is_told_its_pose_begins_anew():
+    state = ConfidenceMonitorState(sure=True, empty=5, geometry=9.0)
+    assert (
+        judged(ConfidenceMonitor(), np.diag((0.0, 9.0, 0.0)), None, state, restart=Reinitialise()).state == "searching"
+    )
+    assert (state.empty, state.geometry) == (1, 0.0)
 
 
 def test_landmarks_are_missed_beside_references_and_not_where_the_map_shows_nothing():
