@@ -98,7 +98,7 @@ def test_a_lost_robot_searches_slowly_behind_the_opening_that_it_sees() -> None:
     for _ in range(400):
         command = robot.look(LOST).search
         assert command is not None
-        assert command.speed in (0.0, 0.15)
+        assert command.speed == (0.15 if abs(command.turning) <= 1.5 * math.radians(30.0) else 0.0)
         robot.go(0.2 * command.turning, 0.2 * command.speed)
         if robot.pose[0] < -2.5:
             break
@@ -127,3 +127,17 @@ def test_without_ranges_it_only_passes_the_vector_on() -> None:
     out = LocalPlanner().step(CTX, LocalPlannerState(), Tick(0, 0), None, None, LOST)
     assert out.vector is LOST
     assert out.search is None
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [((1.62, -0.27), (0.02, 0.03)), ((-0.27, 1.62), (0.03, 0.02)), ((1.42, -1.42), (1.42, -1.42))],
+)
+def test_the_grid_moves_by_whole_cells_with_a_robot_that_leaves_its_middle(
+    before: tuple[float, float], after: tuple[float, float]
+) -> None:
+    state, wall = LocalPlannerState(pose=np.array([*before, 0.5])), np.array([0.35, 0.95])
+    state.evidence.flat[cell_at(wall)] = 1.0
+    LocalPlanner().step(CTX, state, Tick(0, 0))
+    assert state.pose == pytest.approx((*after, 0.5))
+    assert np.flatnonzero(state.evidence).tolist() == [cell_at(wall + np.subtract(after, before))]
