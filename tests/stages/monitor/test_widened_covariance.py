@@ -7,7 +7,7 @@ import pytest
 from landmark_tour import graph_of
 
 import omninav
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.monitor.widened_covariance import WidenCovariance, WidenCovarianceState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
@@ -39,7 +39,7 @@ def test_an_estimate_that_is_more_probably_wrong_than_right_may_be_anywhere_in_t
     far = np.array([-20.0, 0.0])
     assert math.sqrt(found[0, 0]) == pytest.approx(11.6, abs=0.1)  # 5.9 m about the middle, which is 10 m away
     assert far @ np.linalg.inv(found[:2, :2]) @ far < 5.991  # the map's other end is within the 95 % ellipse
-    assert math.sqrt(found[2, 2]) > 1.8  # of any heading
+    assert found[2, 2] == pytest.approx(0.003 + math.pi**2 / 3.0)  # of any heading
     assert widened(0.51).covariance[0, 0] < 0.1
 
 
@@ -62,21 +62,25 @@ def test_what_is_published_drawn_and_measured_is_the_widened_estimate(variant):
 
 
 def test_a_pose_by_landmarks_keeps_its_own_covariance_until_odometry_has_drifted():
-    stage, state, told = WidenCovariance(floor=0.6), WidenCovarianceState(), PoseConfidence(0.9)
+    stage, state, told = WidenCovariance(), WidenCovarianceState(), PoseConfidence(0.9)
     estimate = PoseEstimate(POSE, 1e-4 * np.eye(3), 0.9, POSE)
-    there, away = np.array([[POSE.x, POSE.y, POSE.heading]]), np.array([[POSE.x + 1.0, POSE.y, POSE.heading]])
+    # Less and more than four standard deviations away, of both together.
+    there, away = (np.array([[POSE.x + off, POSE.y, POSE.heading + math.tau]]) for off in (0.056, 0.057))
 
-    def variance(poses: np.ndarray | None, probability: float, metres: float) -> float:
+    def variance(poses: np.ndarray | None, probability: float, metres: float, first: bool = False) -> float:
         fix = None
         if poses is not None:
             fix = LandmarkFix(poses, 1e-4 * np.eye(3)[None], np.array([50]), np.array([probability]), 60)
-        ctx = Context("wide")
-        out = stage.step(ctx, estimate, told, LengthScale(0.5), MAP, state, fix, Motion(metres, 0.0, 0.0))
+        ctx, motion = Context("wide"), Motion(0.6 * metres, 0.8 * metres, 0.0)
+        ctx.tick = Tick(0, 0, first_of_log=first)
+        out = stage.step(ctx, estimate, told, LengthScale(0.5), MAP, state, fix, motion)
         return float(out.estimate.covariance[0, 0])
 
     assert variance(None, 0.0, 0.2) == pytest.approx(1e-4 + 0.09)  # no landmarks yet: the whole share
     assert variance(away, 0.99, 0.2) == pytest.approx(1e-4 + 0.09)  # landmarks that say another pose
-    assert variance(there, 0.5, 0.2) == pytest.approx(1e-4 + 0.09)  # too few to be sure of
-    assert variance(there, 0.99, 0.2) == pytest.approx(1e-4)
+    assert variance(there, 0.89, 0.2) == pytest.approx(1e-4 + 0.09)  # too few to be sure of
+    assert variance(there, 0.91, 0.2) == pytest.approx(1e-4)
     assert variance(None, 0.0, 1.0) == pytest.approx(1e-4 + 0.01 + 0.0025)
+    assert variance(None, 0.0, 0.0, first=True) == pytest.approx(1e-4 + 0.09)
+    assert variance(there, 0.99, 0.0) == pytest.approx(1e-4)
     assert variance(None, 0.0, 50.0) == pytest.approx(1e-4 + 0.09)
