@@ -16,6 +16,7 @@ from omninav.stages.camera.donut import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
@@ -395,6 +396,22 @@ def test_without_a_target_there_is_no_map_and_no_vector() -> None:
     assert homing.mapped.map is None
     assert HomingVectorFromMap().step(homing.ctx, None).vector is None
     assert homing.tracker.step(homing.ctx, homing.tracked, look("mirror", 0.4), CAMERA).tracks is None
+
+
+def test_a_vector_is_in_the_robots_frame_and_its_lengths_are_in_their_units() -> None:
+    # The robot at (1, 0) has turned by 90 degrees to the left, the target at (-3, 3) by 120: it is 3 ahead and 4 left.
+    here, turned = np.array([1.0, 0.0, 0.0]), [turn_about_vertical(math.radians(angle)) for angle in (90.0, 120.0)]
+    map = LocalMap(
+        7, 3, "tracking", 20, rows=np.arange(3), places=here + 10.0 * np.eye(3), rotation=turned[0], translation=here,
+        goal_rotation=turned[1], goal_translation=np.array([-3.0, 3.0, 0.0]), unit=0.04, metres=0.3,
+    )  # fmt: skip
+    at_robot = replace(map, places=np.tile(here, (3, 1)), metres=0.0)
+    stage, ctx = HomingVectorFromMap(), Context("homing")
+    found, close, none = (stage.step(ctx, each).vector for each in (map, at_robot, LocalMap(-1, 3, "lost")))
+    assert (found.direction, found.turn) == pytest.approx((math.atan2(4.0, 3.0), math.radians(30.0)))
+    assert (found.distance, found.ratio, found.nearness, found.metres) == pytest.approx((5.0, 0.2, 0.5, 1.5))
+    assert (close.nearness, close.metres) == (1.0, None)
+    assert (none.direction, none.turn, none.distance, none.ratio, none.nearness) == (0.0, 0.0, 1.0, 1.0, 1.0)
 
 
 def test_missing_wires_are_reported() -> None:
