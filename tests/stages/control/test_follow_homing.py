@@ -292,11 +292,12 @@ def test_who_wanders_turns_away_the_more_the_less_room_there_is_and_keeps_its_si
     assert wandering(-0.5, -0.3, 0) == pytest.approx((0.0, -1.0, -1))
 
 
-def test_a_wandering_robot_is_as_fast_as_what_is_free_ahead_allows() -> None:
-    def wander(*rings: Scan) -> list[tuple[float, float]]:
-        stage, state = WallAvoider(), WallAvoiderState()
-        return [command(stage.step(Context("wander"), ring, state)) for ring in rings]
+def wander(*rings: Scan) -> list[tuple[float, float]]:
+    state = WallAvoiderState()
+    return [command(WallAvoider().step(Context("wander"), ring, state)) for ring in rings]
 
+
+def test_a_wandering_robot_is_as_fast_as_what_is_free_ahead_allows() -> None:
     # 0.725 m are free before a post: half of the way from 0.25 m, where it stops, to 1.2 m. A wall is on its left.
     post = scan((-1.0, 1.0, 0.975), (60.0, 90.0, 2.0))
     slow, straight = pytest.approx((0.2, -0.6)), pytest.approx((0.4, 0.0))

@@ -48,14 +48,7 @@ class Planner:
     def __init__(self, goal: int | str, **parameters: float) -> None:
         self.stage, self.state, self.ticks = ShortestPathPlanner(goal=goal, **parameters), ShortestPathPlannerState(), 0
 
-    def look(
-        self,
-        belief: PlaceBelief | int,
-        status: str | None = None,
-        at: int | None = None,
-        share: float = 0.9,
-        point: GoalPoint | None = None,
-    ):
+    def look(self, belief: PlaceBelief | int, status=None, at: int | None = None, share=0.9, point=None):
         """The route of a robot that believes itself at a place, and drives, or does not, to the view `at` of it."""
         tick = Tick(0, 200_000_000 * self.ticks)
         self.ticks += 1
