@@ -15,7 +15,6 @@ from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.planning.roadmap import (
     BLOCKED_HERE,
     HOVER_S,
-    UNLIKE_IMAGES,
     RoadmapPlanner,
     RoadmapPlannerState,
     goal_poses,
@@ -127,7 +126,7 @@ def doubtful(drive: Drive, *poses, probabilities=(0.5, 0.3)) -> None:
 
 def looked(drive: Drive, **how) -> RoadmapPlanner.Out:
     """Stands where it is for as many images as it takes to judge a place."""
-    return [drive.step(**how) for _ in range(UNLIKE_IMAGES)][-1]
+    return [drive.step(**how) for _ in range(5)][-1]
 
 
 def test_a_doubtful_goal_is_borne_out_by_its_look_else_the_robot_goes_to_the_rival() -> None:
@@ -227,7 +226,7 @@ def test_a_robot_that_is_sent_elsewhere_goes_there_and_to_no_heading() -> None:
     drive.step(fix=fix_at(GOAL))
     out = drive.step(point=GoalPoint(2.0, 2.5))
     assert out.route.state == "under way"
-    assert (out.route.goal.x, out.route.number, out.vector.turn) == (2.0, 1, 0.0)
+    assert (out.route.goal.x, out.route.number, out.route.asked, out.vector.turn) == (2.0, 1, 1, 0.0)
     lost = drive.step(point=GoalPoint(3.0, 2.5), confidence=0.1)
     assert (lost.route.state, lost.route.places.tolist()) == ("locating", [])
 
@@ -249,6 +248,8 @@ def test_it_docks_within_two_centimetres_until_it_is_four_away_and_arrives_withi
         off = np.array([[metres, 0.0, math.radians(degrees)]])
         return drive.step(fix=replace(seen, poses=drive.plan.goal + off))
 
+    unsure = replace(seen, poses=drive.plan.goal[None], probabilities=np.array([0.49]))
+    assert not drive.step(fix=unsure).progress.docking
     docking = [at(metres, -2.2).progress.docking for metres in (0.022, 0.018, 0.038, 0.042, 0.03)]
     assert docking == [False, True, True, False, False]
     assert at(0.01, -2.2).vector.turn == pytest.approx(math.radians(2.2))
@@ -262,11 +263,11 @@ class Line:
         self.plan, self.point = RoadmapPlannerState(), GoalPoint(x, 0.0)
         self.map = graph_of(np.column_stack([np.arange(0.0, 6.5, 0.5), np.zeros((13, 2))]))
 
-    def at(self, x: float, seconds: float = 0.0, confidence: float = 0.5) -> RoadmapPlanner.Out:
+    def at(self, x: float, seconds: float = 0.0, confidence: float = 0.5, **how) -> RoadmapPlanner.Out:
         pose, point, self.point = Pose(x, 0.0, 0.3), self.point, None
         known = PoseEstimate(pose, np.eye(3), 1.0, pose), PoseConfidence(confidence)
         tick = Tick(0, int(seconds * 1e9))
-        return RoadmapPlanner().step(Context("planning"), self.plan, tick, self.map, *known, point=point)
+        return RoadmapPlanner().step(Context("planning"), self.plan, tick, self.map, *known, point=point, **how)
 
 
 def test_it_drives_to_a_point_ahead_and_its_ratio_falls_from_one_within_each_leg() -> None:
@@ -286,3 +287,10 @@ def test_it_goes_to_points_within_five_metres_of_the_map_and_has_arrived_after_t
     line = Line(6.0)
     states = [line.at(x, s).route.state for x, s in ((5.91, 0), (5.89, 5), (5.91, 9), (5.91, 18.9), (5.91, 19))]
     assert states == ["under way"] * 4 + ["arrived"]
+
+
+def test_a_way_counts_longer_beside_where_it_was_blocked_and_ten_times_as_much_the_second_time() -> None:
+    line = Line(6.0)
+    for seconds, metres in ((0, 10.0), (4.9, 10.0), (5, 100.0)):
+        line.at(0.1, seconds, status=BLOCKED)  # at 1.3 m: from the reference at 0.5 m on
+        assert line.plan.extra[:6].tolist() == [0.0, *4 * [metres], 0.0]
