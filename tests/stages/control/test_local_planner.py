@@ -117,6 +117,7 @@ def test_a_robot_that_gets_lost_forgets_what_stood_around_it() -> None:
     led = robot.look(robot.vector_to(2.0, 0.0)).vector
     assert led is not None
     assert abs(led.direction) > 0.5
+    assert led.metres == pytest.approx(2.0 * (2.4 + 2.0**0.5), abs=0.2)  # along and across cells, 0.4 m beside its end
     robot.walls = np.zeros((0, 2, 2))
     robot.look(LOST)
     said = robot.vector_to(2.0, 0.0)
@@ -131,7 +132,7 @@ def test_without_ranges_it_only_passes_the_vector_on() -> None:
 
 @pytest.mark.parametrize(
     ("before", "after"),
-    [((1.62, -0.27), (0.02, 0.03)), ((-0.27, 1.62), (0.03, 0.02)), ((1.42, -1.42), (1.42, -1.42))],
+    [((1.67, -0.27), (-0.03, 0.03)), ((-0.27, 1.62), (0.03, 0.02)), ((1.42, -1.42), (1.42, -1.42))],
 )
 def test_the_grid_moves_by_whole_cells_with_a_robot_that_leaves_its_middle(
     before: tuple[float, float], after: tuple[float, float]
