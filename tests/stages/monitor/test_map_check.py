@@ -77,6 +77,10 @@ def test_headings_are_judged_by_neighbours_that_turn() -> None:
     assert of_headings(turned, turned) == ""
     assert "headings turn against its images" in of_headings(turned, -turned)
     assert of_headings(np.zeros(30), np.zeros(30)) == ""
+    headings = math.radians(40.0) * (-1.0) ** np.arange(100)
+    for against, said in ((62, False), (63, True)):  # by more than a quarter of them all
+        seen = np.where(np.arange(100) < against, -headings, headings)
+        assert bool(of_headings(seen, headings)) == said
 
 
 @pytest.mark.parametrize(
@@ -112,6 +116,7 @@ def test_views_of_one_segment_are_not_compared() -> None:
     map = drifting(60)
     shuffled = map.poses[np.random.default_rng(0).permutation(60)]
     assert said(replace(map, poses=shuffled, features=map.features[:, :1])) == ()
+    assert said(replace(map, poses=shuffled, features=map.features[:, :2]))
 
 
 def test_of_a_large_map_an_image_is_compared_with_some_and_with_its_neighbours() -> None:
