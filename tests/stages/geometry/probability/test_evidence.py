@@ -1,7 +1,15 @@
+import math
+
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.probability.evidence import centre_and_spread, hazen_quantile
+from omninav.stages.geometry.probability.evidence import (
+    best_headings,
+    centre_and_spread,
+    contrast_power,
+    evidence_novelty,
+    hazen_quantile,
+)
 
 
 @pytest.mark.parametrize("quantile", [0.0, 0.2, 0.5, 0.8, 0.95, 1.0])
@@ -20,3 +28,22 @@ def test_centre_and_spread_are_numpys_to_the_bit() -> None:
             centre = np.average(values.astype(np.float64), weights=weights)
             variance = np.average(np.square(values - centre), weights=weights)
             assert centre_and_spread(values, weights) == (centre, np.sqrt(variance))
+
+
+def test_the_best_heading_is_the_first_of_the_highest() -> None:
+    best, at = best_headings(np.array([[1.0, 3.0, 3.0], [2.0, 0.0, 1.0]], np.float32))
+    assert (best.tolist(), at.tolist()) == ([3.0, 2.0], [1, 0])
+
+
+def test_similarities_are_spread_to_the_contrast() -> None:
+    best = np.exp(
+        np.array([0.0, 2.0], np.float32)
+    )  # standard deviation of the logarithms 1; weighted 3 to 1, sqrt(3/4)
+    assert contrast_power(best, 3.0) == pytest.approx(3.0, rel=1e-6)
+    assert contrast_power(best, 3.0, np.array([3.0, 1.0])) == pytest.approx(3.0 / math.sqrt(0.75), rel=1e-6)
+    assert contrast_power(np.full(4, 0.5, np.float32), 3.0) == 1.0
+
+
+def test_an_image_is_as_new_as_the_way_to_it() -> None:
+    given = [(None, 2.0), (0.0, 0.0), (0.5, 2.0), (0.5, 0.8), (0.0, 2.0), (3.0, 2.0)]
+    assert [evidence_novelty(*each) for each in given] == [1.0, 1.0, 0.25, 0.625, 0.05, 1.0]
