@@ -1,12 +1,13 @@
 """Small stages for the tests of the framework, and graphs of them: numbers instead of robots."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Truth, Value
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.files import digest_text, write_whole
 from omninav.pipeline.graph.results import Figure, Metrics
 
 
@@ -65,6 +66,25 @@ class Count(Source):
 
     def length(self) -> int | None:
         return self.length_ * self.logs
+
+
+class Drive(Count):
+    """Numbers that are computed, or read from where they were recorded."""
+
+    place: str | None = None
+
+    def recording_key(self) -> str | None:
+        return None if self.place else digest_text("drive", str(self.length_))
+
+    def recording_name(self) -> str:
+        return f"a drive of {self.length_}"
+
+    def record(self, ctx: Context, folder: Path) -> None:
+        ctx.fact("length_m", self.length_)
+        write_whole(folder / "drive.txt", str(self.length_))
+
+    def replay(self, folder: Path) -> Mapping[str, Any]:
+        return {"place": str(folder), "gap": None}
 
 
 class GivesNumber(Stage):
