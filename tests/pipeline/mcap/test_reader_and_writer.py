@@ -3,6 +3,7 @@
 import itertools
 import random
 import struct
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 from memory_peak import memory_peak
 
-from omninav.pipeline.mcap.chunks import MAGIC
+from omninav.pipeline.mcap.chunks import MAGIC, Allowance, unpack
 from omninav.pipeline.mcap.message import BadMessage, LogError
 from omninav.pipeline.mcap.message_types import encode_message, make_message
 from omninav.pipeline.mcap.reader import LogReader
@@ -111,6 +112,10 @@ def test_a_message_without_a_header_has_its_log_time_as_stamp(tmp_path: Path) ->
 
 def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
     assert written(tmp_path / "a.mcap").read_bytes() == written(tmp_path / "b.mcap").read_bytes()
+    with LogWriter(tmp_path / "c.mcap") as log:
+        for number in range(9):
+            log.write("/text", "std_msgs/msg/String", number, {"data": "one chunk holds it"})
+    assert len(chunk_places(tmp_path / "c.mcap")) == 1
 
 
 def test_no_file_appears_when_writing_fails(tmp_path: Path) -> None:
@@ -126,7 +131,11 @@ def test_topics_types_and_attachments_are_listed(path: Path) -> None:
     assert not reader.dropped
 
 
-def test_bytes_are_fetched_again_from_where_the_scan_found_them(path: Path) -> None:
+@pytest.mark.parametrize("in_memory", [0, 5000, 32_000_000])
+def test_bytes_are_fetched_again_from_where_the_scan_found_them(
+    path: Path, monkeypatch: pytest.MonkeyPatch, in_memory: int
+) -> None:
+    monkeypatch.setattr("omninav.pipeline.mcap.reader._BYTES_IN_MEMORY", in_memory)
     reader = LogReader(path)
     found = [(record.location, bytes(record.data)) for record in reader.scan(["/blob"])]
     assert len(found) == COUNT
@@ -376,3 +385,21 @@ def test_of_two_attachments_of_one_name_the_first_is_used_and_the_other_counted(
     assert reader.attachments == {"camera.yaml": b"first"}
     assert reader.dropped["bad_attachment"] == 1
     assert "there is another 'camera.yaml' before it, which is used" in reader.details["bad_attachment"]
+
+
+def test_a_file_may_unpack_to_so_many_bytes_and_messages() -> None:
+    allowed = Allowance(80)
+    allowed.unpack((1 << 26) + 128 * 80)
+    for _ in range(100_000 + 10):
+        allowed.read_message()
+    for more in (lambda: allowed.unpack(1), allowed.read_message):
+        with pytest.raises(ValueError, match="log of 80 bytes"):
+            more()
+
+
+@pytest.mark.parametrize(("bytes_", "limit"), [(100, 1 << 22), (20_000, 256 * (32 + 8 + 20_000))])
+def test_a_chunk_may_say_that_it_unpacks_to_4_mb_or_256_times_its_bytes(bytes_: int, limit: int) -> None:
+    for size, said in ((bytes_, None), (limit, "not as long as it says"), (limit + 1, f"unpack to {limit + 1}")):
+        content = struct.pack("<QQQIIQ", 0, 0, size, 0, 0, bytes_) + bytes(bytes_)
+        with nullcontext() if said is None else pytest.raises(ValueError, match=said):
+            assert unpack(content, whole=True) == bytes(bytes_)
