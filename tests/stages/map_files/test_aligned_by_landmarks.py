@@ -32,6 +32,11 @@ def test_maps_are_put_where_their_common_landmarks_are_in_whatever_order_they_co
     assert np.abs(wrap(away[:, 2])).max() < np.radians(0.1)
 
 
+def test_all_landmarks_of_a_map_agree_with_itself() -> None:
+    found = aligned_by_landmarks([mapped_room()] * 3, np.random.default_rng(0))
+    assert found.closures == 2 * len(mapped_room().landmarks)
+
+
 def test_a_map_of_another_room_or_without_landmarks_is_aligned_with_nothing() -> None:
     other = mapped(tour_poses(0.3), room(seed=5))
     assert aligned_by_landmarks([mapped_room(), other], np.random.default_rng(0)) is None

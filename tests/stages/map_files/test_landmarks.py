@@ -46,8 +46,14 @@ def test_what_no_reference_of_a_part_sees_is_gone() -> None:
 
 
 def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
-    both = joined_references([mapped_room(), other_room()], "truth")
+    one, other = mapped_room(), other_room()
+    sure = replace(one.landmarks, sigma_rad=0.01, found_rate=0.5, variance_factor=2.0)
+    vague = replace(other.landmarks, sigma_rad=0.03, found_rate=0.25, variance_factor=3.0)
+    both = joined_references([replace(one, landmarks=sure), replace(other, landmarks=vague)], "truth")
     assert violation(both) is None
+    share = (len(sure) + 1) / (len(sure) + len(vague) + 2)
+    assert both.landmarks.sigma_rad**2 == pytest.approx(0.0001 * share + 0.0009 * (1 - share))
+    assert (both.landmarks.found_rate, both.landmarks.variance_factor) == (0.25, 3.0)
     assert len(both.landmarks) == len(mapped_room().landmarks) + len(other_room().landmarks)
     assert found_in(both) == pytest.approx(POSE, abs=1e-3)
     assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)

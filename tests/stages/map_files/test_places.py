@@ -1,6 +1,7 @@
 """Topological maps, joined, thinned and cut."""
 
 import dataclasses
+import math
 
 import made_places
 import numpy as np
@@ -34,9 +35,11 @@ def test_joined_places_keep_their_links_and_views() -> None:
     for link in range(3):
         assert (both.path_of(link + 3) == map.path_of(link) + len(map.views)).all()
     assert all(same_view(both, view + len(map.views), map, view) for view in range(len(map.views)))
-    assert both.spread == map.spread
-    assert (np.diff(both.frames) > 0).all()
+    assert joined_places([map, dataclasses.replace(map, spread=2.0)], "truth").spread == math.sqrt((1 + 4) / 2)
+    assert both.frames[len(map.views)] == map.frames.max() + 1
     assert both.orders[len(map.views)] == map.orders.max() + 2  # they are not neighbours
+    none = cut_places(map, np.zeros(3, bool))
+    assert [len(joined_places([none, *more], "truth").views) for more in ([], [none], [map])] == [0, 0, 9]
 
 
 def test_thinned_ways_keep_images_that_are_apart_and_all_places() -> None:
