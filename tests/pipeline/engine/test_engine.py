@@ -1,5 +1,6 @@
 """The engine: lifetimes, delays, absence, logs in a row, and going on from a checkpoint."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -8,11 +9,11 @@ from omninav.pipeline import Context
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import CHECKED_TICKS, StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
-from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix, prefix_nodes
+from omninav.pipeline.engine.prefix import cached_prefix, following, keep_prefix, prefix_nodes
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
-from toys import graph_of_toys
+from toys import Number, graph_of_toys
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -75,6 +76,7 @@ def test_a_stage_that_lacks_a_required_input_is_skipped_and_counted(tmp_path: Pa
     found = engine.run()["all.metrics"].values["numbers"]
     assert found == {"all": [0, 1, None, 3, 4, None, 6, 7, None, 9], "present": 7}
     assert engine.calls["sum"].ctx.counts["skipped.sum"] == 3
+    assert [n for n, took in enumerate(engine.calls["sum"].times) if math.isnan(took)] == [2, 5, 8]
 
 
 def test_hold_gives_the_last_present_value(tmp_path: Path):
@@ -221,14 +223,15 @@ def test_a_graph_whose_source_listens_to_it_has_no_prefix():
     assert prefix_nodes(graph_of({"source": "Steered", "drive": "Scale"}, wires)) == frozenset()
 
 
-def cached_run(place: Path, cache: Cache) -> tuple[list, bool]:
+def cached_run(place: Path, cache: Cache, seed: int = 0, **nodes: object) -> tuple[list, bool]:
     """What a graph with a prefix gave, and whether the prefix was replayed."""
-    graph = graph_of(PREFIX, PREFIX_WIRES)
-    with cached_prefix(graph, cache, 0) as prefix:
-        options = EngineOptions(0, place, place / "memory")
+    graph, told = graph_of(PREFIX | nodes, PREFIX_WIRES), []
+    with cached_prefix(graph, cache, seed) as prefix:
+        options = EngineOptions(seed, place, place / "memory", on_tick=lambda *done: told.append(done))
         engine = Engine(graph, {}, options, wanted=["all.metrics"], replay=prefix.replay, recorded=prefix.recorded())
         values = engine.run()["all.metrics"].values["numbers"]["all"]
         keep_prefix(engine, prefix, cache)
+        assert told == [(n, 10) for n in range(1, 11)]
         return values, prefix.replay is not None
 
 
@@ -237,6 +240,25 @@ def test_the_prefix_is_computed_once_and_then_replayed_with_the_same_result(tmp_
     first, second = cached_run(tmp_path / "a", cache), cached_run(tmp_path / "b", cache)
     assert first[0] == second[0]
     assert (first[1], second[1]) == (False, True)
+
+
+def test_a_prefix_that_drew_is_replayed_for_its_seed_alone(tmp_path: Path):
+    cache = Cache(tmp_path / "cache")
+    found = [cached_run(tmp_path / str(n), cache, seed, scale="Noise") for n, seed in enumerate((0, 1, 0))]
+    assert [replayed for _, replayed in found] == [False, False, True]
+    assert found[0][0] == found[2][0] != found[1][0]
+
+
+def test_runs_that_differ_in_their_seed_share_what_follows_from_artifacts_but_not_from_draws():
+    wires = PREFIX_WIRES | {"sum": {"number": "scale.number", "other": "artifacts.one"}}
+    graph = build(
+        graph_of_toys(PREFIX | {"start": "Noise"}, wires | {"start": {"number": "artifacts.one"}}), {"one": Number}
+    )
+    assert prefix_nodes(graph) == {"source", "scale"}
+    assert prefix_nodes(graph, artifacts=True) == {"source", "scale", "sum"}
+    assert prefix_nodes(graph, artifacts=True, without=["scale"]) == {"source"}
+    assert prefix_nodes(graph, without=["source"]) == frozenset()
+    assert following(graph, ["scale"]) == {"scale", "sum", "all"}
 
 
 def test_a_damaged_prefix_is_computed_again(tmp_path: Path):
