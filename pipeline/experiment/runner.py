@@ -105,6 +105,7 @@ class ExperimentRun:
             conditions=tuple(_condition(run, common) for run in conditions),
             failures={run.name: run.error for run in self.conditions if run.error},
             missing=sum(len(run.missing) for run in self.conditions if not run.error),
+            # Where this machine keeps what it made is no part of the experiment.
             common_overrides=tuple(word for word in common if not word.startswith("cache=")),
         )
 
