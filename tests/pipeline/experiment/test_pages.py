@@ -10,7 +10,7 @@ from omninav.pipeline.cli.experiments import judged_experiments
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.page import markdown_page
 from omninav.pipeline.experiment.pages import Judged, by_chance, claims_of, claims_page, counts, index_page, sources
-from omninav.pipeline.experiment.result import ExperimentResult, result_text
+from omninav.pipeline.experiment.result import Cell, ExperimentResult, result_text
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import Case, Verdict
 from omninav.pipeline.graph.problems import BadInput
@@ -82,6 +82,13 @@ def test_the_index_and_the_page_say_of_which_draws_a_result_is() -> None:
         in index_page(found)
     )
     assert "1 in each of 3 scenarios (draw 1, draw 2, draw 3)" in str(markdown_page(*found[0])["one.md"])
+
+
+def test_a_table_shows_means_with_what_is_beyond_them_and_the_paper_s_figures() -> None:
+    cells = (Cell(("first",), 5.26, 0.5, 6.0, 2, 3, 4.0), Cell(("second",), 7.0, None, 7.04, 3, 3))
+    result = ExperimentResult("one", "omninav", "full", "", REPEATED, {}, {"error": cells})
+    page = str(markdown_page(read_experiment(FILE | {"published": {"error": {"first": 9}}}, "full"), result)["one.md"])
+    assert "| all | 5.3 ± 0.5, median 6.0, 2 of 3, development 4.0 (9.0) | 7.0 |" in page
 
 
 def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:

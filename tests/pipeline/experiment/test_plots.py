@@ -13,7 +13,7 @@ from omninav.pipeline.experiment import plots
 from omninav.pipeline.experiment.plots import plots_of
 from omninav.pipeline.experiment.result import ExperimentResult, figures_of
 from omninav.pipeline.experiment.verdicts import key_of
-from omninav.pipeline.report.plot_style import PALETTE, plot
+from omninav.pipeline.report.plot_style import plot
 
 LONG = "Error of the direction up to 6 m away, median, not found is 180 (degrees)"
 
@@ -51,13 +51,6 @@ def test_titles_and_legends_are_drawn_whole(page: dict[str, object]) -> None:
 
 def test_a_tall_legend_takes_no_room_from_the_plot() -> None:
     assert drawn(9)[-1].shape[0] > drawn(1)[-1].shape[0]
-
-
-def test_a_line_at_zero_is_drawn_beside_one_that_is_a_hundred_times_another() -> None:
-    curve = drawn(3, levels=(0.0, 1.0, 100.0))[-1]
-    colour = [int(PALETTE[1][n : n + 2], 16) for n in (5, 3, 1)]
-    of_the_line = np.abs(curve.astype(int) - colour).max(axis=2) < 8
-    assert of_the_line.any(axis=0).sum() > curve.shape[1] / 2
 
 
 @pytest.fixture
@@ -99,9 +92,7 @@ def test_lines_lie_along_a_factor(canvases: list[Any]) -> None:
     assert [[end[1] for end in bar] for bar in axes.collections[0].get_segments()] == [[9.0, 11.0], [39.0, 41.0]]
 
 
-def test_of_many_rows_each_has_its_points_and_figures_that_differ_much_stand_in_powers_of_ten(
-    canvases: list[Any],
-) -> None:
+def test_of_many_rows_each_has_its_points_and_far_figures_are_in_powers_of_ten(canvases: list[Any]) -> None:
     drawn(9)
     (axes,), size = canvases[0][0].axes, canvases[0][1]
     found = [each.lines[0].get_xydata()[[0, 8]].tolist() for each in axes.containers]

@@ -2,7 +2,6 @@
 
 import struct
 
-import numpy as np
 import pytest
 
 from omninav.pipeline.mcap.message_types import has_header, header_stamp, make_message, standard_types, types_of
@@ -21,10 +20,6 @@ def test_fields_that_are_left_out_are_empty_and_bytes_are_numbers() -> None:
     marker = make_message("visualization_msgs/msg/Marker", {"points": [{"x": 1.0}]}, 3_000_000_004)
     assert (marker.id, marker.points[0].x, marker.points[0].y, marker.colors) == (0, 1.0, 0, [])
     assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (3, 4)
-    pose = make_message("geometry_msgs/msg/PoseWithCovariance", {})
-    assert pose.covariance.tolist() == [0.0] * 36
-    scan = make_message("sensor_msgs/msg/LaserScan", {"ranges": np.array([1.5, 2.5], np.float32).tobytes()})
-    assert scan.ranges.tolist() == [1.5, 2.5]
     assert make_message("sensor_msgs/msg/Image", {"data": b"\xff"}).data.tolist() == [255]
     assert has_header(standard_types(), "sensor_msgs/msg/Image")
     assert not has_header(standard_types(), "std_msgs/msg/Bool")
@@ -37,7 +32,6 @@ def test_fields_that_are_left_out_are_empty_and_bytes_are_numbers() -> None:
         ("Part[50] a", 1 + 50 * 2),
         ("string[99] a", 1 + 99),
         ("string[100] a", 1 + 100),
-        ("Part[] a\nPart[<=60] b\nfloat64[200] c\nPart[45] d\nint8 e", 1 + 2 + 2 + 1 + 45 * 2 + 1),
         ("Part[] a\nPart[<=60] b\nfloat64[200] c\nPart[47] d\nint8 e", 1 + 2 + 2 + 1 + 47 * 2 + 1),
     ],
 )
