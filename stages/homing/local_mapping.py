@@ -60,15 +60,21 @@ MAX_HEADING_DIFFERENCE_DEG = 5.0
 
 
 class Matches(NamedTuple):
-    """Features that were matched with the target view: bearings and pixels here, bearings and rows there."""
+    """Features that were matched with the target view: bearings and pixels here, bearings and rows there.
+
+    `here` and `there`: bearings of all features, matched or not.
+    """
 
     first: Array
     points: Array
     second: Array
     rows: Ints
+    here: Array
+    there: Array
 
 
-NO_MATCHES = Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(0, np.int64))
+NONE = np.zeros((0, 3))
+NO_MATCHES = Matches(NONE, np.zeros((0, 2)), NONE, np.zeros(0, np.int64), NONE, NONE)
 
 
 class LocalMappingState(State):
@@ -153,9 +159,7 @@ class LocalMapping(Stage):
         matches = matches_with(target, features, correspondences)
         before = state.map if state.map is not None and state.map.target == target.number else None
         local_map = LocalMap(-1, target.number, "lost") if before is None else before.moved(motion)
-        shown = self._tracked(
-            ctx, state, local_map, tracks, matches, (target.features.point_bearings(), features.point_bearings())
-        )
+        shown = self._tracked(ctx, state, local_map, tracks, matches)
         state.map = shown
         if shown.state == "lost":
             state.map, shown = self._begun(ctx, state, shown, matches, motion)
@@ -170,7 +174,6 @@ class LocalMapping(Stage):
         local_map: LocalMap,
         tracks: TrackedFeatures | None,
         matches: Matches,
-        views: tuple[Array, Array],
     ) -> LocalMap:
         """The map with the robot in it, or a better one; lost where it is not known."""
         if not len(local_map):
@@ -186,7 +189,7 @@ class LocalMapping(Stage):
             new, _ = self._made(ctx, state, local_map, fresh, round(more))
             if new is not None:
                 return new
-        if not self._contradicted(local_map, matches if self.verify else fresh, *views):
+        if not self._contradicted(local_map, matches if self.verify else fresh):
             return local_map
         ctx.count("false_map")
         state.witness = None
@@ -260,7 +263,7 @@ class LocalMapping(Stage):
             metres=metres,
         )
 
-    def _contradicted(self, local_map: LocalMap, matches: Matches, there: Array, here: Array) -> bool:
+    def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn and what is left of the way.
         nearness = local_map.distance() / max(local_map.depth(), 1e-9)
         if nearness > ARRIVAL_DISTANCE or (not self.verify and local_map.inliers > len(matches.rows) / 3):
@@ -273,7 +276,7 @@ class LocalMapping(Stage):
         share = SAME_SHARE_AT_TARGET if self.verify and nearness <= AT_TARGET else SAME_SHARE
         if np.count_nonzero(same) < max(share * len(matches.rows), enough):
             return True
-        return self.verify and shown_sectors(there @ turn.T, turned[same], here) < SHOWN_SECTORS
+        return self.verify and shown_sectors(matches.there @ turn.T, turned[same], matches.here) < SHOWN_SECTORS
 
     def _verified(self, state: LocalMappingState, new: LocalMap, with_odometry: bool) -> bool:
         # Whether this image and one before bear each other out; without odometry place and heading do not count.
@@ -336,10 +339,8 @@ def shown_sectors(target: Array, same: Array, here: Array) -> float:
     All bearings (N, 3) are in the robot's frame. Sectors count in which both views have features, since a camera may
     not see all around. Features of one object agree on a place beside another like it, but only in one direction.
     """
-    number, agreed, seen = (
-        np.bincount(((np.arctan2(y, x) / math.tau) % 1.0 * SECTORS).astype(int) % SECTORS, minlength=SECTORS)
-        for x, y, _ in (each[np.isfinite(each).all(axis=1)].T for each in (target, same, here))
-    )
+    azimuths = (np.arctan2(bearings[:, 1], bearings[:, 0]) for bearings in (target, same, here))
+    number, agreed, seen = (np.histogram(each, SECTORS, (-math.pi, math.pi))[0] for each in azimuths)
     compared = (number >= MIN_IN_SECTOR) & (seen > 0)
     return float((agreed >= SHOWN_OF_SECTOR * number)[compared].mean()) if compared.any() else 1.0
 
@@ -354,7 +355,8 @@ def matches_with(target: HomingTarget, features: LocalFeatures, pairs: Correspon
             "local_map: correspondences that are not those of the present features with the target's; match "
             "local_map's own features with those of its target"
         )
-    return Matches(here[pairs.first], features.point_pixels()[pairs.first], there[pairs.second], pairs.second)
+    pixels = features.point_pixels()[pairs.first]
+    return Matches(here[pairs.first], pixels, there[pairs.second], pairs.second, here, there)
 
 
 def _labelled(local_map: LocalMap, tracks: TrackedFeatures | None) -> TrackedFeatures:

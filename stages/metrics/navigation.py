@@ -135,7 +135,7 @@ class Navigation(MetricStage):
 def goals_reached(
     drive: Drive, routes: Sequence[PlannedRoute | None], map: TopologicalMap | ReferenceGraph
 ) -> list[bool]:
-    """Whether each goal was reached, from the last back to the first, in a map of true poses."""
+    """Tell of each goal, from the last back to the first, whether it was reached; in a map of true poses."""
     found, end = [], len(routes)
     while end:
         begun = first_of_last_goal(routes[:end])

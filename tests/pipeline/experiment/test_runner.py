@@ -51,7 +51,7 @@ def compose(words: Sequence[str]) -> dict[str, Any]:
 
 
 def run(place: Path, monkeypatch: pytest.MonkeyPatch, **file: object) -> tuple[bool, ExperimentResult, list[str], int]:
-    """Whether all went well, the result, the jobs that ran, and how many sums were computed."""
+    """Run the experiment: whether all went well, the result, the jobs that ran, and how many sums were computed."""
     ran, sums, add = [], [], toys.Add.step
 
     class HereAndNow(Workers):

@@ -281,11 +281,11 @@ def test_at_the_target_seven_of_ten_matches_must_have_its_bearings(share: int, n
     seen_there /= np.linalg.norm(seen_there, axis=1)[:, None]
     seen_here = seen_there @ (near.rotation.T @ near.goal_rotation).T
     seen_here[share:] *= -1.0
-    matches = Matches(seen_here, np.zeros((100, 2)), seen_there, np.arange(100))
-    assert homing.mapping._contradicted(near, matches, seen_there, seen_here) is not believed
+    matches = Matches(seen_here, np.zeros((100, 2)), seen_there, np.arange(100), seen_here, seen_there)
+    assert homing.mapping._contradicted(near, matches) is not believed
     left = np.flatnonzero(seen_here[:share, 1] > 0)  # all agree, in one half of the directions
-    of_one_side = Matches(seen_here[left], np.zeros((len(left), 2)), seen_there[left], left)
-    assert homing.mapping._contradicted(near, of_one_side, seen_there, seen_here)
+    of_one_side = Matches(seen_here[left], np.zeros((len(left), 2)), seen_there[left], left, seen_here, seen_there)
+    assert homing.mapping._contradicted(near, of_one_side)
 
 
 def test_the_target_is_seen_in_a_direction_by_a_fifth_of_its_features() -> None:
