@@ -110,7 +110,7 @@ class FollowHoming(Stage):
         if stalled is not None:
             ctx.count("stood_blocked")
             return self._stand("blocked", stalled.why)
-        left = math.inf if vector.metres is None else vector.metres
+        left = _metres_left(vector, scan)
         direction, speed = self._free_direction(vector, scan, left)
         state.blocked_since, blocked_s = _since(state.blocked_since, direction is None, tick)
         if direction is None:
@@ -156,6 +156,13 @@ class FollowHoming(Stage):
 
     def _stand(self, state: Literal["waiting", "driving", "docking", "arrived", "lost", "blocked"], why: str) -> Out:
         return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))
+
+
+def _metres_left(vector: HomingVector, scan: Scan | None) -> float:
+    # Where no metres are known, a typical feature is taken to be as far away as what stands around the robot.
+    if vector.metres is not None or scan is None:
+        return math.inf if vector.metres is None else vector.metres
+    return vector.nearness * float(np.median(np.minimum(scan.ranges, scan.farthest)))
 
 
 def _since(stamp: int | None, now: bool, tick: Tick) -> tuple[int | None, float]:

@@ -14,6 +14,8 @@ ARRIVAL_NEARNESS = 0.007
 """Nearness of the last view at which the robot has arrived."""
 PASSED_NEARNESS = 0.03
 """Nearness of a view that hardly differs from the present one, reached at once; of the last, where it lies behind."""
+DOCKING_NEARNESS = 0.05
+"""Nearness of the last view beyond which a robot that turns there is not there after all."""
 MAX_HEADING_ERROR_DEG = 3.0
 """Largest heading error at the last view, degrees."""
 
@@ -63,7 +65,7 @@ class WaypointImages(Stage):
             state.path, state.reached, state.docking, state.arrived = path.number, 0, False, False
             state.target += 1
         elif vector is not None and vector.number == state.target:
-            state.docking = state.docking and vector.state != "doubtful"
+            state.docking &= vector.state != "doubtful" and vector.nearness <= DOCKING_NEARNESS
             if vector.is_found:
                 self._go_on(state, vector, len(path.views))
         last = state.reached >= len(path.views) - 1

@@ -166,7 +166,7 @@ class RoadmapPlanner(Stage):
                 state.extra = np.where(away_m <= BLOCKED_RADIUS_M, more, state.extra)
                 if state.extra[away_m.argmin()] >= DETOUR_M * 10.0 ** (BLOCKED_HERE - 1):
                     state.ended, (x, y) = "gave up", ahead
-                    state.why = f"{BLOCKED_HERE} times its way was blocked near ({x:.1f}, {y:.1f}) m: {status.why}"
+                    state.why = f"its way near ({x:.1f}, {y:.1f}) m was blocked {BLOCKED_HERE} times: {status.why}"
                     return _stopped(state)
                 self._plan(state, map)
                 places, new = self._path(state, map, here), True

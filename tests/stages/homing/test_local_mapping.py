@@ -260,6 +260,19 @@ def test_an_arrival_where_the_target_looks_different_is_not_believed(verify: boo
     assert (homing.at(pose).state, homing.ctx.counts["false_map"]) == (("doubtful", 1) if verify else ("tracking", 0))
 
 
+@pytest.mark.parametrize("odometry", [True, False])
+def test_features_that_led_to_another_place_make_no_map_for_three_metres(odometry: bool) -> None:
+    homing, pose = Homing(verify=True), SIDE_BY_SIDE[-1]
+    assert on_the_way(homing, (*SIDE_BY_SIDE, pose))[-1] == "tracking"
+    homing.map = homing.mapped.map = replace(homing.map, goal_translation=np.full(3, 0.01 * homing.map.depth()))
+    ways = (0.0, 2.9, 0.2) if odometry else (None, None, None)
+    states = [homing.at(pose, None if way is None else Motion(way, 0.0, 0.0)).state for way in ways]
+    assert (states, homing.ctx.counts["false_map"]) == (
+        ["lost", "lost", "doubtful"] if odometry else ["doubtful", "new", "tracking"],
+        1,
+    )
+
+
 @pytest.mark.parametrize(("pose", "believed"), [((4.97, 4.98, -0.5), True), ((4.7, 4.72, -0.5), False)])
 def test_an_arrival_four_decimetres_away_is_not_believed(pose: tuple[float, float, float], believed: bool) -> None:
     homing = Homing(verify=True)

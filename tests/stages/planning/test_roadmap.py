@@ -195,7 +195,7 @@ def test_where_no_other_way_leads_past_a_blocked_place_it_gives_up_there() -> No
         out = drive.step(status=BLOCKED)
         numbers.append(out.route.number)
     assert out.route.state == "gave up"
-    assert out.route.why == f"{BLOCKED_HERE} times its way was blocked near ({GOAL[0]:.1f}, {GOAL[1]:.1f}) m: a chair"
+    assert out.route.why == f"its way near ({GOAL[0]:.1f}, {GOAL[1]:.1f}) m was blocked {BLOCKED_HERE} times: a chair"
     assert (max(numbers), numbers.index(1), numbers.index(2)) == (2, 1, 26)  # five seconds from one to the next
     assert drive.status.state == "waiting"
 
