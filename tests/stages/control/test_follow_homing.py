@@ -200,6 +200,13 @@ def test_a_target_close_before_a_wall_can_be_reached() -> None:
     assert drive(vector(metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
 
 
+def test_where_metres_are_unknown_a_near_target_is_taken_to_be_as_near_as_what_stands_around() -> None:
+    walls = scan((-180.0, 180.0, 2.0), (-40.0, 40.0, 0.6))  # the median range is 2 m
+    for nearness, moves in ((0.1, True), (0.35, False)):  # 0.2 m and 0.7 m away
+        speed, _ = command(drive(vector(nearness=nearness), progress(last=True), walls))
+        assert (speed > 0.0) is moves
+
+
 def test_it_docks_at_a_wall_closer_than_it_stops_on_the_way() -> None:
     wall = scan((-25.0, 25.0, 0.38))  # 0.1 m free ahead of a robot of 0.25 m, which stops at 0.15 m
     assert drive(vector(metres=0.08), progress(last=True), wall).command.speed > 0.0

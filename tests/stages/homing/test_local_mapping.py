@@ -144,6 +144,15 @@ def test_odometry_tells_metres() -> None:
     assert vector.metres == pytest.approx(math.dist(poses[-1][:2], TARGET[:2]), abs=0.08)
 
 
+@pytest.mark.parametrize(("metres", "state"), [(0.15, "tracking"), (0.25, "new")])
+def test_a_place_far_from_where_odometry_leads_is_not_believed(metres: float, state: str) -> None:
+    homing, poses = Homing(), drive(7)
+    on_the_way(homing, poses[:5])
+    elsewhere = homing.map.translation + np.array([metres / homing.map.metres, 0.0, 0.0])
+    homing.map = homing.mapped.map = replace(homing.map, translation=elsewhere)
+    assert on_the_way(homing, poses[5:6], before=poses[4]) == [state]
+
+
 def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:
     assert Homing().at((5.02, 5.01, 1.4)).nearness < 0.04
     assert Homing().at((4.0, 4.2, 1.4)).nearness > 0.1

@@ -43,7 +43,7 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
     out = path.step(vector(2, 0.0069, turn=math.radians(-3.1)))
     assert out.progress.docking
     assert not out.progress.arrived
-    out = path.step(vector(2, 0.1, turn=math.radians(-2.9)))
+    out = path.step(vector(2, 0.1, nearness=0.049, turn=math.radians(-2.9)))
     assert out.progress.arrived
     assert out.progress.at == out.progress.of == 3
     assert out.target is None
@@ -57,6 +57,14 @@ def test_a_robot_that_doubts_its_target_has_not_arrived() -> None:
     doubtful = path.step(vector(0, 0.005, turn=0.0, state="doubtful"), one_view).progress
     assert (doubtful.docking, doubtful.arrived) == (False, False)
     assert path.step(vector(0, 0.005, turn=0.0), one_view).progress.arrived
+
+
+def test_a_robot_that_turns_where_its_target_turns_out_to_be_farther_away_drives_on() -> None:
+    path, one_view = Path(), ImagePath(5, PATH.views[:1], ("a",))
+    path.step(path=one_view)
+    assert path.step(vector(0, 0.005, turn=1.0), one_view).progress.docking
+    farther = path.step(vector(0, 0.2, nearness=0.051, turn=0.0), one_view).progress
+    assert (farther.docking, farther.arrived) == (False, False)
 
 
 def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() -> None:
