@@ -2,7 +2,6 @@
 
 import math
 
-import cv2
 import numpy as np
 import poselib
 import pytest
@@ -29,10 +28,6 @@ SEEDS = st.integers(0, 10**6)
 EITHER = st.booleans()
 
 
-def planar_two_points(first, second):
-    return planar_candidates(first, second, np.array([[0, 1]]))[:2]
-
-
 def relative_pose_of(matrix, first, second):
     """The pose of four with most points in front of both cameras."""
     poses = decompose(matrix)
@@ -52,7 +47,8 @@ def test_a_point_ahead_of_a_robot_that_drove_to_its_left() -> None:
     assert rotation @ (0.0, -2.0, 0.0) + translation == pytest.approx([2.0, 1.0, 0.0])
     first, second = unit(np.array([[2.0, 1.0, 0.0]])), np.array([[0.0, -1.0, 0.0]])
     assert triangulate(first, second, rotation, translation)[0] == pytest.approx([2.0, 1.0, 0.0])
-    assert yaw_of(rotation) == pytest.approx(math.pi / 2)
+    rolled = turn_about_vertical(0.8) @ Rotation.from_euler("x", 0.6).as_matrix()
+    assert yaw_of(rolled) == pytest.approx(0.8)  # whatever the roll
 
 
 @given(SEEDS, EITHER)
@@ -64,7 +60,7 @@ def test_bearings_of_one_point_lie_in_a_plane_with_the_baseline(seed: int, plana
     assert shared_residuals(rotation, translation, first, second) == pytest.approx(np.zeros(20), abs=1e-7)
 
 
-@given(SEEDS, st.floats(-0.2, 0.2))
+@given(SEEDS, st.floats(-1.5, 1.5))
 def test_the_residual_is_the_angle_to_the_epipolar_plane(seed: int, lifted: float) -> None:
     rotation, translation, first, second = two_views(seed, 20, planar=False)
     normals = unit(second @ essential(rotation, translation).T)
@@ -86,9 +82,9 @@ def test_the_shared_residual_has_the_size_of_the_noise(seed: int) -> None:
     assert spread == pytest.approx(0.1, rel=0.1)
 
 
-@given(SEEDS, EITHER)
-def test_eight_points_give_the_essential_matrix_and_a_quality_of_0(seed: int, planar: bool) -> None:
-    rotation, translation, first, second = two_views(seed, 12, planar=planar)
+@given(SEEDS, st.sampled_from([8, 12]), EITHER)
+def test_eight_points_give_the_essential_matrix_and_a_quality_of_0(seed: int, number: int, planar: bool) -> None:
+    rotation, translation, first, second = two_views(seed, number, planar=planar)
     matrix, quality = eight_points(first, second)
     truth = essential(rotation, translation)
     assert abs(float((matrix * truth).sum())) == pytest.approx(2.0, abs=1e-6)  # equal but for the sign
@@ -130,7 +126,7 @@ def test_a_solution_of_five_points_is_the_true_pose(planar: bool) -> None:
 @given(SEEDS)
 def test_a_solution_of_two_points_is_the_true_pose_of_a_robot_on_a_floor(seed: int) -> None:
     rotation, translation, first, second = two_views(seed, 2)
-    rotations, translations = planar_two_points(first, second)
+    rotations, translations, _ = planar_candidates(first, second, np.array([[0, 1]]))
     assert len(rotations) == 2
     assert closest((np.tile(rotations, (2, 1, 1)), np.vstack([translations, -translations])), rotation, translation) < (
         1e-3 if min(np.abs(first[:, 2]).min(), np.abs(second[:, 2]).min()) > 0.02 else 0.5
@@ -143,7 +139,7 @@ def test_both_solutions_of_two_points_are_among_those_of_poselib(seed: int) -> N
     _, _, first, second = two_views(seed, 2)
     upright = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # our z is its y
     theirs = poselib.relpose_upright_planar_2pt(second @ upright.T, first @ upright.T)
-    ours = planar_two_points(first, second)
+    ours = planar_candidates(first, second, np.array([[0, 1]]))
     for pose in theirs:
         turned = upright.T @ pose.R @ upright, upright.T @ pose.t
         best = closest((np.tile(ours[0], (2, 1, 1)), np.vstack([ours[1], -ours[1]])), turned[0], unit(turned[1]))
@@ -152,7 +148,8 @@ def test_both_solutions_of_two_points_are_among_those_of_poselib(seed: int) -> N
 
 def test_points_on_the_horizon_say_nothing_to_a_robot_on_a_floor() -> None:
     level = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    assert len(planar_two_points(level, level)[0]) == 0
+    first, second = (np.vstack([level, others]) for others in two_views(0, 2)[2:])
+    assert planar_candidates(first, second, np.array([[0, 1], [2, 3]]))[2].tolist() == [1, 1]
 
 
 @given(SEEDS, EITHER)
@@ -173,14 +170,9 @@ def test_points_below_or_behind_a_camera_are_in_front_by_depth_where_z_says_they
     points = np.random.default_rng(1).uniform([-4, -4, -2], [4, 4, -0.5], (40, 3))  # all below
     first, second = unit(points), unit((points - translation) @ rotation)
     here, there = depths(first, second, rotation, translation)
-    assert (here > 0).all()
-    assert (there > 0).all()
     assert here == pytest.approx(np.linalg.norm(points, axis=1))
+    assert there == pytest.approx(np.linalg.norm(points - translation, axis=1))
     assert angle_deg(relative_pose_of(essential(rotation, translation), first, second)[1], translation) < 1e-4
-    # What OpenCV makes of the same bearings as pinhole points: x/z, y/z; it finds the sense the wrong way about.
-    flat = [(b / b[:, 2:])[:, :2] for b in (second, first)]
-    _, _, wrong, _ = cv2.recoverPose(essential(rotation, translation), *flat)
-    assert angle_deg(unit(wrong.ravel()), translation) == pytest.approx(180.0, abs=1e-3)
 
 
 @given(SEEDS, EITHER)
@@ -209,12 +201,12 @@ def test_points_are_triangulated_where_they_are(seed: int, planar: bool) -> None
 
 
 def test_lines_that_meet_behind_or_nowhere_are_no_points() -> None:
-    first, second = (
-        unit(np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
-        unit(np.array([[1.0, 2.0, 0.0], [0.0, 0.0, 1.0]])),
-    )
-    assert np.isnan(triangulate(first, second, np.eye(3), np.array([-1.0, 0.0, 0.0]))).all()
-    here, there = depths(first, second, np.eye(3), np.array([-1.0, 0.0, 0.0]))
-    assert here[0] < 0.0
-    assert there[0] < 0.0
-    assert here[1] == there[1] == math.inf
+    # Along (1, 1) and, from (-1, 0), along (1, 2) they meet in (-2, -2), along (0, 1) and against (1, 1) in (0, 1).
+    rotation, way = np.eye(3), np.array([-1.0, 0.0, 0.0])
+    first = unit(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
+    second = unit(np.array([[1.0, 2.0, 0.0], [-1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]))
+    assert np.isnan(triangulate(first, second, rotation, way)).all()
+    here, there = depths(first, second, rotation, way)
+    assert here == pytest.approx([-math.sqrt(8.0), 1.0, math.inf])
+    assert there == pytest.approx([-math.sqrt(5.0), -math.sqrt(2.0), math.inf])
+    assert in_front((rotation[None], way[None]), first, second).tolist() == [1]

