@@ -14,6 +14,8 @@ from omninav.stages.geometry.probability.dempster_shafer import (
     gather,
     masses,
     similarity_of,
+    support,
+    unknown,
 )
 
 share = st.floats(0.0, 1.0)
@@ -32,7 +34,11 @@ def by_sets(one: np.ndarray, other: np.ndarray) -> list[float]:
 
 
 def test_initial_masses_are_those_worked_by_hand() -> None:
-    assert masses(0.7, 0.75) == pytest.approx([0.525, 0.225, 0.25])
+    found = masses([0.7, -1.0, 1.0, 2.0], [0.75, 0.75, -1.0, 2.0])
+    assert found == pytest.approx(
+        np.array([[0.525, 0.225, 0.25], [0.0, 0.75, 0.25], [0.0, 0.0, 1.0], [0.99, 0.0, 0.01]])
+    )
+    assert (support(found[0]), unknown(found[0])) == pytest.approx((0.525, 0.25))
 
 
 @pytest.mark.parametrize(("xi", "after"), [(0.4, [0.635, 0.195, 0.169]), (0.6, [0.702, 0.177, 0.121])])
@@ -50,7 +56,7 @@ def test_the_rule_is_dempsters_over_sets_in_any_order(s: float, xi: float, t: fl
 
 
 def test_two_certain_opposites_are_not_quite_certain() -> None:
-    assert np.isfinite(combine(masses(1.0, 1.0), masses(0.0, 1.0))).all()
+    assert combine(masses(1.0, 1.0), masses(0.0, 1.0)) == pytest.approx(np.array([99.0, 99.0, 1.0]) / 199.0)
     with pytest.raises(ValueError, match="contradict each other"):
         combine(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
 
@@ -60,12 +66,9 @@ def test_confidence_falls_from_one_to_nothing_at_the_reach() -> None:
 
 
 def test_similarities_lie_between_nothing_and_one() -> None:
-    apart = np.array([0.0, 0.5, math.inf])
-    for form in ("ratio", "exponential", "gaussian"):
-        told = similarity_of(apart, 0.5, form)
-        assert told[0] == 1.0
-        assert told[2] == 0.0
-    assert similarity_of(0.5, 0.5) == pytest.approx(0.5)
+    falls = {"ratio": [1 / 2, 1 / 3], "exponential": np.exp([-1.0, -2.0]), "gaussian": np.exp([-0.5, -2.0])}
+    for form, expected in falls.items():
+        assert similarity_of([0.0, 0.5, 1.0, math.inf], 0.5, form) == pytest.approx([1.0, *expected, 0.0])
 
 
 def test_neighbours_speak_once_and_with_what_they_knew_before() -> None:

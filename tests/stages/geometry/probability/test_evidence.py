@@ -36,11 +36,10 @@ def test_the_best_heading_is_the_first_of_the_highest() -> None:
 
 
 def test_similarities_are_spread_to_the_contrast() -> None:
-    best = np.exp(
-        np.array([0.0, 2.0], np.float32)
-    )  # standard deviation of the logarithms 1; weighted 3 to 1, sqrt(3/4)
-    assert contrast_power(best, 3.0) == pytest.approx(3.0, rel=1e-6)
-    assert contrast_power(best, 3.0, np.array([3.0, 1.0])) == pytest.approx(3.0 / math.sqrt(0.75), rel=1e-6)
+    # Standard deviation of the logarithms 0.1; weighted 3 to 1, 0.1 sqrt(3/4).
+    best = np.exp(np.array([-10.0, -9.8])).astype(np.float32)
+    assert contrast_power(best, 3.0) == pytest.approx(30.0, rel=1e-5)
+    assert contrast_power(best, 3.0, np.array([3.0, 1.0])) == pytest.approx(30.0 / math.sqrt(0.75), rel=1e-5)
     assert contrast_power(np.full(4, 0.5, np.float32), 3.0) == 1.0
 
 
