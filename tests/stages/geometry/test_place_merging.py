@@ -34,7 +34,7 @@ def test_distances_go_along_the_drive_and_over_to_the_other_pass() -> None:
     assert np.isinf(distances_along(DISTANCES, ALONG, np.array([2]))[0, NUMBER:]).all()
 
 
-def test_places_side_by_side_are_merged_and_views_go_to_the_nearest() -> None:
+def test_places_side_by_side_are_merged_where_a_pair_was_accepted_and_views_go_to_the_nearest() -> None:
     place = merged_places(DISTANCES, edges(), PLACE, NEW, 0.12)
     assert PLACE.max() + 1 == 7
     assert place.max() + 1 == 3
@@ -42,11 +42,8 @@ def test_places_side_by_side_are_merged_and_views_go_to_the_nearest() -> None:
     middle = AT[medoids(DISTANCES, place)]
     nearest = np.abs(AT[:, None] - middle).min(axis=1)
     assert np.abs(AT - middle[place]) == pytest.approx(nearest, abs=0.2)
-
-
-def test_without_an_accepted_pair_places_of_two_passes_stay_two() -> None:
-    place = merged_places(DISTANCES, ALONG, PLACE, NEW, 0.12)
-    assert not set(place[:NUMBER]) & set(place[NUMBER:])
+    apart = merged_places(DISTANCES, ALONG, PLACE, NEW, 0.12)
+    assert not set(apart[:NUMBER]) & set(apart[NUMBER:])
 
 
 def test_places_of_a_known_map_stay_and_new_views_go_to_them() -> None:

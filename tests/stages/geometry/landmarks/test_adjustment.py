@@ -54,15 +54,9 @@ def test_wrong_sightings_are_told_from_right_ones(world, found):
 
 def test_the_order_of_sightings_does_not_matter(world, wrong_poses, found):
     order = np.random.default_rng(2).permutation(len(world.references))
-    again = adjusted(
-        wrong_poses,
-        triangulated(world, wrong_poses),
-        world.references[order],
-        world.landmarks[order],
-        world.bearings[order],
-        NOISE,
-        np.tile(POSE_SIGMAS, (len(wrong_poses), 1)),
-    )
+    sightings = (each[order] for each in (world.references, world.landmarks, world.bearings))
+    sigmas = np.tile(POSE_SIGMAS, (len(wrong_poses), 1))
+    again = adjusted(wrong_poses, triangulated(world, wrong_poses), *sightings, NOISE, sigmas)
     assert again.poses.tobytes() == found.poses.tobytes()
     assert again.points.tobytes() == found.points.tobytes()
     assert (again.inliers == found.inliers[order]).all()
@@ -137,10 +131,8 @@ def test_a_landmark_that_one_reference_sees_twice_moves_no_pose():
 
 @pytest.mark.parametrize("sightings", [0, 1])
 def test_without_anything_seen_twice_nothing_changes(world, sightings):
-    some = slice(0, sightings)
-    found = adjusted(
-        world.poses, world.points, world.references[some], world.landmarks[some], world.bearings[some], NOISE
-    )
+    some = (each[:sightings] for each in (world.references, world.landmarks, world.bearings))
+    found = adjusted(world.poses, world.points, *some, NOISE)
     assert (found.poses == world.poses).all()
     assert (found.points == world.points).all()
     assert not found.inliers.any()

@@ -28,12 +28,9 @@ def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
     assert np.degrees(np.percentile(np.abs(towards), 95)) < 2.0
 
 
-def test_matches_that_agree_are_of_one_landmark(landmarks, verified):
+def test_matches_that_agree_are_of_one_landmark_and_pairs_that_share_nothing_are_left_out(landmarks, verified):
     assert (landmarks[verified.first] == landmarks[verified.second]).mean() > 0.97
     assert len(verified.first) == len(verified.second) == len(verified.ratio) > 12 * len(verified.pairs)
-
-
-def test_pairs_that_share_nothing_are_left_out(verified):
     assert not {(5, 95), (20, 80)} & set(map(tuple, verified.pairs.tolist()))
 
 

@@ -26,13 +26,11 @@ def test_a_map_of_another_unit_has_the_same_floor():
     assert depth(points, height=9.0, scale=10.0) == pytest.approx(10.0 * depth(points))
 
 
-@pytest.mark.parametrize(("walls", "on_floor"), [(3000, 0), (3000, 40), (0, 30), (0, 0)])
-def test_a_floor_that_does_not_stand_out_is_not_found(walls, on_floor):
-    assert depth(landmarks(np.random.default_rng(0), 0.9, walls, on_floor)) is None
-
-
-def test_a_plane_far_from_the_cameras_height_is_no_floor():
-    assert depth(landmarks(np.random.default_rng(0), 0.5)) is None
+@pytest.mark.parametrize(
+    ("floor", "walls", "on_floor"), [(0.9, 3000, 0), (0.9, 3000, 40), (0.9, 0, 30), (0.9, 0, 0), (0.5, 3000, 400)]
+)
+def test_a_floor_that_does_not_stand_out_or_is_far_from_the_cameras_height_is_not_found(floor, walls, on_floor):
+    assert depth(landmarks(np.random.default_rng(0), floor, walls, on_floor)) is None
 
 
 def test_landmarks_that_are_seen_from_far_away_alone_do_not_count():

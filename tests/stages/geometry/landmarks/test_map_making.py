@@ -68,14 +68,17 @@ def test_each_reference_has_the_landmarks_that_it_sees(views, found) -> None:
         assert sorted(seen[starts[reference] : starts[reference + 1]]) == sorted(own)
 
 
-def test_a_landmark_looks_like_its_sightings_on_average(views, found) -> None:
+def test_a_landmark_looks_like_its_sightings_on_average(views, found, monkeypatch) -> None:
     means = mean_descriptors(views, found)
     assert np.linalg.norm(means, axis=1) == pytest.approx(1.0, abs=1e-5)
     alike = np.einsum("od,od->o", means[found.landmarks], views.compared(found.features))
     assert np.median(alike) > 0.97
+    monkeypatch.setattr(map_making, "BLOCK", 7)  # not all at once
+    assert mean_descriptors(views, found).tobytes() == means.tobytes()
 
 
 def test_of_each_reference_the_landmarks_stay_that_most_references_see(views, found, monkeypatch) -> None:
+    np.testing.assert_equal(widely_seen(views, found), found)  # few are all kept
     monkeypatch.setattr(map_making, "MAX_SEEN", 10)
     few = widely_seen(views, found)
     owners, counts = views.owners[found.features], np.bincount(found.landmarks)
@@ -86,18 +89,6 @@ def test_of_each_reference_the_landmarks_stay_that_most_references_see(views, fo
     assert few.points.tolist() == found.points[sorted(expected)].tolist()
     assert np.bincount(few.landmarks).tolist() == counts[sorted(expected)].tolist()
     assert (found.points[found.landmarks[np.isin(found.features, few.features)]] == few.points[few.landmarks]).all()
-
-
-def test_a_map_of_few_landmarks_keeps_them_all(views, found) -> None:
-    kept = widely_seen(views, found)
-    assert kept.points.tolist() == found.points.tolist()
-    assert kept.features.tolist() == found.features.tolist()
-
-
-def test_many_landmarks_look_as_when_they_are_averaged_one_by_one(views, found, monkeypatch) -> None:
-    whole = mean_descriptors(views, found)
-    monkeypatch.setattr(map_making, "BLOCK", 7)
-    assert mean_descriptors(views, found).tobytes() == whole.tobytes()
 
 
 def test_features_of_any_length_are_put_together_also_with_images_without_any() -> None:
