@@ -24,6 +24,16 @@ def test_a_track_that_is_only_elsewhere_fits_as_it_is():
     assert (fit.mirrored, fit.as_is) == ("", 1.0)
     assert fit.scale == pytest.approx(1.0)
     assert fit.angle == pytest.approx(0.0, abs=1e-9)
+    changed = ((2.0**0.4, 0.0), (2.0**-0.4, 0.0), (2.0**0.6, 0.0), (1.0, 29.0), (1.0, 31.0))  # scale, degrees
+    others = [placed(TRACK * (by, by, 1.0)) + np.radians((0.0, 0.0, turn)) for by, turn in changed]
+    assert [track_fit(TRACK, other, 0.5).as_is for other in others] == [1.0, 1.0, 0.0, 1.0, 0.0]
+
+
+def test_pairs_by_hand_of_a_straight_track():
+    # 33 poses, 0.3 m apart: 29, 25, 17 and 1 pairs that moved by 1.2, 2.4, 4.8 and 9.6 m, of which 25 % are off.
+    line = chain(np.tile([0.3, 0.0, 0.0], (33, 1)))
+    assert [track_fit(line, line, least).pairs for least in (0.0, 2.0, 9.0)] == [72, 43, 1]
+    assert agreement(line, line * 1.25, 1.0) == (pytest.approx(42 / 43), 43)
 
 
 @given(st.floats(0.001, 1000.0), st.floats(-3.1, 3.1))
