@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.geometry.probability.particles import mode_and_mean, weighted_moments
+from omninav.stages.geometry.probability.particles import is_narrow, mode_and_mean, weighted_moments
 from omninav.stages.values.belief import MODE_RADIUS
 
 
@@ -44,6 +44,18 @@ def test_of_two_clusters_the_heavier_is_the_mode_and_not_the_mean_between():
     np.testing.assert_allclose(mode, [10.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(covariance, 0.0, atol=1e-12)
     assert share == pytest.approx(5 / 8)
+
+
+def test_moments_by_hand_around_the_cut():
+    # Half the weight in the middle: half of the squares of (2, 1, 0.2).
+    poses, weights = (
+        np.array([[0.0, 0.0, np.pi - 0.2], [4.0, 2.0, np.pi + 0.2], [2.0, 1.0, np.pi]]),
+        np.array([1, 1, 2]),
+    )
+    mean, covariance = weighted_moments(poses, weights)
+    assert np.abs(mean) == pytest.approx([2.0, 1.0, np.pi])
+    assert covariance == pytest.approx(np.array([[2.0, 1.0, 0.2], [1.0, 0.5, 0.1], [0.2, 0.1, 0.02]]))
+    assert [is_narrow(poses, weights, sigma) for sigma in (1.58, 1.59)] == [False, True]  # sqrt(2.5)
 
 
 def test_headings_on_both_sides_of_the_cut_are_one_mode():

@@ -11,6 +11,7 @@ from omninav.stages.geometry.probability.particles import (
     effective_size,
     mode_and_mean,
     occupied_cells,
+    share_within,
     systematic,
     uniform_around,
     weighted_mean,
@@ -103,6 +104,7 @@ def test_poses_within_a_tolerance_are_those_of_the_definition_whatever_turns_the
     near = (np.square(away[:, :2]).sum(axis=1) <= 0.6**2) & (np.abs(wrap(away[:, 2])) <= 0.7)
     assert 0 < near.sum() < len(near)
     assert are_within(poses, pose, 0.6, 0.7).tolist() == near.tolist()
+    assert share_within(poses, np.full(4000, 0.5), pose, 0.6, 0.7) == 0.5 * near.sum()
 
 
 def test_the_mean_of_all_stands_beside_the_heaviest_mode():
