@@ -42,7 +42,7 @@ def test_landmarks_that_are_seen_from_far_away_alone_do_not_count():
 
 @pytest.mark.parametrize("scale", [0.2, 1.0, 7.0])
 def test_the_lowest_plane_is_the_floor_in_any_unit(scale):
-    desk = landmarks(np.random.default_rng(1), 0.4, walls=0, on_floor=600)
+    desk = landmarks(np.random.default_rng(1), 0.4, walls=0, on_floor=2400)  # denser than the floor
     points = np.concatenate([landmarks(np.random.default_rng(0), 0.9, walls=1000), desk]) * scale
     seen = np.zeros(len(points), np.int64)
     assert lowest_plane(points, POSES * scale, seen, np.arange(len(points))) == pytest.approx(0.9 * scale, rel=0.02)
