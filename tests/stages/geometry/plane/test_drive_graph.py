@@ -19,10 +19,10 @@ def test_sigmas_by_hand_of_five_metres_and_a_turn_of_two():
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(("right", "joined"), [(3, True), (2, False)])
 def test_three_closures_that_agree_join_a_drive(right: int, joined: bool, turned: bool):
-    # The second drive saw the same places from a frame of its own; its other closures are 90 degrees off.
+    # The second drive saw the same places turned by 0.4, in a frame of its own; its other closures are 90 degrees off.
     elsewhere = np.array([-4.0, 7.0, 2.0])
-    own = np.concatenate([OWN, between(elsewhere, OWN)])
-    pairs, turns = np.arange(4)[:, None] + [0, 4], np.where(np.arange(4) < right, 0.0, math.pi / 2)
+    own = np.concatenate([OWN, between(elsewhere, OWN + np.array([0.0, 0.0, 0.4]))])
+    pairs, turns = np.arange(4)[:, None] + [0, 4], 0.4 + np.where(np.arange(4) < right, 0.0, math.pi / 2)
     closures = Closures(pairs[:, ::-1], -turns) if turned else Closures(pairs, turns)
     poses, found = placed_drives(own, np.repeat([0, 1], 4), closures, 0.5)
     assert found.tolist() == [True, joined]
