@@ -4,9 +4,7 @@ import functools
 import os
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -15,13 +13,12 @@ from conftest import DRIVE
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.mcap.message_types import header_stamp, standard_types
+from omninav.pipeline.mcap.message_types import header_stamp
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live.intake import Intake
 from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, MessageQueue
-from omninav.stages.recordings.live_record import LiveHeader, OdometryBuffer
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 
@@ -124,23 +121,6 @@ def test_a_goal_in_a_frame_of_the_robot_is_refused(wire: Wire, tmp_path: Path):
     drive = driven(wire, tmp_path, messages)
     assert not [out for out in drive.outs if out.goal]
     assert drive.ctx.counts["bad_message"] == 1
-
-
-@pytest.mark.parametrize(("frame", "taken"), [("", True), ("map", True), ("wheels", False), ("base_link", False)])
-def test_only_the_robots_own_frames_are_refused(frame: str, taken: bool):
-    drive = OdometryBuffer(LiveHeader({"/odom": "odometry", "/goal_pose": "goal"}))
-    store = standard_types()
-
-    def message(msgtype: str, fields: dict[str, Any]) -> Any:
-        return store.deserialize_cdr(encode(msgtype, fields, 0), msgtype)
-
-    pose = {"position": {"x": 1.0}, "orientation": {"w": 1.0}}
-    drive.add(
-        "odometry", 1, message("nav_msgs/msg/Odometry", {"header": {"frame_id": "/wheels"}, "pose": {"pose": pose}})
-    )
-    goal = message(POSE_STAMPED, {"header": {"frame_id": frame}, "pose": pose})
-    with nullcontext() if taken else pytest.raises(ValueError, match=f"its frame is '{frame}'"):
-        drive.add("goal", 2, goal)
 
 
 def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(wire: Wire, tmp_path: Path):

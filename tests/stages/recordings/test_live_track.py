@@ -18,6 +18,7 @@ def straight(track: LiveTrack, seconds: np.ndarray, x0: float = 0.0) -> list[flo
 def test_a_pose_between_two_messages_is_interpolated_and_one_beyond_them_is_not_known():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.array([1.0, 2.0]))
+    assert track.at(1 * S) == pytest.approx([1, 0, 0])
     assert track.at(round(1.25 * S)) == pytest.approx([1.25, 0, 0])
     assert track.at(round(2.5 * S)) is None
     assert track.at(round(0.5 * S)) is None
@@ -33,14 +34,26 @@ def test_a_single_stamp_that_leaps_ahead_or_back_costs_itself():
     assert track.dropped == {"lone_stamp": 1, "backward_stamp": 1, "duplicate_stamp": 1}
 
 
+def test_a_track_goes_on_after_ten_seconds_and_is_known_for_thirty():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    assert straight(track, np.arange(0.0, 31.0, 10.0)) == [0.0, 10.0, 20.0, 30.0]
+    assert track.add(40 * S + 1, (40.0, 0, 0)) == []
+    assert track.at(0) == pytest.approx([0, 0, 0])
+    straight(track, np.array([31.0]))
+    assert (track.at(9 * S), track.at(10 * S).tolist()) == (None, [10.0, 0.0, 0.0])
+
+
 def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.arange(0.0, 5.05, 0.1))
-    kept = straight(track, np.arange(5.1, 7.05, 0.1), x0=-100.0)
-    assert kept[0] == pytest.approx(5.1)  # none is lost once the next second has decided
-    assert track.at(round(6.0 * S)) == pytest.approx([6.0, 0, 0], abs=1e-6)
-    assert track.unmeasured_s(round(6.0 * S)) == pytest.approx(0.1)
-    assert track.unmeasured_s(round(4.0 * S)) == 0.0
+    for begin, end, number in ((5.1, 6.05, 0), (6.1, 6.15, 11), (6.2, 7.05, 9)):
+        assert len(straight(track, np.arange(begin, end, 0.1), x0=-100.0)) == number  # all are kept after a second
+    assert len(straight(track, np.arange(7.1, 9.05, 0.1), x0=50.0)) == 20
+    assert [track.at(at * S)[0] for at in (6, 8)] == pytest.approx([6, 8])
+    assert track.reported(track.at(8 * S)) == pytest.approx([58, 0, 0])
+    assert [track.unmeasured_s(at * S) for at in (4, 6, 8)] == pytest.approx([0, 0.1, 0.2])
+    straight(track, np.arange(1.0, 3.05, 0.1))  # a clock that is set back for good begins anew
+    assert (track.last, track.at(6 * S), track.unmeasured_s(8 * S)) == (3 * S, None, 0.0)
 
 
 def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_might_have():
@@ -50,14 +63,6 @@ def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_
     assert track.at(8 * S) == pytest.approx([5.1, 0, 0], abs=1e-6)  # 0.1 s ahead as before, and not 3 s
     assert track.at(9 * S) == pytest.approx([6.1, 0, 0], abs=1e-6)
     assert track.unmeasured_s(9 * S) == pytest.approx(3.0)
-
-
-def test_a_clock_that_is_set_back_for_good_begins_anew():
-    track = LiveTrack(MotionLimits(), jumps=False)
-    straight(track, np.arange(1000.0, 1003.0, 0.1))
-    straight(track, np.arange(1.0, 3.0, 0.1))
-    assert track.last == pytest.approx(2.9 * S)
-    assert track.at(1001 * S) is None
 
 
 def test_an_excursion_is_dropped_where_the_track_goes_on_as_before():
