@@ -9,7 +9,7 @@ from landmark_tour import graph_of
 from world_files import DEMO
 
 from omninav.pipeline import Context
-from omninav.stages.recordings.occupancy_grid import boxes, coarser, read_grid, read_occupancy
+from omninav.stages.recordings.occupancy_grid import boxes, coarser, grid_beside, read_grid, read_occupancy
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 from omninav.stages.simulator.world_grid import WorldGrid
@@ -46,12 +46,13 @@ def a_map(*places: tuple[float, float]) -> ReferenceGraph:
     [
         ("", [0, 205, 206, 254], [OCCUPIED, UNKNOWN, FREE, FREE]),
         ("negate: 1\n", [0, 49, 50, 255], [FREE, FREE, UNKNOWN, OCCUPIED]),
-        ("mode: raw\n", [0, 40, 66, 255], [FREE, UNKNOWN, OCCUPIED, UNKNOWN]),
+        ("occupied_thresh: 0.5\nfree_thresh: 0.25\n", [127, 128, 191, 192], [OCCUPIED, UNKNOWN, UNKNOWN, FREE]),
+        ("mode: raw\n", [19, 20, 65, 66, 100, 101], [FREE, UNKNOWN, UNKNOWN, OCCUPIED, OCCUPIED, UNKNOWN]),
         ("mode: scale\n", [0, 128, 205, 254], [OCCUPIED, UNKNOWN, UNKNOWN, FREE]),
     ],
 )
 def test_levels_are_read_as_map_server_reads_them(tmp_path, more, levels, states):
-    grid = read_occupancy(written(tmp_path, [levels], YAML + more))
+    grid = read_occupancy(written(tmp_path, [levels], YAML.partition("occupied")[0] + more))
     assert grid.cells.tolist() == [states]
     assert grid.made_from == "map"
 
@@ -79,7 +80,7 @@ def test_runs_that_stand_in_the_next_row_as_well_are_one_box(tmp_path):
 def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where_any_is():
     fine = np.zeros((4, 5), np.uint8)
     fine[0, 0], fine[1, 1], fine[3, 0] = OCCUPIED, UNKNOWN, UNKNOWN
-    grid = coarser(OccupancyGrid(fine, 0.05, (1.0, 2.0)), 0.1)
+    grid = coarser(OccupancyGrid(fine, 0.05, (1.0, 2.0)), 0.09)
     # the last column is half a cell outside of the grid, which is unknown
     assert grid.cells.tolist() == [[OCCUPIED, FREE, UNKNOWN], [UNKNOWN, FREE, UNKNOWN]]
     assert (grid.resolution, grid.origin) == (0.1, (1.0, 2.0))
@@ -110,6 +111,7 @@ def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, tex
         ("resolution", "fine", r"resolution: 'fine' \(str\), expected float"),
         ("origin", "[1, 2]", "origin: .* expected"),
         ("origin", "[1.0e+300, 2, 0]", "out of bounds"),
+        ("origin", "[1, 2, 0.1]", r"turned by 0\.1 rad"),
         ("occupied_thresh", "7", "occupied_thresh: 7.0 is out of bounds"),
         ("image", "/dev/zero", "/dev/zero: this is a device, expected a file"),
         ("image", ".", "this is a folder, expected a file"),
@@ -179,15 +181,17 @@ def test_a_world_gives_no_grid_of_a_log_or_beside_one_that_is_named():
 def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
     with refused(r"grid=FOLDER/map.yaml .* grid=from_tour"):
         OccupancyGridLoader(log=str(tmp_path / "drive.mcap")).inputs_digest()
+    with refused(r"none.yaml is no file"):
+        OccupancyGridLoader(grid=str(tmp_path / "none.yaml")).inputs_digest()
     written(tmp_path / "tour.grid", [[0]])
     (tmp_path / "tour.mcap").touch()
     with refused(f"grid={tmp_path}/tour.grid/map.yaml"):
         OccupancyGridLoader(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
-
-
-def test_a_grid_that_is_not_there_is_named(tmp_path):
-    with refused(r"none.yaml is no file"):
-        OccupancyGridLoader(grid=str(tmp_path / "none.yaml")).inputs_digest()
+    both = [str(tmp_path / "drive.mcap"), str(tmp_path / "tour.mcap")]
+    beside = written(tmp_path, [[0]])  # of all logs of the folder that are there
+    assert grid_beside(both) == tmp_path / "tour.grid" / "map.yaml"
+    (tmp_path / "drive.mcap").touch()
+    assert grid_beside(both) == beside
 
 
 def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path, monkeypatch):

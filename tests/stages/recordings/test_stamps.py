@@ -1,8 +1,11 @@
 """Poses at the images' times."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from omninav.stages.recordings.stamps import poses_near
+from omninav.stages.recordings.stamps import lone, poses_near
+from omninav.stages.recordings.topics import set_back
 
 SECOND = 10**9
 TIMES = 1_700_000_000 * SECOND + np.array([0, 1, 4]) * SECOND
@@ -28,3 +31,18 @@ def test_rounding_puts_no_stamp_before_the_first_or_after_the_last_pose() -> Non
     assert known([-4e-8, 4 + 4e-8, 4.0005], 0.3) == [0.0, 4.0, 4.0]
     assert known([-0.002, 4.002], 0.3) == [None, None]
     assert known([4.0005], 1e-4) == [None]
+
+
+def test_a_stamp_is_alone_more_than_an_hour_from_all_others_unless_that_is_common() -> None:
+    hour = 3600 * SECOND
+    assert lone(np.array([0, 1, hour + 2, 2 * hour + 3, 2 * hour + 4])).tolist() == [False, False, True, False, False]
+    assert lone(np.array([0, hour + 1, hour + 2])).tolist() == [True, False, False]
+    for stamps in ([0, 1, hour + 1, 2 * hour + 2, 2 * hour + 3], [0, hour + 1], [0, hour + 1, hour + 2, 2 * hour + 3]):
+        assert not lone(np.array(stamps)).any()
+
+
+def test_a_clock_is_said_to_be_set_back_by_ten_seconds_or_more() -> None:
+    records = [SimpleNamespace(log_time=at) for at in (0, 30 * SECOND, 20 * SECOND, 40 * SECOND)]
+    assert set_back(records).startswith("the clock was set back by 10 s after image 2;")
+    records[2].log_time += 1
+    assert set_back(records) == set_back(records[:1]) == ""

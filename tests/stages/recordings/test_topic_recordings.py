@@ -4,7 +4,7 @@ import os
 import random
 import sqlite3
 from contextlib import closing
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +35,7 @@ from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, Topics
 from omninav.stages.recordings.stamps import ascending
-from omninav.stages.values.encoded_image import decode_image
+from omninav.stages.values.encoded_image import Undecodable
 
 from .conftest import refused
 
@@ -171,6 +171,18 @@ def test_undecodable_cut_off_and_blank_images_are_left_out_when_met(tmp_path: Pa
     assert recording.dropped == {"undecodable_image": 4, "blank_image": 1, "wrong_size": 1}
 
 
+def test_readings_are_the_last_of_the_second_before_an_image(tmp_path: Path) -> None:
+    kind, scans = "sensor_msgs/msg/LaserScan", []
+    for seconds, ranges in ((1.267, [1.0, 2.0]), (3.0, [])):  # images are taken at 0.267 s, 0.767 s, ...
+        at = START + round(seconds * 1e9)
+        fields = {"ranges": np.array(ranges, np.float32), "angle_increment": 0.1, "range_max": 4.0}
+        scans.append(Made("/scan", kind, at, at, make_message(kind, fields, at)))
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", chain(messages(), scans))))
+    found = [recording.scan(frame) for frame in range(7)]
+    assert [each and each.ranges.tolist() for each in found] == [None] * 2 + [[1.0, 2.0]] * 3 + [None] * 2
+    assert recording.dropped == {"bad_message": 1}
+
+
 FIRST, LAST = START + 2_000_000_000, START + 8_000_000_000
 
 
@@ -244,12 +256,16 @@ def test_the_digest_follows_the_content_and_not_the_name(tmp_path: Path, whole: 
     assert open_recording(str(write_mcap(tmp_path / "other.mcap"))).digest() == whole.digest()
 
 
-@pytest.mark.parametrize("encoding", ["bgr8", "rgb8", "bgra8", "mono8"])
+@pytest.mark.parametrize("encoding", ["bgr8", "8UC3", "rgb8", "bgra8", "rgba8", "mono8", "8UC1"])
 def test_raw_images_are_read_with_their_row_padding(encoding: str) -> None:
-    pixels = picture(1) if encoding != "mono8" else np.repeat(picture(1)[..., :1], 3, axis=2)
-    channels = {"bgr8": [0, 1, 2], "rgb8": [2, 1, 0], "bgra8": [0, 1, 2, 0], "mono8": [0]}[encoding]
+    pixels = picture(1) if encoding not in ("mono8", "8UC1") else np.repeat(picture(1)[..., :1], 3, axis=2)
+    channels = {"rgb8": [2, 1, 0], "bgra8": [0, 1, 2, 0], "rgba8": [2, 1, 0, 0], "mono8": [0], "8UC1": [0]}
+    channels = channels.get(encoding, [0, 1, 2])
     rows = np.hstack([pixels[..., channels].reshape(16, -1), np.zeros((16, 5), np.uint8)])
     np.testing.assert_array_equal(pixels_of(raw_image(encoding, rows)), pixels)
+    for cut in (rows[:, :-6], rows[:-1]):
+        with pytest.raises(Undecodable):
+            pixels_of(raw_image(encoding, cut))
 
 
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
@@ -267,10 +283,10 @@ def raw_image(encoding: str, rows: np.ndarray) -> object:
 
 
 def test_an_image_is_blank_only_when_it_is_constant() -> None:
-    assert is_blank(decode_image(encoded(np.full((16, 48, 3), (10, 200, 90), np.uint8), ".jpg")))
-    one_pixel = np.zeros((16, 48, 3), np.uint8)
-    one_pixel[3, 5] = 255
-    assert not is_blank(one_pixel)
+    for level, blank in ((2, True), (3, False)):  # JPEG rounds by one, to either side
+        one_pixel = np.full((16, 48, 3), (10, 200, 90), np.uint8)
+        one_pixel[3, 5, 1] += level
+        assert is_blank(one_pixel) is blank
 
 
 def test_ascending_keeps_the_longest_run_by_brute_force() -> None:

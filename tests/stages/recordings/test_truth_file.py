@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conflicting_logs import ticks
 from made_logs import FRAMES, START, TRUTH, Made, messages, pose_at, pose_fields, write_mcap
+from scipy.spatial.transform import Rotation
 
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
@@ -25,7 +26,8 @@ def tum(path: Path, shift_s: float = START / 1e9, seconds: tuple[float, ...] = S
     rows = ["# timestamp x y z qx qy qz qw"]
     for at in seconds:
         x, y, heading = pose_at(at)
-        rows.append(f"{at + shift_s:.9f} {x:.9f} {y:.9f} 0 0 0 {math.sin(heading / 2):.9f} {math.cos(heading / 2):.9f}")
+        turned = " ".join(map(str, Rotation.from_euler("ZYX", [heading, 0.4, -0.3]).as_quat()))  # on a hillside
+        rows.append(f"{at + shift_s:.9f} {x:.9f} {y:.9f} 0 {turned}")
     path.write_text("\n".join(rows))
     return path
 
