@@ -23,8 +23,10 @@ def test_of_a_picture_they_are_the_correlations_of_its_channels() -> None:
 
 def test_of_a_disc_they_are_those_of_the_pixels_in_it() -> None:
     down, right = np.mgrid[:40, :50]
-    disc = np.hypot(right - 20, down - 15) <= 6.0
-    assert disc_colours(PIXELS, ALL, [[20.2, 14.9]], [6.0])[0] == pytest.approx(by_numpy(PIXELS[disc]), abs=1e-6)
+    for x, y, radius, step in ((20, 15, 6.0, 1), (7, 12, 17.0, 2), (43, 33, 17.0, 2)):  # of a large one every second
+        disc = (np.hypot(right - x, down - y) <= radius) & ((right - x) % step == 0) & ((down - y) % step == 0)
+        found = disc_colours(PIXELS, ALL, [[x + 0.2, y - 0.1]], [radius])[0]
+        assert found == pytest.approx(by_numpy(PIXELS[disc]), abs=1e-6)
 
 
 def test_scale_and_offset_of_each_channel_do_not_change_them() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.features.colour_histogram import ColourHistogram
-from omninav.stages.features.grey_world import LEVEL, grey_world_pixels
+from omninav.stages.features.grey_world import grey_world_pixels
 from omninav.stages.features.haar_integral import HaarIntegral
 from omninav.stages.features.hsv_histogram import HsvHistogram
 from omninav.stages.features.mean_rgb import MeanRgb
@@ -35,15 +35,6 @@ def test_light_from_one_side_is_removed_in_a_window_and_not_over_the_whole_view(
     assert mean_gap(0.25) < 6 < 20 < mean_gap(1.0)
 
 
-def test_the_mean_becomes_the_level():
-    assert grey_world_pixels(SCENE, 1.0).mean(axis=(0, 1)) == pytest.approx([LEVEL] * 3, abs=0.5)
-
-
-def test_the_window_goes_around_the_circle():
-    turned = grey_world_pixels(np.roll(SCENE, 100, axis=1), 0.25)
-    assert np.abs(turned.astype(int) - np.roll(grey_world_pixels(SCENE, 0.25), 100, axis=1)).max() <= 1
-
-
 def test_a_column_is_scaled_by_the_mean_of_a_quarter_of_the_circle_around_it():
     view = np.full((2, 40, 3), 55, np.uint8)
     view[:, 2] = 165
@@ -52,6 +43,8 @@ def test_a_column_is_scaled_by_the_mean_of_a_quarter_of_the_circle_around_it():
     expected[2] = 255.0
     described = MeanRgb(segments=40, grey_world="local").step(CTX, Panorama(view)).features.values
     assert described == pytest.approx(np.repeat(expected[:, None], 3, axis=1))
+    whole = grey_world_pixels(view, 1.0)[0, [0, 2], 0]  # of 40 columns the mean is 57.75
+    assert whole.tolist() == [round(55 * 128 / 57.75), 255]
 
 
 def test_black_stays_black_and_what_is_too_bright_is_cut():

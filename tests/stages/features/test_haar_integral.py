@@ -94,18 +94,6 @@ def test_single_pixels_get_the_means_that_the_whole_picture_has_there(root: bool
     assert np.allclose(kernel.means_at(picture, rows, columns), kernel.means(picture)[rows, columns], atol=1e-6)
 
 
-def test_a_pixel_by_itself_is_seen_where_the_kernel_turned_around_a_pixel_meets_it() -> None:
-    # f = M(0,0) M(0,1) averaged over four angles: a lone bright pixel times its neighbours, and a quarter from each of
-    # the four that it is the neighbour of; all others are dark.
-    pixels = np.zeros((7, 9, 3), np.uint8)
-    pixels[3, 4] = 255
-    pixels[3, 5] = 255
-    means = Kernel((0.0, 1.0), 4).means(wrapped(pixels, 2))[..., 0]
-    expected = np.zeros((7, 9))
-    expected[3, 4] = expected[3, 5] = 0.25
-    assert np.allclose(means, expected, atol=1e-6)
-
-
 @pytest.mark.parametrize("histogram", ["joint", "separate"])
 @pytest.mark.parametrize("root", [False, True])
 def test_a_turned_picture_is_as_similar_as_its_interpolation_allows(histogram: str, root: bool) -> None:

@@ -134,6 +134,7 @@ def test_a_variant_learns_its_map_with_a_network_and_finds_its_way(
     assert (code, (tmp_path / "runs/latest/metrics.json").is_file()) == (0, True), capsys.readouterr().err
 
 
-def test_without_a_model_it_says_what_to_type(capsys: pytest.CaptureFixture[str]):
-    assert main(["check", "features=onnx"]) == 2
+@pytest.mark.parametrize("stage", ["features", "landmarks"])
+def test_without_a_model_it_says_what_to_type(capsys: pytest.CaptureFixture[str], stage: str):
+    assert main(["check", f"{stage}=onnx"]) == 2
     assert "model=" in capsys.readouterr().err

@@ -211,20 +211,19 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path: Path, settings: dict
     assert "\n" not in str(refused.value)
 
 
-def test_a_network_without_keypoints_is_refused(tmp_path: Path) -> None:
-    model = onnx.load(network(tmp_path / "net.onnx"))
-    del model.graph.output[0]
-    onnx.save(model, tmp_path / "net.onnx")
-    with pytest.raises(BadInput, match=r"its outputs are .*expected keypoints"):
-        found(tmp_path / "net.onnx")
-
-
-def test_a_network_that_fails_is_said_to(tmp_path: Path) -> None:
-    model = onnx.load(network(tmp_path / "net.onnx"))
-    next(node for node in model.graph.node if "signed" in node.output).input[1] = "unspoilt"
-    onnx.save(model, tmp_path / "net.onnx")
-    with pytest.raises(BadInput, match="the network cannot run on an image"):
-        found(tmp_path / "net.onnx")
+def test_a_network_without_keypoints_and_one_that_fails_are_said_to_be(tmp_path: Path) -> None:
+    for spoil, said in (
+        (lambda graph: graph.output.pop(0), r"its outputs are .*expected keypoints"),
+        (
+            lambda graph: next(node for node in graph.node if "signed" in node.output).input.__setitem__(1, "unspoilt"),
+            "the network cannot run on an image",
+        ),
+    ):
+        model = onnx.load(network(tmp_path / "net.onnx"))
+        spoil(model.graph)
+        onnx.save(model, tmp_path / "net.onnx")
+        with pytest.raises(BadInput, match=said):
+            found(tmp_path / "net.onnx")
 
 
 def test_a_robot_finds_its_way_by_landmarks_of_a_network(
@@ -236,8 +235,3 @@ def test_a_robot_finds_its_way_by_landmarks_of_a_network(
     assert code == 0, capsys.readouterr().err
     metrics = json.loads((tmp_path / "runs/latest/metrics.json").read_text())
     assert metrics["position_error_m"]["median"] < 0.05
-
-
-def test_without_a_model_it_says_what_to_type(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", "landmarks=onnx"]) == 2
-    assert "model=" in capsys.readouterr().err

@@ -18,15 +18,6 @@ def test_a_smaller_image_covers_the_original_from_edge_to_edge(columns: int, row
     assert read.original(corners) == pytest.approx(np.array([[-0.5, -0.5], [columns - 0.5, rows - 0.5]]))
 
 
-def test_a_spot_of_a_smaller_image_is_where_the_original_has_it() -> None:
-    pixels = np.zeros((11, 360, 3), np.uint8)
-    pixels[8:11, 200:206] = 255
-    read = prepared_image(Panorama(pixels), None, 900)  # of 11 rows 5 are left
-    weights = read.pixels[:, :, 0].astype(float)
-    row, column = (np.average(each, weights=weights) for each in np.indices(weights.shape))
-    assert read.original(np.array([column, row])) == pytest.approx([202.5, 9.0], abs=0.4)
-
-
 def test_a_smaller_mirror_image_has_its_ring_where_the_mirror_is() -> None:
     read = prepared_image(look("mirror", 0.0), CAMERA, 40_000)
     assert read.ring is not None

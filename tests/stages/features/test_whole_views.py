@@ -36,7 +36,6 @@ def test_the_basis_is_the_orthonormal_transform_of_scipy() -> None:
     signal = np.random.default_rng(0).normal(size=(24, 3))
     basis = cosine_basis(24)
     assert basis @ signal == pytest.approx(fft.dct(signal, axis=0, norm="ortho"))
-    assert basis @ basis.T == pytest.approx(np.eye(24), abs=1e-12)
 
 
 def test_coefficients_are_the_lowest_of_the_strips_transform_in_order() -> None:
@@ -111,12 +110,6 @@ def test_a_wave_around_the_robot_is_one_coefficient_of_its_row_and_channel() -> 
     strip = waves.reshape(8, 2, 3).swapaxes(0, 1)
     assert spectrum_around(strip, 3) == pytest.approx(expected, abs=1e-9)
     assert spectrum_around(strip, 3, mean=False) == pytest.approx(expected * [0.0, 1.0, 1.0], abs=1e-9)
-
-
-def test_a_spectrum_has_the_energy_of_its_strip() -> None:
-    strip = np.random.default_rng(6).normal(size=(2, 9, 3)).astype(np.float32)
-    sizes = np.abs(spectrum_around(strip, 5)) ** 2
-    assert sizes[:, 0].sum() + 2 * sizes[:, 1:].sum() == pytest.approx(float((strip**2).sum()), rel=1e-5)
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=repr)
