@@ -1,6 +1,6 @@
 """The present view against the places of a made-up world's map, and against one other view."""
 
-import math
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from made_tour import Landmarks, along, mapped, scattered
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.correspondences import MatchFeatures
+from omninav.stages.match.place_words import MatchPlaceWords
 from omninav.stages.match.visual_distance import VisualDistance
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
@@ -66,4 +67,16 @@ def test_correspondences_lead_from_the_present_view_to_the_target(search: str) -
     assert len(np.unique(pairs.second)) == len(pairs)
     nothing = MatchFeatures(search=search).step(Context("match"), features=here, target=there.chosen(slice(0, 0)))
     assert len(nothing.correspondences) == 0
-    assert math.isfinite(pairs.distance.sum())
+
+
+def test_a_place_is_as_similar_by_words_as_its_most_similar_view() -> None:
+    words = MagicMock(owner=np.array([0, 1, 1, 0] * 3), __len__=lambda _: 2)
+    words.words.similarities.return_value = each = np.array([0.1, 0.2, 0.9, 0.3] * 3, np.float32)
+    stage, given = MatchPlaceWords(), (Context("match"), WORLD.seen(Pose(6.0, 7.0, 0.0)))
+    found = stage.step(*given, [0, 1], words)
+    assert found.similarities.values == pytest.approx([0.3, 0.9])
+    assert found.answers.references.tolist() == [2, 6, 10, 3, 7, 11, 1, 5, 9, 0]
+    assert found.answers.similarities.tolist() == each[found.answers.references].tolist()
+    assert stage.step(*given, [0, 1]).similarities is None
+    with pytest.raises(BadInput, match="of 2 places, the map has 3"):
+        stage.step(*given, [0, 1, 2], words)
