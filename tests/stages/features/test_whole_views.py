@@ -68,10 +68,12 @@ def test_the_mean_is_what_a_brighter_picture_changes() -> None:
     assert with_mean[0] == pytest.approx(40 * math.sqrt(16 * 72), rel=1e-3)
 
 
-def test_a_strip_is_the_mean_of_its_parts() -> None:
+def test_a_strip_is_the_mean_of_its_parts_and_its_contrast_that_to_20_degrees_around() -> None:
     pixels = np.random.default_rng(5).integers(0, 256, (80, 360, 3), dtype=np.uint8)
     expected = pixels.reshape(4, 20, 36, 10, 3).mean(axis=(1, 3))
-    assert averaged_strip(pixels, 4, 36, "colour") == pytest.approx(expected, abs=1e-3)
+    strip, contrast = (averaged_strip(pixels, 4, 36, "colour", how) for how in ("none", "local"))
+    assert strip == pytest.approx(expected, abs=1e-3)
+    assert contrast == pytest.approx(local_contrast(strip, 2.0, 1.0), abs=1e-5)  # columns of 10 degrees, rows of 20
 
 
 @pytest.mark.parametrize("contrast", ["whole", "local"])

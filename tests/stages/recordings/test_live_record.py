@@ -53,10 +53,10 @@ def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:
     asked, _ = drive.frame(199_999_999)
     assert (asked.scan, asked.unmeasured_s, asked.restart.at) == (None, 0.0, pytest.approx((1.5, 2.5, 0.3, 0.5, 0.2)))
     assert (asked.goal.x, asked.goal.y, np.isnan(asked.truth).tolist()) == (3.0, -1.0, [True] * 3)
-    for stamp, ranges, used in ((5, [1.0, 2.0], ["scan at 0.2 s"]), (12, [1.0, 2.0], []), (13, None, [])):
-        tick, items = drive.frame(stamp * 10**8)  # readings are of a second, and once in the record
+    for at, ranges, used in ((0.5, [1.0, 2.0], ["scan at 0.2 s"]), (1.2, [1.0, 2.0], []), (1.200000001, None, [])):
+        tick, items = drive.frame(round(at * 1e9))  # readings are of a second, and once in the record
         assert (tick.scan and tick.scan.ranges.tolist(), items, tick.restart, tick.goal) == (ranges, used, None, None)
-        assert tick.odometry.tolist() == tick.reported_odometry.tolist() == [pytest.approx(stamp / 10), 0.0, 0.0]
+        assert tick.odometry.tolist() == tick.reported_odometry.tolist() == [pytest.approx(at), 0.0, 0.0]
     assert drive.frame(2_000_000_001) is None
     for at in (2.1, 3.1):  # a counter that was reset
         say(drive, "odometry", at, {"pose": {"pose": pose_fields(at - 102.1, 0.0, 0.0)}})
