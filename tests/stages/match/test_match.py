@@ -47,6 +47,14 @@ def test_a_candidate_is_compared_as_in_the_whole_map(match: SelectiveMatch) -> N
     assert some.sampling_weight.sum() == len(map)
 
 
+def test_occluded_segments_count_against_a_view_as_each_match_says() -> None:
+    map, seen = references(np.zeros((1, 3)), np.eye(2, dtype=np.float32)[None, [0, 0, 1, 1]]), np.eye(2)[[0] * 4]
+    # The best two of four segments are equal: 2 sqrt(1 / 8); on average a half are; of squares 4 of 8 differ.
+    for match, expected in ((SelectiveMatch, 0.5**0.5), (HistogramIntersection, 0.5), (L2Match, 1 - 0.5**0.5)):
+        found = match(headings=1).step(Context("match"), SegmentHistograms(seen.astype(np.float32)), map)
+        assert found.similarities.values == pytest.approx(np.array([[expected]]))
+
+
 def test_a_map_of_other_features_is_refused_in_one_line() -> None:
     seen = SegmentColours(np.zeros((SEGMENTS, 3), np.float32))
     with pytest.raises(BadInput, match="its views are histograms of 12 segments x 20 bins") as refused:
