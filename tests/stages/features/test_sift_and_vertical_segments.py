@@ -23,7 +23,6 @@ def described(heading: float) -> LocalFeatures:
 
 def test_a_turned_robot_matches_patches_and_both_ends_of_columns() -> None:
     one, other = described(0.0), described(0.7)
-    assert one.columns is not None
     assert len(one.columns) > 100
     pairs = MatchFeatures().step(Context("match"), features=one, target=other).correspondences
     ends = pairs.first >= len(one)
@@ -44,8 +43,6 @@ def test_columns_alone_are_those_of_both_kinds() -> None:
     stage.setup(context)
     alone = stage.step(context, image=look("mirror", 0.0), camera=CAMERA).features
     assert len(alone) == 0
-    assert alone.columns is not None
-    assert both is not None
     assert np.array_equal(alone.columns.descriptors, both.descriptors)
     pairs = MatchFeatures().step(Context("match"), features=alone, target=alone).correspondences
     assert np.array_equal(pairs.first, pairs.second)
@@ -55,8 +52,6 @@ def test_columns_alone_are_those_of_both_kinds() -> None:
 def test_a_map_keeps_columns_and_views_are_compared_by_them_too() -> None:
     view = described(0.0)
     kept = stored([view], [GlobalDescriptor(np.zeros(3, np.float32))]).features(0)
-    assert kept.columns is not None
-    assert view.columns is not None
     assert len(kept.columns) == len(view.columns)
     by = ComparisonOptions()
     both = compare(view_features(kept), view_features(view), by)
@@ -69,6 +64,4 @@ def test_a_map_keeps_columns_and_views_are_compared_by_them_too() -> None:
 def test_lost_features_are_of_both_kinds() -> None:
     view = described(0.0)
     left = LostFeatures(share=0.5).step(Context("lost", np.random.default_rng(0)), view).features
-    assert left.columns is not None
-    assert view.columns is not None
     assert 0.3 < len(left.columns) / len(view.columns) < 0.7
