@@ -56,8 +56,8 @@ MIN_BASELINE_M = 0.2
 MAX_DOUBTFUL_M = 0.6
 """Way after which a doubtful map that no image has shown again, and a witness, are forgotten, metres."""
 MAX_JUMP_M = 0.2
-"""Largest distance of the robot's place from where odometry leads, from one image to the next, metres: in 11 development
-drives right places jump by 0.07 at most in 98 % of the images, and those that jump by 0.2 and more are wrong."""
+"""Largest distance of the robot's place from where odometry leads, from one image to the next, metres: in development
+drives 98 % of the right places lie within 0.07, and all beyond 0.2 are wrong (docs/experiments/atlas.md)."""
 MAX_REFUTED_M = 3.0
 """Way after which features that led to another place may make a map again, metres."""
 MAX_HEADING_DIFFERENCE_DEG = 5.0
@@ -113,8 +113,9 @@ class LocalMapping(Stage):
 
     With fewer than `MIN_INLIERS` the map is rebuilt from the matches of the same tick, with the old map's scale, or the
     target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
-    says the target is reached, where the two views still differ, is discarded, and the features that agreed with it make
-    no map for `MAX_REFUTED_M`, as they may be of a thing that looks the same as one at the target.
+    says the target is reached, where the two views still differ, is discarded. Then the features that agreed with it
+    make no map for `MAX_REFUTED_M`, as they may be of a thing that looks like one at the target. A place more than
+    `MAX_JUMP_M` from where odometry leads is not believed.
 
     A relative pose with few inliers may be one of another place that looks the same. The map is `doubtful` until
     `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or more, and
