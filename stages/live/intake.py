@@ -33,8 +33,13 @@ TYPES: dict[Role, str] = {
     "restart": EMPTY,
 }
 """What each role's topic carries; an image's type follows from its topic."""
-SETTINGS = {"image": "topics.image", "odometry": "topics.odometry"}
-"""Where the topic of a role without which there is no tick is set."""
+SETTINGS = {"image": "topics.image", "odometry": "topics.odometry", "scan": "topics.scan"}
+"""Where the topic of a sensor is set."""
+WITHOUT = {
+    "odometry": "speed=0.5 (m/s, a robot without odometry)",
+    "scan": "topics.scan=null (a robot without a range finder)",
+}
+"""What to type where there is no such sensor."""
 SILENT_S = 1.0
 """A topic that has been heard and says nothing for so long is a trouble."""
 UNUSED_S = 2.0
@@ -74,6 +79,8 @@ class Intake:
     def __post_init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.details: dict[str, str] = {}
+        """The first of each kind; `_latest`: the last."""
+        self._latest: dict[str, str] = {}
         self.unrecorded: list[Arrival] = []
         self._images: list[_Pending] = []
         self._earlier: int | None = None
@@ -113,12 +120,13 @@ class Intake:
         images = [topic for topic, role in topics.items() if role == "image"]
         spoken = [topic for topic in images if topic in self._received]
         image = (spoken or [topic for topic in images if topic in offered] or images)[0]
-        needed = {topic: type_on(topic, role) for topic, role in topics.items() if role == "odometry"}
-        needed[image] = type_on(image, "image")
+        kinds = {topic: type_on(topic, role) for topic, role in topics.items() if role != "image" or topic == image}
+        needed = {topic for topic in kinds if topics[topic] in SETTINGS}
         if self.camera is None and self.camera_info is not None:
-            needed[self.camera_info] = CAMERA_INFO
-        for topic in {*images, *needed}:
-            kind, heard = needed.get(topic, ""), self._received.get(topic)
+            kinds[self.camera_info] = CAMERA_INFO
+            needed.add(self.camera_info)
+        for topic in {*images, *kinds, *([self.camera_info] if self.camera_info else [])}:
+            kind, heard = kinds.get(topic, ""), self._received.get(topic)
             trouble = ""
             if not kind:
                 pass
@@ -126,30 +134,34 @@ class Intake:
                 trouble = f"{topic}: its {mismatched[topic]} (QoS) does not fit"
             elif topic in offered and offered[topic] != kind:
                 trouble = f"{topic} carries {offered[topic]:.80}, not {kind}{self._advice(topic, kind, offered)}"
+            elif topic not in needed:
+                pass
             elif heard is None:
                 trouble = f"nothing on {topic} ({kind}) for {now - self._since:.0f} s"
                 trouble += "" if topic in offered else ", nobody publishes it"
                 trouble += self._advice(topic, kind, offered)
             elif now - heard > max(SILENT_S, self.patience_s):
                 trouble = f"{topic} ({kind}) has been silent for {now - heard:.0f} s"
+                trouble += "" if topic in offered else ", nobody publishes it"
             self.status.note(topic, trouble)
         self.status.counts = self.dropped()
-        unseen = f"no publisher is seen ({self.transport.place}): is the robot on, and in the same domain and reach?"
+        unseen = f"no publisher is seen ({self.transport.place}): {self.transport.unseen()}"
         self.status.note("robot", "" if offered or self._received else unseen)
-        self.status.note("ticks", "")
-        if not self.status.troubles:  # else that is why
-            self.status.note("ticks", self._unused(now))
+        without = [topic for topic in needed if topic in self.status.troubles and topics.get(topic) != "scan"]
+        self.status.note("ticks", "" if without else self._unused(now))  # else that is why
 
     def _advice(self, topic: str, kind: str, offered: Mapping[str, str]) -> str:
-        """Say what to type where another topic carries what is missing, or the robot has none."""
+        """Say what to type where another topic carries what a sensor should, or the robot has no such sensor."""
         role = self.header.topics.get(topic)
         kinds = IMAGE_TYPES if role == "image" else (kind,)
         others = sorted(
             name for name, carried in offered.items() if carried in kinds and name not in self.header.topics
         )
+        if role is not None and role not in SETTINGS:
+            return ""
         setting = SETTINGS.get(role or "", "topics.camera_info")
         advice = [f"{setting}={others[0]:.80}"] if others else []
-        advice += ["speed=0.5 (m/s, a robot without odometry)"] if role == "odometry" else []
+        advice += [WITHOUT[role]] if role in WITHOUT else []
         advice += ["camera=PATH/camera.yaml"] if role is None else []
         return f"; type {', or '.join(advice)}" if advice else ""
 
@@ -160,7 +172,7 @@ class Intake:
         if not unused or now - self._last_used < UNUSED_S:
             return ""
         kind, number = unused.most_common(1)[0]
-        return f"no image is used: {kind} {number} times ({self.details.get(kind, kind):.200})"
+        return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200})"
 
     def dropped(self) -> Counter[str]:
         """What was left out so far, by kind."""
@@ -173,6 +185,7 @@ class Intake:
     def _drop(self, kind: str, detail: str) -> None:
         self.counts[kind] += 1
         self.details.setdefault(kind, detail)
+        self._latest[kind] = detail
 
     def _take(self, arrival: Arrival) -> None:
         self._received[arrival.topic] = time.monotonic()

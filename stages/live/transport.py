@@ -100,6 +100,10 @@ class Transport(ABC):
         """Topics of ours whose other end asks for or offers another QoS: topic -> which policy."""
         return {}
 
+    def unseen(self) -> str:
+        """What may be the cause where no publisher is seen, and what to do."""
+        return "is the robot on, and in the same domain and reach?"
+
     def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
         """Answer a service, with requests and answers in CDR; False where the transport has no services."""
         return False

@@ -26,6 +26,8 @@ from .conftest import CAMERA, IMAGE, ODOMETRY, TRUTH, Wire, encode, recorded, re
 
 POSE, POSE_STAMPED = "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseStamped"
 COMPRESSED, SCAN = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/LaserScan"
+NO_SCAN = f"nothing on /scan ({SCAN}) for 0 s, nobody publishes it; "
+NO_SCAN += "type topics.scan=null (a robot without a range finder)"
 
 
 @functools.cache
@@ -186,6 +188,7 @@ def test_while_a_robot_says_nothing_what_is_missing_is_noted(wire: Wire, tmp_pat
         ODOMETRY: "nothing on /odom (nav_msgs/msg/Odometry) for 0 s, nobody publishes it; "
         "type speed=0.5 (m/s, a robot without odometry)",
         IMAGE: f"nothing on {IMAGE} ({COMPRESSED}) for 0 s, nobody publishes it",
+        "/scan": NO_SCAN,
         "robot": "no publisher is seen (a test): is the robot on, and in the same domain and reach?",
     }
     drive.feed(wire, said())
@@ -209,7 +212,44 @@ def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
         "type topics.odometry=/wheels, or speed=0.5 (m/s, a robot without odometry)",
         "/camera/image": "/camera/image carries std_msgs/msg/String, not sensor_msgs/msg/Image; "
         "type topics.image=/omni",
+        "/scan": NO_SCAN.replace("0 s", "12 s"),
     }
+
+
+def test_a_camera_info_that_came_late_is_no_trouble_any_more_and_hides_no_other(
+    wire: Wire, tmp_path: Path, now: list[float]
+):
+    intake = Drive(tmp_path, camera=None, topics=Topics(scan=None)).intake
+    intake.watch()
+    assert "nothing on /camera/camera_info" in wire.status.troubles["/camera/camera_info"]
+    (odometry, *_), (image, *_) = recorded(DRIVE, ODOMETRY), recorded(DRIVE, IMAGE)
+    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    assert intake.next(0.0) is None
+    wire.status.note("state", "searching")
+    for _ in range(2):
+        now[0] += 3.0
+        wire.inbox.put(odometry)
+        wire.inbox.put(image._replace(data=image.data[:4]))
+        assert intake.next(0.0) is None
+    intake.watch()
+    assert wire.status.troubles.keys() == {"state", "ticks"}
+    assert "no image is used: bad_message" in wire.status.troubles["ticks"]
+
+
+def test_a_range_finder_that_is_missing_and_a_request_of_another_type_are_noted_though_ticks_go_on(
+    wire: Wire, tmp_path: Path, now: list[float]
+):
+    drive = Drive(tmp_path)
+    drive.feed(wire, said())
+    wire.there = {"/goal_pose": "geometry_msgs/msg/Point", "/pose": POSE_STAMPED, "/odom": "nav_msgs/msg/Odometry"}
+    wire.there |= {IMAGE: COMPRESSED}
+    drive.intake.watch()
+    assert drive.outs
+    assert wire.status.troubles == {"/goal_pose": f"/goal_pose carries geometry_msgs/msg/Point, not {POSE_STAMPED}"}
+    drive.intake._received.pop("/scan")
+    wire.there["/base_scan"] = SCAN
+    drive.intake.watch()
+    assert wire.status.troubles["/scan"] == NO_SCAN.replace("type", "type topics.scan=/base_scan, or")
 
 
 @pytest.mark.parametrize(
