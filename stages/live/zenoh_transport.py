@@ -92,6 +92,15 @@ class ZenohTransport(Transport):
                 found[parts[9].replace("%", "/")] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
         return found
 
+    def unseen(self) -> str:
+        known = self._session.info
+        if known.routers_zid() or known.peers_zid():
+            return super().unseen()
+        return (
+            "no router answers; type `ros2 run rmw_zenoh_cpp rmw_zenohd`, or where another one is: "
+            f"export ZENOH_CONFIG_OVERRIDE='connect/endpoints=[\"{ROUTER}\"]'"
+        )
+
     def close(self) -> None:
         self._session.close()
 

@@ -8,7 +8,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.live.publish_truth import PublishTruth
-from omninav.stages.live.transport import TransportError, connect
+from omninav.stages.live.transport import TransportError, connect, disconnect
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.pose import Pose
 
@@ -75,3 +75,12 @@ def test_a_configuration_that_is_none_is_refused_in_one_line(monkeypatch: pytest
     monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", "/nowhere.json5")
     with pytest.raises(TransportError, match="transport=zenoh: a session cannot be opened"):
         connect("zenoh", 4)
+
+
+def test_a_router_that_does_not_answer_is_named_and_one_that_does_is_not(
+    router: zenoh.Session, monkeypatch: pytest.MonkeyPatch
+):
+    assert "router" not in connect("zenoh", 6).unseen()
+    disconnect()
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'connect/endpoints=["tcp/127.0.0.1:9"]')
+    assert "no router answers; type `ros2 run rmw_zenoh_cpp rmw_zenohd`" in connect("zenoh", 6).unseen()
