@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from omninav.pipeline.files import open_itself
+from omninav.pipeline.files import named, open_itself
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogStream
 from omninav.stages.camera.model import Camera
@@ -43,15 +43,17 @@ class DriveRecord:
 
     def write(self, arrivals: Iterable[Arrival]) -> None:
         """Append messages, in this order whatever their times."""
-        for arrival in arrivals:
-            self._last = max(arrival.received, self._last + 1)
-            self._stream.append(arrival.topic, arrival.msgtype, self._last, arrival.data)
-        self._file.flush()
+        with named(self._part):
+            for arrival in arrivals:
+                self._last = max(arrival.received, self._last + 1)
+                self._stream.append(arrival.topic, arrival.msgtype, self._last, arrival.data)
+            self._file.flush()
 
     def close(self) -> None:
         """Give the record its end and its name."""
-        self._stream.finish()
-        self._file.close()
+        with named(self._part):
+            self._stream.finish()
+            self._file.close()
         os.replace(self._part, self.path)
 
 

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -324,3 +325,14 @@ def test_requests_that_are_turned_off_are_not_heard(wire: Wire, tmp_path: Path):
         TRUTH,
         "/scan",
     }
+
+
+def test_a_record_on_a_full_disk_names_its_file(wire: Wire, tmp_path: Path):
+    drive = Drive(tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match=r"live\.mcap\.unfinished"):
+            drive.feed(wire, said())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
