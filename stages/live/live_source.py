@@ -12,7 +12,7 @@ from omninav.pipeline import BadInput, Bounds, Context, Source
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
-from omninav.stages.recordings.camera_yaml import read_camera
+from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera
 from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, LiveRecording, OdometryBuffer, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
@@ -140,6 +140,8 @@ class LiveSource(Source):
             taken = self._intake.next(0.1)
             self._watch(ctx, self._intake)
             if taken is not None:
+                if self._camera is None and not position.ticks:
+                    ctx.warn(f"assumed: {self.topics.camera_info}: {UNSAID_BY_INFO}")
                 self._write(self._intake, taken.arrivals)
                 assert isinstance(self._intake.camera, Camera)
                 return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)

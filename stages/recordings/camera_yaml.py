@@ -74,6 +74,10 @@ def camera_section(camera: Camera) -> dict[str, Any]:
     return content
 
 
+UNSAID_BY_INFO = "it does not say the camera's yaw and height; yaw is 0 (else give camera=PATH/camera.yaml)"
+"""What is assumed of a camera that a CameraInfo message describes."""
+
+
 def camera_from_info(info: Any, where: str) -> Camera:
     """A camera from a CameraInfo message, where there is no camera.yaml, by the first model that knows its distortion.
 

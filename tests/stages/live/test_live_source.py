@@ -20,6 +20,7 @@ from omninav.stages.live.intake import Intake
 from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, MessageQueue
+from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 
@@ -325,6 +326,14 @@ def test_requests_that_are_turned_off_are_not_heard(wire: Wire, tmp_path: Path):
         TRUTH,
         "/scan",
     }
+
+
+def test_the_yaw_that_a_camera_info_does_not_say_is_said_to_be_assumed(wire: Wire, tmp_path: Path):
+    drive = Drive(tmp_path, camera=None)
+    assert drive.intake.camera is None
+    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    drive.feed(wire, said())
+    assert drive.ctx.warnings == [f"assumed: /camera/camera_info: {UNSAID_BY_INFO}"]
 
 
 def test_a_record_on_a_full_disk_names_its_file(wire: Wire, tmp_path: Path):
