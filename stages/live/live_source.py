@@ -31,7 +31,7 @@ from .drive_record import DriveRecord, unfinished
 from .intake import Intake
 from .live_position import Guess, LiveSourceState
 from .publish import publish_diagnostics
-from .transport import Transport, TransportName, connect, disconnect
+from .transport import Transport, TransportName, connect, disconnect, full_name
 
 LIVE, DEVICE = "live", "camera:"
 """As `log`: a robot, and what a camera of this computer begins with."""
@@ -174,7 +174,7 @@ class LiveSource(Source):
             header=self._header,
             drive=OdometryBuffer(self._header) if before is None else before.drive,
             camera=self._camera if before is None else before.camera,
-            camera_info=self.topics.camera_info,
+            camera_info=None if self.topics.camera_info is None else full_name(self.topics.camera_info),
             patience_s=PATIENCE_S,
             last_stamp=position.stamp if position.ticks else None,
         )
@@ -316,8 +316,9 @@ class LiveSource(Source):
         ]
         roles: dict[str, Role] = {}
         for topic, role in wanted:
-            if topic is not None and roles.setdefault(topic, role) != role:
-                raise BadInput(f"{topic}: it cannot be both {roles[topic]} and {role}; give one of them its own topic")
+            name = "" if topic is None else full_name(topic)
+            if name and roles.setdefault(name, role) != role:
+                raise BadInput(f"{name}: it cannot be both {roles[name]} and {role}; give one of them its own topic")
         return roles
 
 

@@ -28,7 +28,7 @@ from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
 
-from .transport import Transport, TransportError, TransportName, connect
+from .transport import Transport, TransportError, TransportName, connect, full_name
 from .watchdog import Watchdog
 
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -210,7 +210,7 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
     if topic in transport.status.left_out:
         return
     try:
-        transport.publish(topic, msgtype, data, latched)
+        transport.publish(full_name(topic), msgtype, data, latched)
     except TransportError as error:
         transport.status.left_out[topic] = str(error)
 

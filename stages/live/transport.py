@@ -156,6 +156,11 @@ def opened(key: tuple[str, int | str], make: Callable[[], Opened]) -> Opened:
     return _OPEN[key]  # type: ignore[return-value]  # a key names its class
 
 
+def full_name(topic: str) -> str:
+    """A topic's name as ROS resolves it: `scan` is `/scan`."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
 def disconnect() -> None:
     """Close all transports of this process."""
     while _OPEN:

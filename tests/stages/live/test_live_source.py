@@ -18,6 +18,7 @@ from omninav.pipeline.mcap.message_types import header_stamp
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live.intake import Intake
 from omninav.stages.live.live_source import LiveSource, LiveSourceState
+from omninav.stages.live.publish import send
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, MessageQueue
 from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO
@@ -345,3 +346,16 @@ def test_a_record_on_a_full_disk_names_its_file(wire: Wire, tmp_path: Path):
             drive.feed(wire, said())
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_topics_without_a_slash_are_those_that_ros_makes_of_them(wire: Wire, tmp_path: Path):
+    names = Topics(image="camera/image/compressed", camera_info="camera/camera_info", odometry="odom", scan="scan")
+    source = LiveSource(topics=names, goal="goal_pose", restart="again")
+    ctx = Context("source", folder=tmp_path)
+    source.setup(ctx)
+    intake = source._join(LiveSourceState())
+    topics = {IMAGE, ODOMETRY, TRUTH, "/scan", "/initialpose", "/goal_pose", "/again"}
+    assert intake.header.topics.keys() == topics
+    assert wire.inbox._arrivals.keys() == topics | {"/camera/camera_info"}
+    send(wire, "pose", POSE, encode(POSE, {}))
+    assert [topic for topic, _ in wire.sent] == ["/pose"]
