@@ -38,23 +38,26 @@ DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
 class FollowHomingState(State):
     """Since when (ns) targets have been lost or doubtful, and since when no direction has been free; None: not now.
 
-    `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone.
+    `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone. `ranged`: whether there
+    has been a scan.
     """
 
     lost_since: int | None = None
     blocked_since: int | None = None
     target: int = -1
     sought_since: int | None = None
+    ranged: bool = False
 
 
 class FollowHoming(Stage):
     """Turns towards the homing vector and drives around obstacles; docks at the last view.
 
-    Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
-    for a while where its distance in metres is known, and a doubtful one slowly, since more of it is seen from closer
-    by. Then the robot is `lost` until it is sure of its target: it stands, or searches, if `wander` is wired: it drives
-    by that command, and again for a while towards what may be its target. After `search_s` without a break it stands.
-    It is `blocked` where no direction is free, or where `stalled` says so. `status` gives the reason.
+    Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way; a robot that has had one
+    stands until there is another. A lost target is approached for a while where its distance in metres is known, and a
+    doubtful one slowly, since more of it is seen from closer by. Then the robot is `lost` until it is sure of its
+    target: it stands, or searches, if `wander` is wired: it drives by that command, and again for a while towards what
+    may be its target. After `search_s` without a break it stands. It is `blocked` where no direction is free, or where
+    `stalled` says so. `status` gives the reason.
     """
 
     max_speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -110,6 +113,10 @@ class FollowHoming(Stage):
         if stalled is not None:
             ctx.count("stood_blocked")
             return self._stand("blocked", stalled.why)
+        state.ranged |= scan is not None
+        if state.ranged and scan is None:
+            ctx.count("stood_without_scan")
+            return self._stand(moving.state, "its range finder is silent: waiting for a scan")
         left = _metres_left(vector, scan)
         direction, speed = self._free_direction(vector, scan, left)
         state.blocked_since, blocked_s = _since(state.blocked_since, direction is None, tick)

@@ -78,6 +78,12 @@ def test_it_drives_where_the_vector_points_within_its_limits() -> None:
     assert speeds == pytest.approx([0.4 * math.cos(math.radians(34.0)), 0.0])
 
 
+def test_a_robot_whose_range_finder_falls_silent_stands_until_it_speaks() -> None:
+    robot = Robot()
+    for ring, speed in ((None, 0.4), (scan(), 0.4), (None, 0.0), (scan(), 0.4)):
+        assert robot.drive(vector(), progress(), ring).command.speed == speed
+
+
 def test_towards_the_last_view_it_slows_down_but_on_the_way_it_does_not() -> None:
     assert drive(vector(metres=0.2), progress(last=True)).command.speed == pytest.approx(0.7 * 0.2)
     assert drive(vector(ratio=0.15), progress(last=True)).command.speed == pytest.approx(0.2)
