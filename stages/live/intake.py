@@ -40,6 +40,8 @@ WITHOUT = {
     "scan": "topics.scan=null (a robot without a range finder)",
 }
 """What to type where there is no such sensor."""
+SHARED = ("tf2_msgs/msg/TFMessage", "diagnostic_msgs/msg/DiagnosticArray")
+"""Types of topics that many nodes publish together."""
 SILENT_S = 1.0
 """A topic that has been heard and says nothing for so long is a trouble."""
 UNUSED_S = 2.0
@@ -84,6 +86,7 @@ class Intake:
         self.unrecorded: list[Arrival] = []
         self._images: list[_Pending] = []
         self._earlier: int | None = None
+        self._without_scan = False
         self._since = time.monotonic()
         self._received: dict[str, float] = {}
         self._used_any = self.last_stamp is not None
@@ -143,7 +146,12 @@ class Intake:
             elif now - heard > max(SILENT_S, self.patience_s):
                 trouble = f"{topic} ({kind}) has been silent for {now - heard:.0f} s"
                 trouble += "" if topic in offered else ", nobody publishes it"
+            elif topics.get(topic) == "scan" and self._without_scan:
+                trouble = f"{topic}: nothing of it is stamped in the second before an image; is its clock the camera's?"
             self.status.note(topic, trouble)
+        for topic in self.status.sent:
+            other = topic in offered and offered[topic] not in SHARED
+            self.status.note(f"sent {topic}", f"another node publishes {topic} too; end one of them" if other else "")
         self.status.counts = self.dropped()
         unseen = f"no publisher is seen ({self.transport.place}): {self.transport.unseen()}"
         self.status.note("robot", "" if offered or self._received else unseen)
@@ -284,6 +292,7 @@ class Intake:
             self._drop("outside_odometry", f"{where}: odometry begins later")
             return None
         frame, scans = made
+        self._without_scan = frame.scan is None
         arrivals = [*self.recordable(), *scans, image.arrival]
         self.last_stamp, self._used_any, self._earlier = image.stamp, True, None
         self._last_used, self._counts_at_last = time.monotonic(), self.counts.copy()

@@ -211,6 +211,7 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
         return
     try:
         transport.publish(full_name(topic), msgtype, data, latched)
+        transport.status.sent.add(full_name(topic))
     except TransportError as error:
         transport.status.left_out[topic] = str(error)
 

@@ -16,6 +16,8 @@ class LiveStatus:
         self.troubles: dict[str, str] = {}
         self.left_out: dict[str, str] = {}
         """What cannot be published or answered in this run, and why: said once, and never tried again."""
+        self.sent: set[str] = set()
+        """Topics on which this run has published."""
         self._reported: set[str] = set()
         self.counts: Counter[str] = Counter()
         self.live = False

@@ -359,3 +359,22 @@ def test_topics_without_a_slash_are_those_that_ros_makes_of_them(wire: Wire, tmp
     assert wire.inbox._arrivals.keys() == topics | {"/camera/camera_info"}
     send(wire, "pose", POSE, encode(POSE, {}))
     assert [topic for topic, _ in wire.sent] == ["/pose"]
+
+
+def test_a_second_node_on_a_published_topic_is_noted(wire: Wire, tmp_path: Path):
+    drive = Drive(tmp_path, topics=Topics(scan=None))
+    drive.feed(wire, said())
+    for topic, kind in (("/cmd_vel", "geometry_msgs/msg/Twist"), ("/tf", "tf2_msgs/msg/TFMessage")):
+        send(wire, topic, kind, encode(kind, {}))
+        wire.there[topic] = kind
+    drive.intake.watch()
+    assert wire.status.troubles == {"sent /cmd_vel": "another node publishes /cmd_vel too; end one of them"}
+
+
+def test_scans_of_another_clock_than_the_cameras_are_noted(wire: Wire, tmp_path: Path):
+    drive = Drive(tmp_path)
+    drive.feed(wire, [each._replace(data=ahead(each.data)) if each.topic == "/scan" else each for each in said()])
+    drive.intake.watch()
+    assert drive.outs
+    assert wire.status.troubles.keys() == {"/scan"}
+    assert "/scan: nothing of it is stamped in the second before an image" in wire.status.troubles["/scan"]
