@@ -37,9 +37,8 @@ def serve_amcl(transport: Transport, node: str, initial_pose: str | None) -> Non
 
     def set_pose(request: bytes) -> bytes:
         assert initial_pose is not None
-        transport.inbox.put(
-            Arrival(full_name(initial_pose), POSE, time.time_ns(), request)
-        )  # the request is that message
+        # The request is that message.
+        transport.inbox.put(Arrival(full_name(initial_pose), POSE, time.time_ns(), request))
         return NOTHING
 
     def get_state(_: bytes) -> bytes:
