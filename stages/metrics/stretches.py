@@ -32,6 +32,8 @@ NEAR_M, NEAR_SCALES = 0.5, 2.0
 scales."""
 GAP_M, GAP_SHARE = 0.5, 0.1
 """Distance (m, plus a share of the metres driven) from odometry's prediction that working odometry never exceeds."""
+MAX_HEADING_ERROR_DEG = 10.0
+"""Median error of the heading of sure estimates from which it is said, degrees."""
 NOT_RECORDED = (
     "What single images say was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
     "particle filter in a map has, as variant=omninav."
@@ -205,6 +207,9 @@ def in_short(log: Log) -> str:
     words = f"Sure of the estimate from image {start} to the end ({images})."
     if not all_on:
         words = f"Sure of the estimate in {100 * len(sure) / len(log):.0f} % of {images}, from image {start} on."
+    turned = median(np.abs(log["heading_error_deg"][log.sure]))
+    if turned > MAX_HEADING_ERROR_DEG:
+        words += f" By ground truth its heading is off by {turned:.0f} degrees (median): check the camera's yaw."
     return words if log.known("nearest_m") else f"{words} {NOT_RECORDED}"
 
 

@@ -18,6 +18,7 @@ def drive(**changed):
         "log": np.zeros(N, int), "frame": np.arange(N), "time_s": 0.5 * np.arange(N),
         "estimate_x": along, "estimate_y": zero, "estimate_heading": zero, "estimate_weight": one, "confidence": one,
         "motion_x": 0.2 * one, "motion_y": zero, "motion_turn": zero, "position_error_m": np.nan * one,
+        "heading_error_deg": np.nan * one,
         "similarity": 0.9 * one, "nearest_m": 0.2 * one, "nearest_scales": 0.5 * one, "match_away_m": 0.2 * one,
         "match_lead": 1.5 * one, "lead_against": zero, "landmarks": 60 * one, "landmarks_away_m": zero,
         "features": 400 * one, "brightness": 0.5 * one, "contrast": 0.1 * one, "correlation": 0.8 * one,
@@ -41,7 +42,11 @@ JUMPED = ALONG + np.where(np.arange(N) >= 35, 5.0, 0.0)
 
 def test_a_drive_that_is_sure_has_no_stretch():
     assert found() == []
-    assert in_short(Log(drive())) == "Sure of the estimate from image 0 to the end (60 images)."
+    said = "Sure of the estimate from image 0 to the end (60 images)."
+    assert in_short(Log(drive(heading_error_deg=-9.0 * np.ones(N)))) == said
+    assert in_short(Log(drive(heading_error_deg=-17.2 * np.ones(N)))).startswith(
+        f"{said} By ground truth its heading is off by 17 "
+    )
 
 
 @pytest.mark.parametrize(
