@@ -74,7 +74,7 @@ def camera_section(camera: Camera) -> dict[str, Any]:
     return content
 
 
-UNSAID_BY_INFO = "it does not say the camera's yaw and height; yaw is 0 (else give camera=PATH/camera.yaml)"
+UNSAID_BY_INFO = "CameraInfo does not say the camera's yaw and height; yaw is 0 (else give camera=PATH/camera.yaml)"
 """What is assumed of a camera that a CameraInfo message describes."""
 
 

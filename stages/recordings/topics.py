@@ -14,7 +14,7 @@ from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
-from .camera_yaml import camera_from_info, parse_camera, read_camera
+from .camera_yaml import UNSAID_BY_INFO, camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
@@ -102,8 +102,10 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, found),
     )
-    if len(files) == 1 and (sentence := set_back(found[image_topic])):
-        recording.assumed = (f"{name}: {sentence}",)
+    told = set_back(found[image_topic]) if len(files) == 1 else ""
+    by_info = options.camera is None and "camera.yaml" not in feed.attachments and not camera_files
+    unsaid = UNSAID_BY_INFO if by_info else ""
+    recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)
     return recording
 
 

@@ -31,6 +31,7 @@ from made_logs import (
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings import rosbag
+from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO
 from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, Topics
@@ -94,6 +95,17 @@ def test_a_cut_log_is_used_up_to_the_cut(tmp_path: Path) -> None:
     assert 5 <= len(recording.stamps) < FRAMES
     assert recording.dropped["cut_file"] == 1
     np.testing.assert_array_equal(recording.image(3), picture(3))
+
+
+def test_a_camera_that_a_message_alone_describes_has_a_yaw_that_is_assumed(tmp_path: Path, whole: Recording) -> None:
+    height, width = picture(0).shape[:2]
+    k = [50.0, 0.0, width / 2, 0.0, 50.0, height / 2, 0.0, 0.0, 1.0]
+    kind, fields = "sensor_msgs/msg/CameraInfo", {"width": width, "height": height, "k": k}
+    told = Made("/camera_info", kind, START, START, make_message(kind, fields, START))
+    path = write_mcap(tmp_path / "log.mcap", chain([told], messages()), camera=None)
+    recording = open_recording(str(path), topics=Topics(camera_info="/camera_info"))
+    assert (recording.camera.yaw, whole.assumed) == (0.0, ())
+    assert recording.assumed == (f"{path}: {UNSAID_BY_INFO}",)
 
 
 def test_a_bad_chunk_costs_its_images_and_no_others(tmp_path: Path) -> None:
