@@ -9,7 +9,7 @@ from typing import Any
 from omninav.pipeline.files import DISK
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.graph import Node, Wire
-from omninav.pipeline.graph.problems import BadInput, one_line
+from omninav.pipeline.graph.problems import HINTS, BadInput, one_line
 from omninav.pipeline.graph.registry import BUILT_IN
 from omninav.pipeline.graph.stage import Context, Outputs, State
 
@@ -107,7 +107,7 @@ class Call:
         """The error that says which stage failed, and when."""
         message = f"{place}: {type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno in DISK:
-            return BadInput(f"{message}; free some of it")
+            return BadInput(f"{message}; {HINTS[error.errno]}")
         return StageFailed(message)
 
     def _place(self) -> str:

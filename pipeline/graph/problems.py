@@ -71,6 +71,7 @@ def cut(value: Any) -> str:
 HINTS = {
     errno.ENOSPC: "free some space; `omninav resume` goes on with a run that has begun",
     errno.EDQUOT: "free some space; `omninav resume` goes on with a run that has begun",
+    errno.EFBIG: "a file may not grow so large; raise the limit (`ulimit -f`), or name another disk",
     errno.EROFS: "nothing can be written there; give other folders: runs=FOLDER cache=FOLDER/.cache",
     errno.EACCES: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",
     errno.EPERM: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",

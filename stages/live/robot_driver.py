@@ -1,5 +1,6 @@
 """A robot's driver: what its sensors give goes out as ROS 2 messages, and commands come in."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -162,15 +163,17 @@ class RobotDriver(Stage):
             left = self._started + seconds - time.monotonic() if self.real_time else 0.0
             arrival = self._transport.take(max(0.0, left))
             if arrival is not None:
-                message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+                try:
+                    message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+                except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
+                    ctx.count("bad_message", detail=f"{self.command_topic}: no {arrival.msgtype} ({error!s:.120})")
+                    continue
                 twist: Any = getattr(message, "twist", message)
-                command = np.array([twist.linear.x, twist.angular.z])
-                if np.isfinite(command).all():
-                    robot.command, robot.commanded = command, now
+                speed, turning = twist.linear.x, twist.angular.z
+                if math.isfinite(speed) and math.isfinite(turning):
+                    robot.command, robot.commanded = np.array([speed, turning]), now
                 else:
-                    ctx.count(
-                        "impossible_command", detail=f"{self.command_topic}: {command[0]} m/s, {command[1]} rad/s"
-                    )
+                    ctx.count("impossible_command", detail=f"{self.command_topic}: {speed} m/s, {turning} rad/s")
             elif left <= 0.0:
                 if left < -1.0:
                     self._started -= left  # too slow by a second: from here on time is counted again

@@ -61,8 +61,9 @@ def test_a_command_that_is_no_number_is_counted_and_not_driven(wire):
     wire.there["/cmd_vel"] = TWIST
     drive.tick()
     wire.inbox.put(Arrival("/cmd_vel", TWIST, 0, encode(TWIST, {"linear": {"x": float("nan")}})))
+    wire.inbox.put(Arrival("/cmd_vel", TWIST, 0, b"\0\1\0\0cut"))
     assert drive.tick().command is None
-    assert drive.ctx.counts == {"impossible_command": 1}
+    assert drive.ctx.counts == {"impossible_command": 1, "bad_message": 1}
 
 
 def test_odometry_comes_at_its_own_rate_and_ends_at_the_image(wire):
