@@ -166,9 +166,11 @@ class FollowHoming(Stage):
 
 
 def _metres_left(vector: HomingVector, scan: Scan | None) -> float:
-    # Where no metres are known, a typical feature is taken to be as far away as what stands around the robot.
-    if vector.metres is not None or scan is None:
-        return math.inf if vector.metres is None else vector.metres
+    if vector.metres is not None:
+        return vector.metres
+    if scan is None:
+        return math.inf
+    # A typical feature is taken to be as far away as what stands around the robot.
     return vector.nearness * float(np.median(np.minimum(scan.ranges, scan.farthest)))
 
 

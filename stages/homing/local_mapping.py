@@ -78,9 +78,9 @@ class Matches(NamedTuple):
     there: Array
 
 
-NONE = np.zeros((0, 3))
+NO_BEARINGS = np.zeros((0, 3))
 NO_ROWS = np.zeros(0, np.int64)
-NO_MATCHES = Matches(NONE, np.zeros((0, 2)), NONE, NO_ROWS, NONE, NONE)
+NO_MATCHES = Matches(NO_BEARINGS, np.zeros((0, 2)), NO_BEARINGS, NO_ROWS, NO_BEARINGS, NO_BEARINGS)
 
 
 class LocalMappingState(State):

@@ -34,12 +34,12 @@ TYPES: dict[Role, str] = {
 }
 """What each role's topic carries; an image's type follows from its topic."""
 SETTINGS = {"image": "topics.image", "odometry": "topics.odometry", "scan": "topics.scan"}
-"""Where the topic of a sensor is set."""
+"""Settings that name the topics of sensors."""
 WITHOUT = {
     "odometry": "speed=0.5 (m/s, a robot without odometry)",
     "scan": "topics.scan=null (a robot without a range finder)",
 }
-"""What to type where there is no such sensor."""
+"""Words to type for a robot without the sensor."""
 SHARED = ("tf2_msgs/msg/TFMessage", "diagnostic_msgs/msg/DiagnosticArray")
 """Types of topics that many nodes publish together."""
 SILENT_S = 1.0

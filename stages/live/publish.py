@@ -210,8 +210,9 @@ def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: b
     if topic in transport.status.left_out:
         return
     try:
-        transport.publish(full_name(topic), msgtype, data, latched)
-        transport.status.sent.add(full_name(topic))
+        name = full_name(topic)
+        transport.publish(name, msgtype, data, latched)
+        transport.status.sent.add(name)
     except TransportError as error:
         transport.status.left_out[topic] = str(error)
 

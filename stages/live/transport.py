@@ -101,7 +101,7 @@ class Transport(ABC):
         return {}
 
     def unseen(self) -> str:
-        """What may be the cause where no publisher is seen, and what to do."""
+        """Say why no publisher may be seen, and what to do."""
         return "is the robot on, and in the same domain and reach?"
 
     def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:

@@ -75,7 +75,7 @@ def camera_section(camera: Camera) -> dict[str, Any]:
 
 
 UNSAID_BY_INFO = "CameraInfo does not say the camera's yaw and height; yaw is 0 (else give camera=PATH/camera.yaml)"
-"""What is assumed of a camera that a CameraInfo message describes."""
+"""Sentence on a camera that a CameraInfo message alone describes."""
 
 
 def camera_from_info(info: Any, where: str) -> Camera:

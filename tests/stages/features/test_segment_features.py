@@ -30,16 +30,16 @@ def test_grey_segments_compare_by_their_brightness(joint: bool) -> None:
 
 
 @pytest.mark.parametrize("joint", [False, True])
-@pytest.mark.parametrize(("least_s", "least_v"), [(0, 0), (50, 40)])
-def test_histograms_agree_with_counting_by_numpy(joint: bool, least_s: int, least_v: int) -> None:
+@pytest.mark.parametrize(("min_s", "min_v"), [(0, 0), (50, 40)])
+def test_histograms_agree_with_counting_by_numpy(joint: bool, min_s: int, min_v: int) -> None:
     pixels = picture(3)
     pixels[:, ::4] //= 64  # some of them nearly black, and some without a hue
     hsv = cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV).reshape(20, 36, 3).astype(int)
-    found = hsv_histograms(pixels, 6, joint=joint, min_saturation=least_s, min_value=least_v)
+    found = hsv_histograms(pixels, 6, joint=joint, min_saturation=min_s, min_value=min_v)
     assert np.allclose(found.sum(axis=1), 1.0, atol=1e-6)  # erratum 20: without it the similarity's bound fails
     for j, histogram in enumerate(found):
         h, s, v = hsv[:, 6 * j : 6 * j + 6].reshape(-1, 3).T
-        coloured = (s >= max(1, least_s)) & (v >= max(1, least_v))
+        coloured = (s >= max(1, min_s)) & (v >= max(1, min_v))
         if joint:
             bins = np.bincount(np.where(coloured, h * 16 // 180, 16) * 4 + v * 4 // 256, minlength=68) / len(h)
         else:

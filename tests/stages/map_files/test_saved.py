@@ -12,7 +12,7 @@ from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.saved import read_saved, refuse_other_views, target, write_saved
 
 
-def test_a_map_made_of_others_says_what_their_files_say_alike_and_which_they_were(tmp_path: Path) -> None:
+def test_a_map_made_of_others_says_what_their_files_agree_on_and_which_they_were(tmp_path: Path) -> None:
     files = [str(tmp_path / f"{name}.omap") for name in ("one", "other")]
     for bins, file in enumerate(files):
         stages = {"unwarp": {"width": 90}, "features": {"bins": bins, "segments": 3}, "drift": {"sigma": bins}}

@@ -1,4 +1,4 @@
-"""What a live run consumed: as it comes, and as a recording."""
+"""Messages of a live run, as they come and as a recording."""
 
 from contextlib import nullcontext
 from pathlib import Path

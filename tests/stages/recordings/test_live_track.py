@@ -52,7 +52,7 @@ def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known
     assert [track.at(at * S)[0] for at in (6, 8)] == pytest.approx([6, 8])
     assert track.reported(track.at(8 * S)) == pytest.approx([58, 0, 0])
     assert [track.unmeasured_s(at * S) for at in (4, 6, 8)] == pytest.approx([0, 0.1, 0.2])
-    straight(track, np.arange(1.0, 3.05, 0.1))  # a clock that is set back for good begins anew
+    straight(track, np.arange(1.0, 3.05, 0.1))  # a clock that is set back for good begins again
     assert (track.last, track.at(6 * S), track.unmeasured_s(8 * S)) == (3 * S, None, 0.0)
 
 

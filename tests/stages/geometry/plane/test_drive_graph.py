@@ -1,4 +1,4 @@
-"""Where drives lie to each other, by hand."""
+"""Drives placed beside each other, worked by hand."""
 
 import math
 

@@ -128,5 +128,7 @@ def test_false_alarms_by_hand(pairs: int, agree: int, poses: float) -> None:
     rotation, translation, first, second = two_views(0, pairs)
     pose = AgreedPose(rotation, translation, np.arange(pairs) < agree, 0)
     assert false_alarms(pose, first, second, 1e-4) == pytest.approx(1e-6 * poses, rel=1e-5)
-    alike = np.tile([0.0, 1.0, 0.0], (pairs, 1))
-    assert false_alarms(pose, alike, alike @ rotation, 0.01) == (2.0 * pairs * (pairs - 1) if agree > 2 else math.inf)
+    bearings = np.tile([0.0, 1.0, 0.0], (pairs, 1))
+    assert false_alarms(pose, bearings, bearings @ rotation, 0.01) == (
+        2.0 * pairs * (pairs - 1) if agree > 2 else math.inf
+    )
