@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
 )
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.compared_views import ComparedViews
-from omninav.stages.values.drive import pose_row
+from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.pose import Pose, PoseSource, frame_of
 from omninav.stages.values.topological_map import TopologicalMap
@@ -28,18 +28,6 @@ from .pose_of_view import Supervised
 
 ORDER_GAP = 1000
 """Gap between the numbers of the last view of a tour and the first of the next: they do not follow each other."""
-
-
-class View(NamedTuple):
-    """One view, with the fields of `ComparedViews`."""
-
-    features: LocalFeatures
-    descriptor: GlobalDescriptor
-    pose: tuple[float, float, float]
-    frame: int
-    order: int
-    tour: int
-    owner: int = -1
 
 
 class ViewComparison(Stage):
@@ -80,37 +68,38 @@ class ViewComparison(Stage):
         """The whole tour at once."""
         source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
-        views = [] if known is None else known_views(known)
-        frame = 1 + max((view.frame for view in views), default=-1)
-        order = max((view.order for view in views), default=-1)
-        log = -1
-        for row in self._chosen(ticks, features, descriptor):
-            order += 1 if ticks[row].log == log else ORDER_GAP
-            log = ticks[row].log
-            seen, whole = features[row], descriptor[row]
-            assert seen is not None
-            assert whole is not None
-            pose = pose_row(poses[row] if row < len(poses) else None)
-            views.append(View(seen, whole, pose, frame + row, order, 1 + log))
-        if not views:
+        rows = self._chosen(ticks, features, descriptor)
+        seen = [each for row in rows if (each := features[row]) is not None]
+        wholes = [whole for row in rows if (whole := descriptor[row]) is not None]
+        taken = pose_rows([poses[row] if row < len(poses) else None for row in rows])
+        logs = np.array([ticks[row].log for row in rows], np.int64)
+        frames, orders = np.array(rows, np.int64), np.cumsum(np.where(np.diff(logs, prepend=-1) == 0, 1, ORDER_GAP)) - 1
+        tours, owners, kept = 1 + logs, np.full(len(rows), -1, np.int64), 0
+        if known is not None:
+            kept = len(known.views)
+            seen = [*map(known.views.features, range(kept)), *seen]
+            wholes = [*map(known.views.global_moments, range(kept)), *wholes]
+            taken = np.concatenate([known.poses, taken])
+            frames = np.append(known.frames, known.frames.max(initial=-1) + 1 + frames)
+            orders = np.append(known.orders, known.orders.max(initial=-1) + 1 + orders)
+            tours, owners = np.append(np.zeros(kept, np.int64), tours), np.append(known.owner, owners)
+        if not seen:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
-        ctx.doing(f"comparing {len(views)} views")
+        ctx.doing(f"comparing {len(seen)} views")
         options = ComparisonOptions(self.ratio, min_matches=self.min_matches, patch_distance=self.patch_distance)
-        colours = np.stack([view.descriptor.values for view in views]).astype(np.float64)
+        colours = np.stack([each.values for each in wholes]).astype(np.float64)
         close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance
-        prepared = [view_features(view.features) for view in views]
-        known_number = sum(view.owner >= 0 for view in views)
-        distances, shares = compare_all(ctx, prepared, close, known_number, options)
+        distances, shares = compare_all(ctx, [view_features(each) for each in seen], close, kept, options)
         return self.Out(
             views=ComparedViews(
-                features=tuple(view.features for view in views),
-                descriptors=tuple(view.descriptor for view in views),
-                poses=np.array([view.pose for view in views]),
+                features=tuple(seen),
+                descriptors=tuple(wholes),
+                poses=taken,
                 pose_source=source,
-                frames=np.array([view.frame for view in views], np.int64),
-                orders=np.array([view.order for view in views], np.int64),
-                tours=np.array([view.tour for view in views], np.int64),
-                owners=np.array([view.owner for view in views], np.int64),
+                frames=frames,
+                orders=orders,
+                tours=tours,
+                owners=owners,
                 distances=distances,
                 shares=shares,
                 options=options[:-1],  # how they were searched does not matter
@@ -155,25 +144,6 @@ class ViewComparison(Stage):
             )
         ctx.fact("map_poses", source)
         return source
-
-
-def known_views(known: TopologicalMap) -> list[View]:
-    """The views that a map keeps, of tour 0."""
-    views = []
-    for view in range(len(known.views)):
-        x, y, heading = (float(number) for number in known.poses[view])
-        views.append(
-            View(
-                known.views.features(view),
-                known.views.global_moments(view),
-                (x, y, heading),
-                int(known.frames[view]),
-                int(known.orders[view]),
-                0,
-                int(known.owner[view]),
-            )
-        )
-    return views
 
 
 def compare_all(
