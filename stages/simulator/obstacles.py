@@ -1,8 +1,7 @@
 """Obstacles with fast queries: distance to the nearest one, and range along a ray."""
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,17 +13,6 @@ from .bodies import boxes_of_cells
 
 CELL = 1.0
 """Size (m) of the cells in which boxes are looked up."""
-
-
-class Body(Protocol):
-    """A box that stands on the floor: centre, half length and half depth (m), yaw (rad)."""
-
-    @property
-    def centre(self) -> tuple[float, float]: ...
-    @property
-    def half(self) -> tuple[float, float]: ...
-    @property
-    def yaw(self) -> float: ...
 
 
 class Obstacles(NamedTuple):
@@ -45,9 +33,9 @@ class Obstacles(NamedTuple):
     reach: float
 
 
-def gather(bodies: Sequence[Body], size: tuple[float, float], reach: float) -> Obstacles:
-    """Obstacles from boxes on a floor of `size` m; distances are known up to `reach` m."""
-    boxes = np.array([(*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half) for b in bodies]).reshape(-1, 6)
+def gather(boxes: Array, size: tuple[float, float], reach: float) -> Obstacles:
+    """Obstacles from boxes (B, >= 6), as `box_array` has them, on a floor of `size` m, known up to `reach` m away."""
+    boxes = np.ascontiguousarray(boxes[:, :6])
     rows, columns = max(1, math.ceil(size[1] / CELL)), max(1, math.ceil(size[0] / CELL))
     across = np.abs(boxes[:, 2:3]) * boxes[:, 4:5] + np.abs(boxes[:, 3:4]) * boxes[:, 5:6]
     upward = np.abs(boxes[:, 3:4]) * boxes[:, 4:5] + np.abs(boxes[:, 2:3]) * boxes[:, 5:6]

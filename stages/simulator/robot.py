@@ -148,7 +148,7 @@ def drive(
     state = at_rest((*start, heading))
     bounds = limits(robot)
     if room is None:
-        bounds[0], room = 0.0, gather([], (1.0, 1.0), 0.0)
+        bounds[0], room = 0.0, gather(np.empty((0, 6)), (1.0, 1.0), 0.0)
     every = round(1.0 / (rate * STEP_S))
     capacity = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
     poses = np.empty((capacity, 3))

@@ -20,6 +20,7 @@ from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from . import route_planning
+from .bodies import box_array
 from .cameras import shutter_times
 from .config import Day, Kidnapping, WorldConfig
 from .drawn_plan import laid_out
@@ -182,7 +183,7 @@ class SimulatedRecording:
 
     @cached_property
     def _room(self) -> Obstacles:
-        return gather(self._world.obstacles, self.world.size, reach(self.world.robot))
+        return gather(box_array(self._world.obstacles), self.world.size, reach(self.world.robot))
 
     @cached_property
     def _key(self) -> int:

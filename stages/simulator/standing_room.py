@@ -1,14 +1,13 @@
 """Places that a robot can get to on a listed floor plan, found before anything of it is built."""
 
 import math
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
 
-from .config import Point, Room, WorldConfig
+from .config import Room, WorldConfig
 from .layout import expand
 from .obstacles import distances, gather
 
@@ -19,20 +18,14 @@ DRIVEN_UNDER_M = 1.4
 """Least height (m) of the underside of bodies that are in nobody's way."""
 
 
-class _Body(NamedTuple):
-    centre: Point
-    half: Point
-    yaw: float
-
-
 def standing_room(world: WorldConfig) -> Array:
     """Places (N, 2) on a grid of 0.1 m with room for the robot on day 0, all connected."""
     blocks = [block for block in expand(world).blocks if block.bottom_z < DRIVEN_UNDER_M]
-    bodies = [_Body(block.centre, (block.size[0] / 2, block.size[1] / 2), block.yaw) for block in blocks]
+    boxes = [(*b.centre, math.cos(b.yaw), math.sin(b.yaw), b.size[0] / 2, b.size[1] / 2) for b in blocks]
     columns, rows = (math.floor(extent / CELL_M) for extent in world.size)
     x, y = CELL_M * (np.arange(columns) + 0.5), CELL_M * (np.arange(rows) + 0.5)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    free = distances(gather(bodies, world.size, 1.0), points) > world.robot.radius + ROOM_M
+    free = distances(gather(np.reshape(boxes, (-1, 6)), world.size, 1.0), points) > world.robot.radius + ROOM_M
     _, parts = cv2.connectedComponents(free.reshape(rows, columns).astype(np.uint8), connectivity=8)
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0

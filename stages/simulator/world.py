@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Ints
 
 from . import people, textures
-from .bodies import Box, Tiling
+from .bodies import Box, Tiling, box_array
 from .config import Block, Lamp, Room, Shelf, WallPanel, WorldConfig
 from .drawn_plan import laid_out
 from .layout import expand
@@ -272,7 +272,7 @@ class World:
 
     def _near(self, reach: float) -> Obstacles:
         if reach not in self._gathered:
-            self._gathered[reach] = gather(self.obstacles, self.config.size, reach)
+            self._gathered[reach] = gather(box_array(self.obstacles), self.config.size, reach)
         return self._gathered[reach]
 
     def is_free(self, points: npt.ArrayLike, radius: float) -> Bools:

@@ -11,6 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
+from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.drawn_starts import drawn_pose, drawn_way_back
@@ -110,7 +111,7 @@ class ClosedLoop(Source):
             raise BadInput("nodes.source.goals: this variant drives to no points; leave them out")
         world = World(self.world, self.day)
         self._world, self._scene = world, world.scene
-        self._room = gather(world.obstacles, world.config.size, reach(self.world.robot))
+        self._room = gather(box_array(world.obstacles), world.config.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
         self._camera = RobotCamera(self.world, "closed loop", self.day)
         self._bias = draw_bias(self.world.odometry, stream(self.world.draw_seed, "odometry bias", self.day))

@@ -1,13 +1,13 @@
 """Clearance, beams and contacts, against shapes worked by hand and brute force."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from world_files import DEMO
 
 from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.config import Kidnapping, Ranges, Robot
 from omninav.stages.simulator.obstacles import Obstacles, beam, gather, nearest
 from omninav.stages.simulator.ranges import measure
@@ -28,20 +28,19 @@ from omninav.stages.simulator.world import World
 ROBOT = Robot()
 
 
-@dataclass(frozen=True)
-class Pillar:
-    centre: tuple[float, float] = (5.0, 5.0)
-    half: tuple[float, float] = (0.5, 0.2)
-    yaw: float = 0.0
+def pillar(
+    centre: tuple[float, float] = (5.0, 5.0), half: tuple[float, float] = (0.5, 0.2), yaw: float = 0.0
+) -> np.ndarray:
+    return np.array([[*centre, math.cos(yaw), math.sin(yaw), *half]])
 
 
-def hall(*bodies: Pillar) -> Obstacles:
-    return gather(bodies, (10.0, 8.0), reach(ROBOT))
+def hall(*bodies: np.ndarray) -> Obstacles:
+    return gather(np.concatenate([np.empty((0, 6)), *bodies]), (10.0, 8.0), reach(ROBOT))
 
 
 def test_clearance_is_that_of_the_world():
     world = World(DEMO)
-    room = gather(world.obstacles, DEMO.size, 0.6)
+    room = gather(box_array(world.obstacles), DEMO.size, 0.6)
     points = np.random.default_rng(0).uniform((0, 0), DEMO.size, (500, 2))
     found = [max(0.0, nearest(room, NO_PEOPLE, x, y)[0]) for x, y in points]
     np.testing.assert_allclose(found, np.minimum(world.clearance(points), 0.6), atol=1e-9)
@@ -49,7 +48,7 @@ def test_clearance_is_that_of_the_world():
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
 def test_the_way_out_leads_straight_away_from_the_nearest_thing(yaw: float):
-    room = gather([Pillar(yaw=yaw)], (10.0, 8.0), 3.0)
+    room = gather(pillar(yaw=yaw), (10.0, 8.0), 3.0)
     rng = np.random.default_rng(1)
     for x, y in rng.uniform((3.5, 3.5), (6.5, 6.5), (200, 2)):
         distance, away_x, away_y = nearest(room, NO_PEOPLE, x, y)
@@ -66,7 +65,7 @@ def test_people_are_in_the_way_too():
 
 def test_beams_find_what_marching_finds():
     world = World(DEMO)
-    room = gather(world.obstacles, DEMO.size, 0.6)
+    room = gather(box_array(world.obstacles), DEMO.size, 0.6)
     rng = np.random.default_rng(2)
     starts = rng.uniform((0, 0), DEMO.size, (400, 2))
     starts = starts[world.clearance(starts) > 0.05][:40]
@@ -80,7 +79,7 @@ def test_beams_find_what_marching_finds():
 
 def test_a_ring_hears_the_nearest_thing_in_each_cone_and_nothing_beyond_its_reach():
     ring = Ranges(noise=0.0, dropout=0.0)
-    room = gather([Pillar((5.0, 4.0), (0.01, 0.01))], (10.0, 8.0), 0.6)
+    room = gather(pillar((5.0, 4.0), (0.01, 0.01)), (10.0, 8.0), 0.6)
     (heard,) = measure(room, np.zeros((1, 0, 3)), [[3.0, 4.0, 0.0]], ring, np.random.default_rng(0))
     assert heard[8] == pytest.approx(1.99)
     assert np.isinf(heard[[7, 9]]).all()
@@ -90,7 +89,7 @@ def test_a_ring_hears_the_nearest_thing_in_each_cone_and_nothing_beyond_its_reac
 
 def test_noise_and_lost_echoes_of_a_ring_are_as_configured():
     ring = Ranges(noise=0.02, dropout=0.1)
-    room = gather([Pillar((5.0, 4.0), (1.0, 1.0))], (10.0, 8.0), 0.6)
+    room = gather(pillar((5.0, 4.0), (1.0, 1.0)), (10.0, 8.0), 0.6)
     heard = measure(room, np.zeros((4000, 0, 3)), np.tile((3.0, 4.0, 0.0), (4000, 1)), ring, np.random.default_rng(0))
     ahead = heard[:, 8]
     assert np.isinf(ahead).mean() == pytest.approx(0.1, abs=0.02)
@@ -123,7 +122,7 @@ def test_a_robot_at_an_angle_slides_along_a_wall_or_is_held(contact: str, moves:
 
 def test_no_command_ever_brings_a_robot_into_anything():
     """Random commands between two pillars, a wall and a person: never closer than its radius."""
-    room, people = hall(Pillar(), Pillar((5.6, 5.9), (0.2, 0.2), 0.4)), np.array([[4.0, 5.5, 0.3]])
+    room, people = hall(pillar(), pillar((5.6, 5.9), (0.2, 0.2), 0.4)), np.array([[4.0, 5.5, 0.3]])
     rng = np.random.default_rng(5)
     state = at_rest((5.0, 4.0, 0.0))
     least = math.inf

@@ -13,6 +13,7 @@ from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Delivery, Kidnapping, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
 from omninav.stages.simulator.obstacles import gather
@@ -170,7 +171,7 @@ def test_its_images_are_blurred_by_its_motion_around_their_tick():
     last = [loop.drive(Command(0.3, 0.5), 8)[-1].image.pixels for loop in (sharp, blurred)]
     assert np.abs(last[0].astype(int) - last[1]).mean() > 0.5
     state, world = blurred.state.robot, World(quiet, blurred.source.day)
-    room = gather(world.obstacles, quiet.size, reach(quiet.robot))
+    room = gather(box_array(world.obstacles), quiet.size, reach(quiet.robot))
     poses = around(state, [-0.05, 0.0, 0.05])
     driven = np.repeat(state[None], 2, axis=0)
     steer(driven[0], 0.3, 0.5, limits(quiet.robot), 0.05, room)
