@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-from omninav.stages.geometry.appearance.visual_distance import Patches, Segments, ViewFeatures, patches
+from omninav.stages.geometry.appearance.visual_distance import Patches, Segments, ViewFeatures
 from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 
 
@@ -80,7 +80,8 @@ class LocalFeatures(Value):
 
     def patches(self) -> Patches:
         """Vectors that they are matched by."""
-        return patches(self.descriptors, self.colours, self.bearings)
+        azimuths = np.arctan2(self.bearings[:, 1], self.bearings[:, 0])
+        return Patches(self.descriptors.astype(np.float32), self.colours, azimuths)
 
     def point_bearings(self) -> Array:
         """Bearings (N + 2C, 3) of the patches, then of the upper and the lower end of each of C columns."""

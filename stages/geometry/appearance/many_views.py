@@ -6,7 +6,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
 
-from .feature_matching import mutual_nearest_of_each
+from .feature_matching import mutual_nearest_of_each, squared_distances
 from .visual_distance import Comparison, ComparisonOptions, Patches, ViewFeatures, compare, compared
 
 ROWS = 2048
@@ -41,10 +41,7 @@ class ManyViews:
     def _angles(self, chosen: Ints, own: Patches, other: Patches, by: ComparisonOptions) -> list[Array]:
         """Turns of the patches of each chosen view against those that they match, the clearest first."""
         rows = np.concatenate([np.arange(self._starts[n], self._starts[n + 1]) for n in chosen])
-        squares = own.descriptors[rows] @ other.descriptors.T
-        squares *= -2.0
-        squares += own.squares[rows, None]
-        squares += other.squares
+        squares = squared_distances(own.descriptors[rows], other.descriptors)
         starts = np.cumsum([0, *(self._starts[chosen + 1] - self._starts[chosen])])
         view, first, second = mutual_nearest_of_each(squares, starts, by.ratio)
         first = rows[first]

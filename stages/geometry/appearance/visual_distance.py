@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.se2 import wrap
 
-from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, tree_matches
+from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, squared_distances, tree_matches
 
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
@@ -40,10 +40,9 @@ class ComparisonOptions(NamedTuple):
 
 
 class Patches(NamedTuple):
-    """Patches of a view: float32 `descriptors` (N, D) with their squared lengths, `colours` (N, 3), `azimuths` (N,)."""
+    """Patches of a view: float32 `descriptors` (N, D), `colours` (N, 3), `azimuths` (N,)."""
 
     descriptors: Floats
-    squares: Floats
     colours: Floats
     azimuths: Array
 
@@ -72,13 +71,6 @@ class Comparison(NamedTuple):
     features: float
 
 
-def patches(descriptors: npt.ArrayLike, colours: Floats, bearings: Array) -> Patches:
-    """Patches (N,) from their descriptors (N, D), colours (N, 3) and bearings (N, 3) in the robot's frame."""
-    descriptors = np.asarray(descriptors, np.float32)
-    squares = np.einsum("nd,nd->n", descriptors, descriptors)
-    return Patches(descriptors, squares, colours, np.arctan2(bearings[:, 1], bearings[:, 0]))
-
-
 def match_patches(one: Patches, other: Patches, by: ComparisonOptions) -> Pairs:
     """Patches of two views with similar descriptors and colours (Goedemé et al. 2007, sections 3.2 and 3.4)."""
     if not len(one.descriptors) or not len(other.descriptors):
@@ -88,11 +80,7 @@ def match_patches(one: Patches, other: Patches, by: ComparisonOptions) -> Pairs:
     elif by.search == "kd_tree":
         pairs = tree_matches(one.descriptors, other.descriptors, by.ratio)
     else:
-        squares = one.descriptors @ other.descriptors.T
-        squares *= -2.0
-        squares += one.squares[:, None]
-        squares += other.squares
-        pairs = mutual_nearest(squares, by.ratio)
+        pairs = mutual_nearest(squared_distances(one.descriptors, other.descriptors), by.ratio)
     distances = np.linalg.norm(one.colours[pairs.first] - other.colours[pairs.second], axis=1)
     return pairs.chosen(distances <= by.max_colour_distance)
 

@@ -15,12 +15,12 @@ from omninav.stages.geometry.appearance.feature_matching import (
 )
 from omninav.stages.geometry.appearance.visual_distance import (
     ComparisonOptions,
+    Patches,
     ViewFeatures,
     alignment,
     compare,
     local_distance,
     match_patches,
-    patches,
 )
 from omninav.stages.values.local_features import LocalFeatures, view_features
 
@@ -102,8 +102,7 @@ def test_patches_are_compared_by_equation_2_where_that_is_asked_for() -> None:
     assert sigma == pytest.approx([101.68, 4.069], rel=1e-3)
     squares = (((one[:, None] - other) / sigma) ** 2).sum(axis=-1)
     assert squares[0] == pytest.approx([0.5436, 0.00967, 9.573], rel=1e-3)
-    colours, around = np.zeros((3, 3), np.float32), np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
-    first, second = patches(one, colours[:2], around[:2]), patches(other, colours, around)
+    first, second = (Patches(rows, np.zeros((len(rows), 3), np.float32), np.zeros(len(rows))) for rows in (one, other))
     plain = match_patches(first, second, ComparisonOptions())
     assert dict(zip(plain.first.tolist(), plain.second.tolist(), strict=True)) == {0: 0, 1: 2}
     for search in ("all", "kd_tree"):

@@ -7,10 +7,10 @@ from omninav.stages.geometry.appearance.many_views import ROWS, ManyViews
 from omninav.stages.geometry.appearance.visual_distance import (
     ComparisonOptions,
     PatchDistance,
+    Patches,
     Segments,
     ViewFeatures,
     compare,
-    patches,
 )
 
 
@@ -18,9 +18,9 @@ def a_view(rng: np.random.Generator, looks: np.ndarray, number: int, segments: i
     """Of some landmarks, each seen with noise in a direction of its own."""
     rows = rng.choice(len(looks), number, replace=False)
     angles = rows / len(looks) * 6.0 + rng.normal(0.0, 0.02, number)
-    bearings = np.stack([np.cos(angles), np.sin(angles), np.zeros(number)], axis=-1)
     colours = np.repeat((rows / len(looks))[:, None], 3, axis=1).astype(np.float32)
-    described = patches(looks[rows] + rng.integers(0, 9, (number, looks.shape[1])), colours, bearings)
+    descriptors = looks[rows] + rng.integers(0, 9, (number, looks.shape[1]))
+    described = Patches(descriptors.astype(np.float32), colours, angles)
     if segments is None:
         return ViewFeatures(described, None)
     columns = rng.normal(0, 1, (segments, 10)).astype(np.float32)
