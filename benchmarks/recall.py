@@ -36,7 +36,7 @@ RECORDED = {
 
 def similar(map: ReferenceGraph, view: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
     """Selective similarity of references at their best headings."""
-    return similarities(map.features[rows], view, HEADINGS, True, True).max(axis=1)
+    return similarities(map.features[rows], view, HEADINGS, "histograms").max(axis=1)
 
 
 def vectors_of(view: np.ndarray) -> np.ndarray:

@@ -33,7 +33,7 @@ class HistogramIntersection(ReferenceMatch, Stage):
         return super().step(ctx, features, map, candidates, words, length_scale, last)
 
     def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
-        return similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
+        return similarities(map.features, features.values, self.headings, "histograms", None, chosen)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         return 0.0, None

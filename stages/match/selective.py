@@ -29,8 +29,7 @@ class SelectiveMatch(ReferenceMatch, Stage):
 
     def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:
         exponent, scale = self.exponent_and_scale(features)
-        histograms = features.kind == "histograms"
-        return similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
+        return similarities(map.features, features.values, self.headings, features.kind, exponent, chosen, scale)
 
     def exponent_and_scale(self, features: SegmentFeatures) -> tuple[float, float]:
         kind = features.kind

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.appearance.segments import HEADINGS, MAX_DISTANCES, similarities
+from omninav.stages.geometry.appearance.segments import HEADINGS, similarities
 from omninav.stages.geometry.appearance.turn_fit import explained
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.arrays import Array
@@ -67,10 +67,7 @@ class CheckMap(Stage):
             near = np.argsort(away, kind="stable")[:NEIGHBOURS]
             others = np.setdiff1d(evenly, [*near, sample])
             chosen = np.concatenate([near, others])
-            values = similarities(
-                map.features, np.asarray(map.features[sample]), HEADINGS, map.kind == "histograms", True,
-                chosen=chosen, max_distance=MAX_DISTANCES[map.kind],
-            )  # fmt: skip
+            values = similarities(map.features, np.asarray(map.features[sample]), HEADINGS, map.kind, chosen=chosen)
             best = values.max(axis=1)
             likeness.append(float((best[: len(near), None] > best[None, len(near) :]).mean()))
             for row, reference in enumerate(near.tolist()):

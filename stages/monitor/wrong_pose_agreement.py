@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.segments import HEADINGS, MAX_DISTANCES, similarities
+from omninav.stages.geometry.appearance.segments import HEADINGS, similarities
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.consistency import consistency
@@ -55,9 +55,7 @@ class LearnWrongPoseAgreement(Stage):
             far, wrong = away > length_scale.metres, (away > self.within_m) | (turned > radians)
             if not (far.any() and wrong.any()):
                 continue
-            values = similarities(
-                views[far], view, HEADINGS, map.kind == "histograms", True, max_distance=MAX_DISTANCES[map.kind]
-            )
+            values = similarities(views[far], view, HEADINGS, map.kind)
             best = int(values.max(axis=1).argmax())
             match = poses[far][best] + (0.0, 0.0, angle_of_peak(values[best]))
             shares.append(float(consistency(poses[wrong], match, gate, radians).mean()))

@@ -5,7 +5,7 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.drive_graph import Closures
 
-from .segments import EXPONENTS, HEADINGS, MAX_DISTANCES, FeatureKind, similarities
+from .segments import HEADINGS, FeatureKind, similarities
 from .visual_compass import angle_of_peak
 
 MIN_EXCESS = 0.7
@@ -23,13 +23,12 @@ def closures_by_appearance(features: Floats, kind: FeatureKind, driven: Array, l
     similarity keeps `MIN_EXCESS` of what exceeds the background, the median over the map: (S - median) / (1 - median).
     """
     found: dict[tuple[int, int], float] = {}
-    histograms, scale = kind == "histograms", MAX_DISTANCES[kind]
     queries = np.unique(np.linspace(0, len(features) - 1, min(SAMPLES, len(features))).astype(np.int64))
     for one in queries.tolist():
         apart = np.flatnonzero(np.abs(driven - driven[one]) >= MIN_GAP * length_scale_m)
         if not len(apart):
             continue
-        values = similarities(features, features[one], HEADINGS, histograms, True, EXPONENTS["sqrt"], None, scale)
+        values = similarities(features, features[one], HEADINGS, kind)
         best = values.max(axis=1)
         background = float(np.median(best))
         other = int(apart[best[apart].argmax()])

@@ -8,7 +8,7 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 
-from .segments import HEADINGS, MAX_DISTANCES, FeatureKind, Rows, similarities
+from .segments import HEADINGS, FeatureKind, Rows, similarities
 
 MAX_COMPARED, NEAREST_COMPARED = 10_000, 1000
 """References with which a sample is compared, and how many of them, in a larger map, are those nearest to it."""
@@ -68,20 +68,11 @@ def length_scale(poses: Array, features: Rows, kind: FeatureKind) -> float | Non
     if len(poses) < MIN_REFERENCES:
         return None
     chosen = np.unique(np.linspace(0, len(poses) - 1, min(SAMPLES, len(poses))).astype(np.int64))
-    histograms, scale = kind == "histograms", MAX_DISTANCES[kind]
     others = compared_with(poses, chosen)
     views = features[:] if others is None else None
     similarity = np.stack(
         [
-            similarities(
-                features[rows] if views is None else views,
-                features[n],
-                HEADINGS,
-                histograms,
-                False,
-                0.0,
-                max_distance=scale,
-            ).max(axis=1)
+            similarities(features[rows] if views is None else views, features[n], HEADINGS, kind, None).max(axis=1)
             for n, rows in zip(chosen, chosen if others is None else others, strict=True)
         ]
     ).astype(np.float64)

@@ -192,35 +192,32 @@ def similarities(
     references: Rows,
     view: Floats,
     headings: int,
-    histograms: bool,
-    selective: bool,
-    exponent: float = 0.5,
+    kind: FeatureKind,
+    exponent: float | None = 0.5,
     chosen: Ints | None = None,
-    max_distance: float = MAX_COLOUR_DISTANCE,
+    max_distance: float | None = None,
 ) -> Floats:
     """Similarity of a view to references at equally spaced headings: (chosen, headings) float32 in [0, 1].
 
     `references` (R, segments, bins) and `view` (segments, bins): histograms that sum to 1 per segment (compared by
-    intersection), or others (s_j = 1 - |difference| / max_distance, not below 0). `selective`: S = max_k
-    (sum of the k largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross & Koenig
-    2004, section 2; errata 20, 21); otherwise the mean of all s_j. `chosen`: indices of the references to compare; None
-    means all.
-    Column h is a robot heading 2 pi h / headings more than the reference's own.
+    intersection), or others (s_j = 1 - |difference| / max_distance, by default the largest possible; not below 0).
+    S = max_k (sum of the k largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross &
+    Koenig 2004, section 2; errata 20, 21); with exponent None the mean of all s_j. `chosen`: indices of the references
+    to compare; None means all. Column h is a robot heading 2 pi h / headings more than the reference's own.
     """
     some = references[:] if chosen is None else references[chosen]
     out = np.empty((len(some), headings), np.float32)
     rows, which = _turned_rows(np.ascontiguousarray(view, np.float32), headings)
-    segments = len(view)
-    network, factors, unrolled = _best_of(segments, selective, exponent)
-    scale = np.float32(max_distance)
+    network, factors, unrolled = _best_of(len(view), exponent)
+    histograms, scale = kind == "histograms", np.float32(max_distance or MAX_DISTANCES[kind])
     _compare(np.ascontiguousarray(some, np.float32), rows, which, histograms, network, factors, unrolled, scale, out)
     return out
 
 
 @functools.cache
-def _best_of(segments: int, selective: bool, exponent: float) -> tuple[Ints, Floats, tuple[np.float32, ...]]:
+def _best_of(segments: int, exponent: float | None) -> tuple[Ints, Floats, tuple[np.float32, ...]]:
     """Network, penalties, and the same as a tuple where segments are sorted in registers."""
-    if selective:
+    if exponent is not None:
         factors = penalties(segments, exponent)
         return sorting_network(segments), factors, tuple(factors) if segments in UNROLLED else (np.float32(0),)
     factors = np.zeros(segments, np.float32)

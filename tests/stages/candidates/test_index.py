@@ -114,7 +114,7 @@ def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> 
     for place in rng.integers(0, len(MAP), 20):
         noisy = MAP.features[place] * rng.uniform(0.8, 1.2, (SEGMENTS, BINS)).astype(np.float32)
         view = turned_view(noisy / noisy.sum(axis=1, keepdims=True), float(rng.uniform(-3, 3)))
-        exact = np.argsort(-similarities(MAP.features, view, SEGMENTS, True, True).max(axis=1))[:10]
+        exact = np.argsort(-similarities(MAP.features, view, SEGMENTS, "histograms").max(axis=1))[:10]
         among = chosen(selected(index, view))
         found.append(np.isin(exact, among).mean())
         assert exact[0] in among

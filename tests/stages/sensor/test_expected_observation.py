@@ -37,7 +37,7 @@ def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() ->
         weights = 1 / (squares + squares.min() / 4 + 1e-4 * 2.0**2)
         turned = [turned_view(FEATURES[n], float(pose[2] - REFERENCES[n, 2])) for n in nearest]
         expected = np.average(turned, axis=0, weights=weights).astype(np.float32)
-        score, known = similarities(expected[None], view, 1, True, True)[0, 0], np.exp(-0.5 * squares.min() / 2.0**2)
+        score, known = similarities(expected[None], view, 1, "histograms")[0, 0], np.exp(-0.5 * squares.min() / 2.0**2)
         assert likeness == pytest.approx(max(0.1, known * score + (1 - known) * 0.1), abs=2e-5)
 
 

@@ -32,7 +32,7 @@ def score(alike: np.ndarray, exponent: float = 0.5) -> float:
 @pytest.mark.parametrize("headings", [1, 12, 36])
 def test_the_kernel_agrees_with_the_paper_s_words(segments: int, headings: int) -> None:
     references, view = histograms(6, segments, 20), histograms(1, segments, 20, seed=1)[0]
-    found = similarities(references, view, headings, histograms=True, selective=True)
+    found = similarities(references, view, headings, "histograms")
     for h in range(headings):
         shift = h * segments / headings
         whole, part = int(shift), shift - int(shift)
@@ -48,8 +48,8 @@ def test_colours_are_compared_by_their_distance() -> None:
     references = (RNG.random((4, 9, 3)) * 255).astype(np.float32)
     view = (RNG.random((9, 3)) * 255).astype(np.float32)
     alike = 1 - np.linalg.norm(references - view, axis=2) / (np.sqrt(3) * 255)
-    selective = similarities(references, view, 9, histograms=False, selective=True)[:, 0]
-    plain = similarities(references, view, 9, histograms=False, selective=False)[:, 0]
+    selective = similarities(references, view, 9, "colours")[:, 0]
+    plain = similarities(references, view, 9, "colours", None)[:, 0]
     assert np.allclose(selective, [score(a) for a in alike], atol=1e-6)
     assert np.allclose(plain, alike.mean(axis=1), atol=1e-6)
 
@@ -57,9 +57,9 @@ def test_colours_are_compared_by_their_distance() -> None:
 def test_colours_farther_apart_than_the_scale_are_not_alike_at_all() -> None:
     references, view = np.full((1, 4, 3), 100, np.float32), np.full((4, 3), 100, np.float32)
     view[:, 0] += [0, 15, 30, 90]
-    assert similarities(references, view, 1, False, False, max_distance=60.0)[0, 0] == pytest.approx(2.25 / 4)
+    assert similarities(references, view, 1, "colours", None, max_distance=60.0)[0, 0] == pytest.approx(2.25 / 4)
     # s = 1, 3/4, 1/2, 0: three segments, (9/4) / sqrt(3 x 4) = .65, beat four and two.
-    found = similarities(references, view, 1, False, True, max_distance=60.0)[0, 0]
+    found = similarities(references, view, 1, "colours", max_distance=60.0)[0, 0]
     assert found == pytest.approx(2.25 / np.sqrt(12), abs=1e-6)
 
 
@@ -74,13 +74,13 @@ def with_segment_similarities(alike: list[float]) -> tuple[np.ndarray, np.ndarra
 def test_k_perfect_segments_of_n_give_the_root_of_k_over_n(n: int, k: int) -> None:
     # Erratum 20, worked by hand.
     expected, observed = with_segment_similarities([1.0] * k + [0.0] * (n - k))
-    assert similarities(expected, observed, 1, True, True)[0, 0] == pytest.approx(np.sqrt(k / n), abs=1e-6)
+    assert similarities(expected, observed, 1, "histograms")[0, 0] == pytest.approx(np.sqrt(k / n), abs=1e-6)
 
 
 def test_all_k_are_tried_because_the_score_dips_on_its_way_up() -> None:
     # Erratum 21: s = (1, .41, .41, .41, .41) has S(1) = .447, dips at k = 2, and ends at S(5) = .528.
     expected, observed = with_segment_similarities([1.0, 0.41, 0.41, 0.41, 0.41])
-    assert similarities(expected, observed, 1, True, True)[0, 0] == pytest.approx(0.528, abs=1e-6)
+    assert similarities(expected, observed, 1, "histograms")[0, 0] == pytest.approx(0.528, abs=1e-6)
     assert 1.41 * np.sqrt(1 / 10) < 1.0 * np.sqrt(1 / 5)
 
 
@@ -92,7 +92,7 @@ def test_similarities_stay_within_zero_and_one_and_a_view_is_wholly_like_itself(
     references[10:20, :, 1:] = 0  # one bin holds all
     references[10:20, :, 0] = 1
     for view in (references[0], references[15]):
-        found = similarities(references, view, 36, True, True, exponent)
+        found = similarities(references, view, 36, "histograms", exponent)
         assert found.min() >= 0.0
         assert found.max() <= 1.0
         assert found[[0, 15][int(view[0, 0] == 1)], 0] == pytest.approx(1.0, abs=1e-5)
@@ -110,8 +110,8 @@ def test_the_network_sorts(length: int, seed: int) -> None:
 
 def test_a_penalty_without_exponent_is_the_mean_of_all() -> None:
     references, view = histograms(3, 10, 20), histograms(1, 10, 20, seed=2)[0]
-    none = similarities(references, view, 10, True, True, exponent=0.0)
-    assert np.allclose(none, similarities(references, view, 10, True, False), atol=1e-6)
+    none = similarities(references, view, 10, "histograms", exponent=0.0)
+    assert np.allclose(none, similarities(references, view, 10, "histograms", None), atol=1e-6)
     assert np.allclose(penalties(10, 0.0), 0.1)
 
 
@@ -121,7 +121,7 @@ def test_a_robot_turned_left_is_found_at_the_heading_it_turned_by(turn: int) -> 
     reference = histograms(1, 18, 20)
     turned = np.roll(reference[0], turn, axis=0)
     for found in (
-        similarities(reference, turned, 18, True, True),
+        similarities(reference, turned, 18, "histograms"),
         euclidean_similarities(reference, turned, 18, "histograms"),
     ):
         assert int(np.argmax(found[0])) == turn
@@ -138,7 +138,7 @@ def test_a_fraction_of_a_segment_is_the_mixture_of_two() -> None:
 
 def test_one_heading_each_agrees_with_all_headings() -> None:
     references, view = histograms(5, 12, 20), histograms(1, 12, 20, seed=3)[0]
-    everywhere = similarities(references, view, 12, True, True)
+    everywhere = similarities(references, view, 12, "histograms")
     picked = np.array([0, 3, 5, 11, 7])
     one = similarity_at(references, view, 2 * np.pi * picked / 12, "histograms")
     assert np.allclose(one, everywhere[np.arange(5), picked], atol=1e-5)
@@ -148,7 +148,7 @@ def test_chosen_references_are_compared_as_all_are() -> None:
     references, view = histograms(9, 10, 20), histograms(1, 10, 20, seed=4)[0]
     chosen = np.array([1, 4, 8])
     for compare in (
-        lambda c: similarities(references, view, 36, True, True, chosen=c),
+        lambda c: similarities(references, view, 36, "histograms", chosen=c),
         lambda c: euclidean_similarities(references, view, 36, "histograms", c),
     ):
         assert np.allclose(compare(chosen), compare(None)[chosen], atol=1e-6)
