@@ -41,8 +41,12 @@ def triangulate(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, tr
     return points
 
 
+def angles_between(one: Array, other: Array) -> Array:
+    """Angles (N,), rad, between vectors (N, 3) and (N, 3)."""
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return np.asarray(np.arctan2(across, np.einsum("...j,...j->...", one, other)))
+
+
 def parallax(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array) -> Array:
     """Angles (N,), rad, between the bearings of the two views: how well the points' depths are known."""
-    first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64) @ rotation.T
-    angles: Array = np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), np.einsum("ij,ij->i", first, second))
-    return angles
+    return angles_between(np.asarray(first, np.float64), np.asarray(second, np.float64) @ rotation.T)

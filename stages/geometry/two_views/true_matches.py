@@ -6,7 +6,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .epipolar import shared_residuals, turn_about_vertical
-from .triangulation import depths, parallax
+from .triangulation import angles_between, depths, parallax
 
 Motion = tuple[float, float, float]
 """Pose of the second view seen from the first: x forward, y left (m), turn (rad)."""
@@ -46,9 +46,3 @@ def right_by_epipolar(first: npt.ArrayLike, second: npt.ArrayLike, moved: Motion
     here, there = depths(first, second, rotation, way)
     ahead = (here > 0.0) & (there > 0.0) & np.isfinite(here) | (parallax(first, second, rotation) <= limit)
     return np.asarray(ahead & (shared_residuals(rotation, way / np.linalg.norm(way), first, second) <= limit))
-
-
-def angles_between(one: Array, other: Array) -> Array:
-    """Angles (N,), rad, between vectors (N, 3) and (N, 3)."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.asarray(np.arctan2(across, np.einsum("...j,...j->...", one, other)))
