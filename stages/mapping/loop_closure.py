@@ -71,8 +71,8 @@ class LoopClosure(Stage):
         initial = dempster_shafer.masses(similarity, 1.0 - IGNORANCE)
         gaps = place_clusters.between_hypotheses(ends, views.orders)
         masses = dempster_shafer.gather(initial, gaps, NEIGHBOUR_DISTANCE)
-        informed = dempster_shafer.unknown(masses) < dempster_shafer.unknown(initial)
-        accepted = (dempster_shafer.support(masses) > self.min_support) & informed
+        informed = masses[:, dempster_shafer.UNKNOWN] < initial[:, dempster_shafer.UNKNOWN]
+        accepted = (masses[:, dempster_shafer.SUPPORT] > self.min_support) & informed
         joined = [pairs[accepted]] if self.accepted == "merge" else []
         for place in range(int(known.max(initial=-1)) + 1):
             parts = np.flatnonzero(known == place)

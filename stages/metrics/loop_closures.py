@@ -9,7 +9,7 @@ from omninav.pipeline import Context, Figure, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.geometry.arrays import Array, Bools
-from omninav.stages.geometry.probability.dempster_shafer import support, unknown
+from omninav.stages.geometry.probability.dempster_shafer import SUPPORT, UNKNOWN
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 QUANTITIES = {
@@ -73,7 +73,7 @@ class LoopClosures(Stage):
         right = hypothesis_gaps(hypotheses) <= NEAR_M if hypotheses.pose_source == "truth" else None
         far = np.abs(hypotheses.pairs[:, 1] - hypotheses.pairs[:, 0]) >= MIN_IMAGES_BETWEEN
         one, other = hypotheses.place[hypotheses.pairs].T
-        supports, closed = support(hypotheses.masses)[far], None if right is None else right[far]
+        supports, closed = hypotheses.masses[far, SUPPORT], None if right is None else right[far]
         some = closed if closed is not None and closed.any() else None
         loops = {
             **counted(hypotheses.accepted, right),
@@ -126,11 +126,11 @@ def neighbours(initial: Array, masses: Array, right: Bools | None) -> dict[str, 
     """
     if right is None or not right.any():
         return {"area_gain": None, "wrong_without": None, "right_alone": None}
-    before = support(initial)
+    before = initial[:, SUPPORT]
     return {
-        "area_gain": average_precision(support(masses), right) - average_precision(before, right),
+        "area_gain": average_precision(masses[:, SUPPORT], right) - average_precision(before, right),
         "wrong_without": float(np.count_nonzero((before > 0.5) & ~right)),
-        "right_alone": float((unknown(masses) >= unknown(initial))[right].mean()),
+        "right_alone": float((masses[right, UNKNOWN] >= initial[right, UNKNOWN]).mean()),
     }
 
 

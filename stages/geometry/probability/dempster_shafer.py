@@ -8,6 +8,8 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Array
 
+SUPPORT, UNKNOWN = 0, 2
+"""Columns of masses: Spt(H) = m(H) (equation 7), and the ignorance."""
 SUREST = 0.99
 """The most that evidence may weigh: two certain opposites could not be combined (erratum 29 in docs/papers.md)."""
 
@@ -47,16 +49,6 @@ def combine(one: Array, other: Array) -> Array:
         raise ValueError("two sources of evidence that contradict each other entirely cannot be combined")
     combined: Array = np.stack([yes, no, open_], axis=-1) / total[..., None]
     return combined
-
-
-def support(mass: Array) -> Array:
-    """Support of the hypothesis: Spt(H) = m(H) (equation 7)."""
-    return mass[..., 0]
-
-
-def unknown(mass: Array) -> Array:
-    """Ignorance: m(H or not H)."""
-    return mass[..., 2]
 
 
 def similarity_of(distance: npt.ArrayLike, spread: float, form: str = "ratio") -> Array:

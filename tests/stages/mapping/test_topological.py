@@ -22,7 +22,7 @@ from omninav.stages.geometry.appearance.place_clusters import (
     waypoint_views,
 )
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
-from omninav.stages.geometry.probability.dempster_shafer import support
+from omninav.stages.geometry.probability.dempster_shafer import SUPPORT
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.match.visual_distance import VisualDistance
@@ -228,7 +228,7 @@ def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are(
 ) -> None:
     monkeypatch.setattr("omninav.stages.mapping.loop_closure.NEIGHBOUR_DISTANCE", 0.1)
     found = LoopClosure().step(Context("loops"), twice.views).hypotheses
-    assert (support(found.masses) > 0.5).any()
+    assert (found.masses[:, SUPPORT] > 0.5).any()
     assert not found.accepted.any()
 
 
