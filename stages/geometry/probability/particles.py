@@ -225,24 +225,10 @@ def systematic(weights: Array, number: int, offset: float) -> Ints:
     `offset` in [0, 1) places the comb. Particle i is drawn floor or ceil of number w_i times; unbiased for a uniform
     offset.
     """
-    drawn = np.empty(number, np.int64)
-    _comb(weights, offset, drawn)
-    return drawn
-
-
-@compiled(nogil=True)
-def _comb(weights: Array, offset: float, out: Ints) -> None:
-    number = len(out)
-    step = weights.sum() / number
-    at, reached, last = 0, weights[0], len(weights) - 1
-    while weights[last] <= 0.0 and last > 0:  # rounding must not end on a particle without weight
-        last -= 1
-    for n in range(number):
-        tooth = (n + offset) * step
-        while reached <= tooth and at < last:
-            at += 1
-            reached += weights[at]
-        out[n] = at
+    upto = np.cumsum(weights)
+    teeth = (np.arange(number) + offset) * (upto[-1] / number)
+    last = np.flatnonzero(weights > 0.0).max(initial=0)  # rounding must not end on a particle without weight
+    return np.asarray(np.minimum(np.searchsorted(upto, teeth, side="right"), last), np.int64)
 
 
 def occupied_cells(poses: Array, cell: float, angle: float) -> int:
