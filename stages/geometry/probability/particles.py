@@ -2,13 +2,14 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Ints
-from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
+from omninav.stages.geometry.plane.point_cells import distinct
 
 NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 """Steps to a cell itself and its 26 neighbours: (3, 27)."""
@@ -242,8 +243,10 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
     """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), any heading."""
+    from scipy.spatial import KDTree  # slow to import: not before a run
+
     reach = radius + radius / 2 * np.sqrt(0.5)
-    cells = sort_into_cells(centres, reach)
+    tree: Any = KDTree(centres[:, :2])
     low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
     cell = radius / 2
     columns, rows = (int(n) for n in np.ceil((high - low) / cell))
@@ -254,9 +257,9 @@ def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Ge
     at = distinct(at[:, None] + steps * rows)
     at = at[(at >= 0) & (at < columns * rows)]
     corners = low + cell * np.column_stack(np.divmod(at, rows))
-    corners = corners[have_a_point_within(cells, corners + cell / 2, reach)]
+    corners = corners[np.isfinite(tree.query(corners + cell / 2, distance_upper_bound=reach)[0])]
     xy = np.empty((0, 2))
     while len(xy) < number:
         drawn = corners[rng.integers(len(corners), size=number)] + cell * rng.random((number, 2))
-        xy = np.concatenate([xy, drawn[have_a_point_within(cells, drawn, radius)]])
+        xy = np.concatenate([xy, drawn[np.isfinite(tree.query(drawn, distance_upper_bound=radius)[0])]])
     return np.column_stack([xy[:number], rng.uniform(-np.pi, np.pi, number)])
