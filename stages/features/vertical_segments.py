@@ -52,19 +52,14 @@ class Segments(NamedTuple):
     descriptors: Floats
 
 
-@compiled(nogil=True)
-def _edges(steps: Floats, min_step: float, lines: Ints, rows: Array) -> int:
-    height, width = steps.shape
-    found = 0
-    for column in range(width):
-        for row in range(1, height - 1):
-            before, here, after = steps[row - 1, column], steps[row, column], steps[row + 1, column]
-            if here >= min_step and here > before and here >= after:
-                bend = before - 2.0 * here + after
-                shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-                lines[found], rows[found] = column, row + shift
-                found += 1
-    return found
+def _edges(steps: Floats, min_step: float) -> tuple[Ints, Array]:
+    # Columns and rows (E,) of the local maxima along columns, between rows by a parabola through three.
+    before, here, after = (steps[k : len(steps) - 2 + k].astype(np.float64) for k in range(3))
+    lines, rows = np.nonzero(((here >= min_step) & (here > before) & (here >= after)).T)
+    before, here, after = (each[rows, lines] for each in (before, here, after))
+    bend = before - 2.0 * here + after
+    shift: Array = np.divide(0.5 * (before - after), bend, out=np.zeros(len(rows)), where=bend < 0.0)
+    return lines.astype(np.int64), rows + 1 + shift
 
 
 @compiled(nogil=True)
@@ -113,9 +108,7 @@ def segments_of(
     grey = cv2.cvtColor(smooth, cv2.COLOR_BGR2GRAY).astype(np.float32)
     steps = np.zeros_like(grey)
     steps[1:-1] = np.abs(grey[2:] - grey[:-2]) / 2.0
-    lines, rows = np.empty(grey.size, np.int64), np.empty(grey.size)
-    found = _edges(steps, max(min_gradient * float(grey.std()), 1e-3), lines, rows)
-    lines, rows = lines[:found], rows[:found]
+    lines, rows = _edges(steps, max(min_gradient * float(grey.std()), 1e-3))
     kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= min_length))
     ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
     descriptors = np.empty((len(kept), 3 + COEFFICIENTS), np.float32)
