@@ -11,6 +11,7 @@ from omninav.stages.geometry.appearance.feature_matching import NOWHERE, Pairs, 
 from omninav.stages.geometry.arrays import Array, Bools, Floats
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.geometry.probability.small_systems import rotated_by, solve
+from omninav.stages.geometry.two_views.absolute_pose import sees
 
 FACES = 6
 """Virtual pinhole cameras that share the circle: poselib's solver takes pixels, and a pinhole no full circle."""
@@ -74,7 +75,7 @@ def pose_of_bearings(
         return None
     pose = np.array([t[0], t[1], math.atan2(R[1, 0], R[0, 0])])
     covariance: Array = np.linalg.inv(square)[:3, :3].astype(np.float64)
-    inliers = _within(R, t, bearings, points, tolerance)
+    inliers = sees(R, t, bearings, points, tolerance)
     if inliers.sum() < min_inliers:
         return None
     return BearingPose(pose, covariance, spread, inliers, tilt)
@@ -152,18 +153,6 @@ def _ransac(bearings: Array, points: Array, tolerance: float, samples: int) -> t
     centre = np.round(-found.R.T @ found.t, START_DECIMALS)
     found.q = np.round(found.q, START_DECIMALS) / np.linalg.norm(np.round(found.q, START_DECIMALS))
     return np.ascontiguousarray(found.R.T), centre, agreeing
-
-
-@compiled(nogil=True)
-def _within(R: Array, t: Array, bearings: Array, points: Array, tolerance: float) -> Bools:
-    out, least = np.zeros(len(points), np.bool_), math.cos(tolerance)
-    for n in range(len(points)):
-        x, y, z = points[n, 0] - t[0], points[n, 1] - t[1], points[n, 2] - t[2]
-        length, cos = math.sqrt(x * x + y * y + z * z), 0.0
-        for k in range(3):
-            cos += (R[0, k] * x + R[1, k] * y + R[2, k] * z) * bearings[n, k]
-        out[n] = cos > least * length
-    return out
 
 
 @compiled(nogil=True)
