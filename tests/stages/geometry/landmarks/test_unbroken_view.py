@@ -5,7 +5,10 @@ import pytest
 from landmark_tour import room, seen_from
 
 from omninav.stages.features.rotation_reduced_sift import none_found
-from omninav.stages.geometry.landmarks.unbroken_view import of_one_place
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
+from omninav.stages.geometry.appearance.visual_words import root_descriptors
+from omninav.stages.geometry.landmarks.unbroken_view import carried, of_one_place
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.local_features import LocalFeatures
 
 HERE = np.array([5.3, 3.2, 0.4])
@@ -26,3 +29,18 @@ def test_images_of_one_place_differ_by_a_turn_alone(ahead: float, same: bool) ->
 def test_what_shows_too_few_features_or_another_room_is_of_no_place() -> None:
     assert not alike(seen_from(room(), HERE), none_found(), 0.0)
     assert not alike(seen_from(room(), HERE), seen_from(room(seed=5), HERE), 0.0)
+
+
+@pytest.mark.parametrize(("fitting", "expected"), [(14, (math.inf, True)), (15, (5.0, False)), (25, (0.0, False))])
+def test_fifteen_matches_that_fit_odometry_tell_of_the_same_surroundings(
+    fitting: int, expected: tuple[float, bool]
+) -> None:
+    motion = np.array([0.3, 0.0, 0.0])
+    here, there = (seen_from(room(number=800), pose) for pose in (HERE, compose(HERE, motion)))
+    pairs = mutual_nearest_units(root_descriptors(here.descriptors), root_descriptors(there.descriptors), 0.8)
+    both = pairs.second[1 : fitting + 1]
+    bearings = np.concatenate([there.bearings[both], there.bearings])
+    others = np.tile(there.descriptors[:1], (len(there.bearings), 1))  # of which none is clearly the most similar
+    descriptors = np.concatenate([there.descriptors[both], others])
+    found = carried((here.bearings, here.descriptors), (bearings, descriptors), motion)
+    assert found == expected
