@@ -190,7 +190,7 @@ def outputs_by_name(graph: Graph) -> dict[str, str]:
 
     Of several of one name it is the one that is read again at the next tick, else the last in running order.
     """
-    origins = [f"{node.name}.{port}" for node in graph.of_lifetime("tick") for port in node.signature.outputs]
+    origins = [origin for node in graph.of_lifetime("tick") for origin in node.origins]
     again = {wire.origin for wire in graph.wires if wire.delay}
     names = {origin.partition(".")[2]: origin for origin in sorted(origins, key=lambda origin: origin in again)}
     return names | {origin: origin for origin in origins}

@@ -86,9 +86,7 @@ class Engine:
         self.graph, self.wanted, self.kept, self.replay = graph, wanted, kept, replay
         self.options = options = options or EngineOptions()
         self.values: dict[str, Any] = {f"{ARTIFACTS}.{name}": value for name, value in (artifacts or {}).items()}
-        self.static = set(self.values) | {
-            f"{node.name}.{port}" for node in graph.of_lifetime("before") for port in node.signature.outputs
-        }
+        self.static = {*self.values, *(origin for node in graph.of_lifetime("before") for origin in node.origins)}
         self.stateful = self.graph.leading_to([wire.origin for wire in graph.wires if wire.delay]).nodes
         self.calls = {node.name: self._call(node) for node in graph.nodes.values()}
         self.channels = {
@@ -121,12 +119,8 @@ class Engine:
         rng = np.random.default_rng([self.options.seed, zlib.crc32(node.name.encode())])
         ctx = Context(node.name, rng, self.options.folder)
         ctx.progress, ctx.doing = self.options.on_tick, self.options.on_doing
-        origins = [
-            *self.wanted,
-            *self.kept,
-            *(o for wire in self.graph.wires for o in (wire.origin, wire.initial) if o),
-        ]
-        ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
+        read = {*self.wanted, *self.kept, *(origin for wire in self.graph.wires for origin in wire.origins)}
+        ctx.read = frozenset(port for port in node.signature.outputs if f"{node.name}.{port}" in read)
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
         for wire in self.graph.wires:
             if wire.from_node == node.name and not wire.collect and wire.to_node in self.stateful:

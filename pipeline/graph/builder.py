@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from .graph import ARTIFACTS, LIFETIMES, Graph, Lifetime, Node, Wire
+from .graph import ARTIFACTS, LIFETIMES, Graph, Lifetime, Node, Wire, node_of
 from .ground_truth import truth_in_the_loop
 from .ordering import Following
 from .parameters import BadStage
@@ -334,10 +334,9 @@ class _Builder:
     def _lifetimes(self) -> dict[str, Lifetime]:
         flow = Following(self.nodes)
         for wire in self.wires:
-            if wire.from_node != ARTIFACTS:
-                flow.add(wire.from_node, wire.to_node)
-            if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
-                flow.add(wire.initial.partition(".")[0], wire.to_node)
+            for name in map(node_of, wire.origins):
+                if name != ARTIFACTS:
+                    flow.add(name, wire.to_node)
         after_roots = {wire.to_node for wire in self.wires if wire.collect}
         tick_roots = {name for name, node in self.nodes.items() if node.signature.is_source}
         tick_roots |= {wire.to_node for wire in self.wires if wire.delay}
@@ -360,10 +359,9 @@ class _Builder:
     def _ordered(self, lifetimes: dict[str, Lifetime]) -> Graph:
         order = Following(self.nodes)
         for wire in self.wires:
-            if wire.from_node != ARTIFACTS and not wire.delay:
-                order.add(wire.from_node, wire.to_node)
-            if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
-                order.add(wire.initial.partition(".")[0], wire.to_node)
+            for name in map(node_of, wire.origins[1:] if wire.delay else wire.origins):
+                if name != ARTIFACTS:
+                    order.add(name, wire.to_node)
         cycle = order.circle()
         if cycle:
             path = " -> ".join([*cycle, cycle[0]])

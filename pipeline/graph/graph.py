@@ -13,6 +13,11 @@ ARTIFACTS = "artifacts"
 """The name under which static values from files or other graphs' runs are wired: `artifacts.name`."""
 
 
+def node_of(origin: str) -> str:
+    """The node that an output `node.port` is of."""
+    return origin.partition(".")[0]
+
+
 @dataclass(frozen=True)
 class Node:
     """A stage with its name, parameters and lifetime in a graph."""
@@ -23,6 +28,11 @@ class Node:
     signature: Signature
     parameters: dict[str, Any]
     lifetime: Lifetime = "tick"
+
+    @property
+    def origins(self) -> list[str]:
+        """`node.port` of each of its outputs."""
+        return [f"{self.name}.{port}" for port in self.signature.outputs]
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,11 @@ class Wire:
     def origin(self) -> str:
         """`node.port` of the output it comes from."""
         return f"{self.from_node}.{self.from_port}"
+
+    @property
+    def origins(self) -> list[str]:
+        """The outputs that enter by it: its own, and that of its first value."""
+        return [self.origin, *([self.initial] if self.initial else [])]
 
     @property
     def where(self) -> str:
@@ -73,18 +88,23 @@ class Graph:
         """The output port behind `node.port`, None where there is none."""
         node, _, name = origin.partition(".")
         if node == ARTIFACTS:
-            return Port(name, self.artifact_types[name]) if name in self.artifact_types else None
+            kind = self.artifact_types.get(name)
+            return None if kind is None else Port(name, kind, truth=bool(getattr(kind, "is_truth", False)))
         return self.nodes[node].signature.outputs.get(name) if node in self.nodes else None
 
-    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "costly", "is_truth", "reported"]) -> bool:
+    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "costly", "reported"]) -> bool:
         """Whether the values of an output are of a type that is marked so (see `Value`)."""
         port = self.port(origin)
         return port is not None and bool(getattr(port.type, mark, False))
 
+    def is_truth(self, origin: str) -> bool:
+        """Whether an output is ground truth (see `Truth`)."""
+        port = self.port(origin)
+        return port is not None and port.truth
+
     def reported(self, names: Iterable[str]) -> set[str]:
         """The outputs of some nodes that are results of a run, though no other node reads them."""
-        ports = {f"{name}.{port}" for name in names for port in self.nodes[name].signature.outputs}
-        return {origin for origin in ports if self.is_marked(origin, "reported")}
+        return {o for name in names for o in self.nodes[name].origins if self.is_marked(o, "reported")}
 
     def inputs_of(self, name: str) -> list[Wire]:
         """The wires that enter a node."""
@@ -92,17 +112,16 @@ class Graph:
 
     def readers_of(self, origin: str) -> list[str]:
         """The nodes that read an output port, by any kind of wire. `readers_of("source.truth")` is who sees truth."""
-        return sorted({wire.to_node for wire in self.wires if origin in (wire.origin, wire.initial)})
+        return sorted({wire.to_node for wire in self.wires if origin in wire.origins})
 
     def leading_to(self, origins: Iterable[str]) -> "Graph":
         """The part of the graph that some outputs depend on, by any kind of wire."""
-        needed, waiting = set(), [origin.partition(".")[0] for origin in origins]
+        needed, waiting = set(), [*map(node_of, origins)]
         while waiting:
             name = waiting.pop()
             if name in needed or name not in self.nodes:
                 continue
             needed.add(name)
-            for wire in self.inputs_of(name):
-                waiting += [wire.from_node, *([wire.initial.partition(".")[0]] if wire.initial else [])]
+            waiting += [node_of(origin) for wire in self.inputs_of(name) for origin in wire.origins]
         nodes = {name: node for name, node in self.nodes.items() if name in needed}
         return Graph(nodes, [wire for wire in self.wires if wire.to_node in needed], self.artifact_types)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .graph import Graph, Wire
+from .graph import Graph
 
 
 def steering(graph: Graph) -> frozenset[str]:
@@ -10,7 +10,7 @@ def steering(graph: Graph) -> frozenset[str]:
     source = graph.source
     if source is None:
         return frozenset()
-    return frozenset(graph.leading_to(o for wire in graph.inputs_of(source.name) for o in _origins(wire)).nodes)
+    return frozenset(graph.leading_to(o for wire in graph.inputs_of(source.name) for o in wire.origins).nodes)
 
 
 def truth_in_the_loop(graph: Graph) -> Iterator[tuple[str, str, str]]:
@@ -20,21 +20,12 @@ def truth_in_the_loop(graph: Graph) -> Iterator[tuple[str, str, str]]:
     """
     for name in sorted(steering(graph)):
         for wire in graph.inputs_of(name):
-            for origin in _origins(wire):
-                if _is_truth(graph, origin):
+            for origin in wire.origins:
+                if graph.is_truth(origin):
                     what = f"{origin} is ground truth, and '{name}' steers the source: nothing measures it in the field"
                     yield wire.where, what, f"take the wire out: {wire.where}=null"
 
 
-def _origins(wire: Wire) -> list[str]:
-    return [wire.origin, *([wire.initial] if wire.initial else [])]
-
-
 def truth_readers(graph: Graph) -> list[str]:
     """The nodes that read anything marked as truth, by any kind of wire."""
-    return sorted({wire.to_node for wire in graph.wires if any(_is_truth(graph, o) for o in _origins(wire))})
-
-
-def _is_truth(graph: Graph, origin: str) -> bool:
-    port = graph.port(origin)
-    return (port is not None and port.truth) or graph.is_marked(origin, "is_truth")
+    return sorted({wire.to_node for wire in graph.wires if any(map(graph.is_truth, wire.origins))})

@@ -11,9 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from omninav.pipeline.graph.graph import Graph, Node, Wire
+from omninav.pipeline.graph.graph import Graph, Node, Wire, node_of
 
-from .drawn_graph import class_name, is_truth, node_of, origins_of
+from .drawn_graph import class_name
 
 TITLE, ROW, PAD, GAP = 36.0, 16.0, 8.0, 18.0
 """Pixels: a box's title, a port's row, the space below the ports, and between boxes."""
@@ -93,7 +93,7 @@ def layout(graph: Graph) -> Layout:
 
 
 def _boxes(graph: Graph) -> dict[str, Box]:
-    read = {origin for wire in graph.wires for origin in origins_of(wire)}
+    read = {origin for wire in graph.wires for origin in wire.origins}
     boxes: dict[str, Box] = {}
     for name in sorted({node_of(origin) for origin in read} - set(graph.nodes)):
         ports = sorted(origin.partition(".")[2] for origin in read if node_of(origin) == name)
@@ -106,7 +106,7 @@ def _boxes(graph: Graph) -> dict[str, Box]:
         ports = [p for p in node.signature.outputs if f"{node.name}.{p}" in read]
         if not ports and node.lifetime != "after":
             ports = list(node.signature.outputs)
-        outputs = [Row(port, port, is_truth(graph, f"{node.name}.{port}")) for port in ports]
+        outputs = [Row(port, port, graph.is_truth(f"{node.name}.{port}")) for port in ports]
         source = node.signature.is_source
         boxes[node.name] = Box(node.name, class_name(node.target), _hover(node), node.lifetime, inputs, outputs, source)
     for box in boxes.values():
@@ -118,7 +118,7 @@ def _input_row(graph: Graph, node: Node, wire: Wire) -> Row:
     text = f"{wire.to_port} (held)" if wire.hold else wire.to_port
     if node.lifetime == "after":
         text = f"{wire.to_port} ← {wire.origin}"
-    return Row(wire.to_port, text, any(is_truth(graph, origin) for origin in origins_of(wire)))
+    return Row(wire.to_port, text, any(map(graph.is_truth, wire.origins)))
 
 
 def _box_width(box: Box) -> float:

@@ -8,9 +8,9 @@ loop.
 from collections.abc import Sequence
 from html import escape
 
-from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.graph import Graph, node_of
 
-from .drawn_graph import LIFETIMES, delay_in_words, is_truth, node_of
+from .drawn_graph import LIFETIMES, delay_in_words
 from .graph_layout import ROW, TITLE, Box, Item, Layout, Link, Passage, layout, text_width
 from .mermaid import TRUTH
 
@@ -121,7 +121,7 @@ class _Painter:
         return right, max(ends)
 
     def _colour(self, origin: str) -> str:
-        return TRUTH if is_truth(self.graph, origin) else WIRE
+        return TRUTH if self.graph.is_truth(origin) else WIRE
 
     def _link(self, link: Link) -> None:
         x0 = link.start.x + link.start.width
@@ -141,7 +141,7 @@ class _Painter:
         x0, y0 = start.x + start.width, start.output_y(origin.partition(".")[2])
         wires = [w for w in self.delayed if w.origin == origin]
         out = x0 + 13
-        colour = TRUTH if is_truth(self.graph, origin) else DELAY
+        colour = TRUTH if self.graph.is_truth(origin) else DELAY
         for wire in wires:
             end = self.boxes[wire.to_node]
             x1, y1 = end.x, end.input_y(wire.to_port)

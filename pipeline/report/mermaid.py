@@ -2,9 +2,10 @@
 
 import re
 
-from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.graph import Graph, node_of
+from omninav.pipeline.graph.ground_truth import truth_readers
 
-from .drawn_graph import LIFETIMES, class_name, delay_in_words, is_truth, node_of, origins_of
+from .drawn_graph import LIFETIMES, class_name, delay_in_words
 
 TRUTH = "#b3261e"
 """The colour of ground truth."""
@@ -13,7 +14,7 @@ TRUTH = "#b3261e"
 def mermaid(graph: Graph) -> str:
     """The graph as a Mermaid flowchart. Delayed and initial wires are dotted, collected ones thick."""
     lines = ["flowchart LR"]
-    outside = sorted({node_of(origin) for w in graph.wires for origin in origins_of(w)} - set(graph.nodes))
+    outside = sorted({node_of(origin) for w in graph.wires for origin in w.origins} - set(graph.nodes))
     lines += [f"  {_id(name)}[({name})]" for name in outside]
     for lifetime, title in LIFETIMES.items():
         names = [node.name for node in graph.nodes.values() if node.lifetime == lifetime]
@@ -35,8 +36,7 @@ def mermaid(graph: Graph) -> str:
     arrow = {"--": "-->", "-.": ".->", "==": "==>"}
     for (start, kind, end), names in joined.items():
         lines.append(f"  {_id(start)} {kind} {_quoted('<br/>'.join(names))} {arrow[kind]} {_id(end)}")
-    readers = sorted({w.to_node for w in graph.wires for origin in origins_of(w) if is_truth(graph, origin)})
-    if readers:
+    if readers := truth_readers(graph):
         lines.append(f"  classDef truth stroke:{TRUTH},stroke-width:2px")
         lines.append(f"  class {','.join(_id(name) for name in readers)} truth")
     return "\n".join(lines) + "\n"

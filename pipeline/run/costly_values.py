@@ -47,9 +47,8 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
 def _costly(graph: Graph) -> Iterator[str]:
     """The outputs before the loop that take long to make, of nodes that give nothing else."""
     for node in graph.of_lifetime("before"):
-        origins = [f"{node.name}.{port}" for port in node.signature.outputs]
-        if len(origins) == 1 and graph.is_marked(origins[0], "costly"):
-            yield origins[0]
+        if len(node.origins) == 1 and graph.is_marked(node.origins[0], "costly"):
+            yield node.origins[0]
 
 
 def _key(graph: Graph, origin: str, artifacts: Mapping[str, str]) -> str:

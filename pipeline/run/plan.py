@@ -110,7 +110,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
         raise ProblemsFound(_once([*_unreadable_inputs(graph), *problems]))
     record = tuple(dict.fromkeys(config.get("record") or ()))
     graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in (*saves.values(), *record)])
-    read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
+    read = {origin for wire in graph.wires for origin in wire.origins}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
     return Plan(config, graph, tuple(artifacts), saves, record)
@@ -139,14 +139,14 @@ def _unrecordable(graph: Graph, origins: Any) -> Iterator[Problem]:
     yield from problems
     for origin in () if problems else origins:
         if graph.port(origin) is None or graph.nodes[origin.partition(".")[0]].lifetime != "tick":
-            outputs = [f"{node.name}.{port}" for node in graph.of_lifetime("tick") for port in node.signature.outputs]
+            outputs = [output for node in graph.of_lifetime("tick") for output in node.origins]
             yield Problem("record", f"there is no output '{origin}' in the loop", suggest(origin, outputs, "outputs"))
         elif graph.is_marked(origin, "in_place"):
             yield Problem("record", f"'{origin}' is updated in place, and kept at the end only", "leave it out")
 
 
 def _no_output(where: str, origin: str, graph: Graph) -> Problem:
-    outputs = [f"{node.name}.{port}" for node in graph.nodes.values() for port in node.signature.outputs]
+    outputs = [output for node in graph.nodes.values() for output in node.origins]
     return Problem(where, f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))
 
 

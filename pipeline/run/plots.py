@@ -37,6 +37,5 @@ def _is_drawn(node: Node, plots: str) -> bool:
 def _only_for(graph: Graph, name: str, unwanted: set[str]) -> bool:
     """Whether somebody reads a node's outputs, and only those that are not wanted."""
     node = graph.nodes[name]
-    origins = [f"{name}.{port}" for port in node.signature.outputs]
-    readers = {reader for origin in origins for reader in graph.readers_of(origin)}
+    readers = {reader for origin in node.origins for reader in graph.readers_of(origin)}
     return bool(readers) and readers <= unwanted and not node.signature.is_source and not graph.reported([name])

@@ -14,8 +14,8 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
     figures: list[Figure] = []
     tables: list[Table] = []
     for node in engine.graph.nodes.values():
-        for port in node.signature.outputs:
-            for value in _flat(engine.last(f"{node.name}.{port}")):
+        for origin in node.origins:
+            for value in _flat(engine.last(origin)):
                 if isinstance(value, Metrics):
                     metrics.append(value)
                     for path, figure in _leaves(merged([value]).values):

@@ -78,7 +78,7 @@ def _try_first_tick(graph: Graph, files: Mapping[str, Path] | None, seed: int) -
     if source is None or not isinstance(source.stage, Source) or not source.stage.repeatable:
         return
     ticking = prefix_nodes(graph) if files is None else [node.name for node in graph.of_lifetime("tick")]
-    outputs = [f"{name}.{port}" for name in ticking for port in graph.nodes[name].signature.outputs]
+    outputs = [origin for name in ticking for origin in graph.nodes[name].origins]
     artifacts = {name: read_artifact(file) for name, file in (files or {}).items()}
     engine = Engine(graph.leading_to(outputs), artifacts, EngineOptions(seed, checkpoint_s=math.inf))
     engine.begin()

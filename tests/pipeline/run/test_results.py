@@ -8,9 +8,8 @@ from omninav.pipeline.run.results import results_of
 
 def run_of(**stated: dict[str, object]) -> SimpleNamespace:
     """A graph that has run, each node with these figures."""
-    signature = SimpleNamespace(outputs=["metrics"])
     return SimpleNamespace(
-        graph=SimpleNamespace(nodes={name: SimpleNamespace(name=name, signature=signature) for name in stated}),
+        graph=SimpleNamespace(nodes={name: SimpleNamespace(name=name, origins=[f"{name}.metrics"]) for name in stated}),
         calls={name: SimpleNamespace(ctx=Context(name)) for name in stated},
         last=lambda port: Metrics(stated[port.split(".")[0]]),
     )
