@@ -1,4 +1,4 @@
-"""Which code, libraries, parameters and wires a graph's results follow from."""
+"""Which code, libraries, parameters and wires a graph's results follow from, and the commit of omninav itself."""
 
 import ast
 import dataclasses
@@ -8,13 +8,13 @@ import inspect
 import json
 import platform
 import re
+import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.graph.stage import Stage
 
 LIBRARIES = (
     "numpy",
@@ -44,6 +44,18 @@ def version(distribution: str) -> str:
         return "not installed"
 
 
+def git_commit() -> str | None:
+    """The commit of omninav's own checkout, with a mark where files differ from it; None where there is none."""
+    here = Path(__file__).resolve().parents[2]
+    own = ["--git-dir", str(here / ".git"), "--work-tree", str(here)]  # no other's, whose settings name programs
+    command = ["git", *own, "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        ended = subprocess.run(command, cwd=here, capture_output=True, encoding="utf-8", errors="replace", timeout=5)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return ended.stdout.strip() or None if ended.returncode == 0 else None
+
+
 @functools.cache
 def surroundings() -> str:
     """A hash over what every graph runs in: the framework's code, and the versions of Python and the libraries."""
@@ -66,26 +78,18 @@ def graph_digest(graph: Graph, only: Iterable[str] | None = None) -> str:
     for name in names:
         node = graph.nodes[name]
         parameters = json.dumps(node.parameters, sort_keys=True, default=str)
-        parts += [name, node.target, code_version(type(node.stage)), parameters]
+        parts += [name, node.target, module_version(type(node.stage).__module__), parameters]
     parts += sorted(str(dataclasses.astuple(wire)) for wire in graph.wires if wire.to_node in set(names))
     return digest_text(*parts)
-
-
-def code_version(cls: type[Stage]) -> str:
-    """A hash over the source of a stage's module and of all that it imports of its own package, directly or not.
-
-    A change there makes its cached results stale, one elsewhere in the package does not. Imports are read off the
-    source, so that those count as well which run at need only. What other packages hold counts by its version, where
-    it is one of `LIBRARIES`.
-    """
-    return module_version(cls.__module__)
 
 
 @functools.cache
 def module_version(module: str, without: str = "") -> str:
     """A hash over the source of a loaded module and of all that it imports of its own package, directly or not.
 
-    Modules of the package `without` are left out.
+    A change there makes a stage's cached results stale, one elsewhere in the package does not. Imports are read off the
+    source, so that those count as well which run at need only. What other packages hold counts by its version, where
+    it is one of `LIBRARIES`. Modules of the package `without` are left out.
     """
     file = Path(inspect.getfile(sys.modules[module])).resolve()
     root = file.parent

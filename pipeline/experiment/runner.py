@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from omninav.pipeline.engine.code_version import LIBRARIES, version
+from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
 from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.jobs.executors import EngineSettings, read_engine
@@ -21,7 +21,6 @@ from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.quantities import title, unit
-from omninav.pipeline.run.provenance import git_commit
 
 from .conditions import (
     Compose,

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.code_version import LIBRARIES, version
+from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
@@ -20,7 +20,6 @@ from .config_text import config_text
 from .inputs import refuse_missing
 from .metrics_files import MANIFEST
 from .plan import Plan, input_digests
-from .provenance import git_commit
 
 CONFIG = "config.yaml"
 STEPS = "steps"

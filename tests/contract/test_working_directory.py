@@ -135,7 +135,7 @@ def test_what_numba_has_read_before_stays_and_later_folders_are_not_read(tmp_pat
 
 
 def test_the_version_is_of_omninavs_own_checkout_and_no_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from omninav.pipeline.run import provenance
+    from omninav.pipeline.engine import code_version
 
     for command in (
         ["init", "-q"],
@@ -145,8 +145,8 @@ def test_the_version_is_of_omninavs_own_checkout_and_no_others(tmp_path: Path, m
         subprocess.run(["git", *command], cwd=tmp_path, check=True)
     site = tmp_path / "venv/site-packages/omninav/pipeline/run"
     site.mkdir(parents=True)
-    monkeypatch.setattr(provenance, "__file__", str(site / "provenance.py"))
-    assert provenance.git_commit() is None
+    monkeypatch.setattr(code_version, "__file__", str(site / "code_version.py"))
+    assert code_version.git_commit() is None
     assert not (tmp_path / "EXECUTED").exists()
 
 
