@@ -236,15 +236,11 @@ SETTABLE = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/lau
 
 def _foreign_classes(part: Any, where: str) -> Iterator[Problem]:
     """Classes in a launcher or a sweeper that no installed package has registered, and functions called by name."""
-    for name, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
-        path = f"{where}.{name}"
-        if name == "_target_":
-            if not isinstance(value, str) or value not in _registered():
-                yield Problem(path, f"{shown(value)} is no launcher or sweeper of an installed package")
+    for path, name, value in _entries(part, where):
+        if name == "_target_" and (not isinstance(value, str) or value not in _registered()):
+            yield Problem(path, f"{shown(value)} is no launcher or sweeper of an installed package")
         elif name in CALLED_BY_NAME and value is not None:
             yield not_settable(path)
-        else:
-            yield from _foreign_classes(value, path)
 
 
 def _registered() -> set[str]:
@@ -256,13 +252,13 @@ def _registered() -> set[str]:
             if isinstance(value, dict):
                 waiting.append(value)
             else:
-                found |= set(_targets(OmegaConf.to_container(value.node, resolve=False)))
+                node = OmegaConf.to_container(value.node, resolve=False)
+                found |= {str(target) for _, name, target in _entries(node, "") if name == "_target_"}
     return found
 
 
-def _targets(part: Any) -> Iterator[str]:
+def _entries(part: Any, where: str) -> Iterator[tuple[str, Any, Any]]:
+    """Path, name and value of all that mappings and lists hold, those within each other too."""
     for name, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
-        if name == "_target_":
-            yield str(value)
-        else:
-            yield from _targets(value)
+        yield f"{where}.{name}", name, value
+        yield from _entries(value, f"{where}.{name}")
