@@ -9,7 +9,7 @@ from typing import Any
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.config_text import config_text
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.plan import Plan, check_inputs, plan
 
 from .plain_errors import plain_errors
 from .words import words_of
@@ -76,16 +76,8 @@ def compose(*words: str, **settings: Any) -> Configuration:
 @plain_errors()
 def check(*words: str, **settings: Any) -> Configuration:
     """`compose`, and open every file that the run would read, so that nothing is found to be missing later."""
-    from omninav.pipeline.engine.artifact import check_artifact
-    from omninav.pipeline.run.inputs import refuse_missing
-    from omninav.pipeline.run.plan import input_digests
-
     made = compose(*words, **settings)
-    refuse_missing(made.settings)
-    input_digests(made.plan)
-    for artifact in made.plan.artifacts:
-        if artifact.file is not None:
-            check_artifact(artifact.file)
+    check_inputs(made.plan)
     return made
 
 

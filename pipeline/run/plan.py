@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, read_header, type_of
+from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, check_artifact, read_header, type_of
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
@@ -17,6 +17,7 @@ from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, su
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
 
 from .artifact_specification import ArtifactSpecification, read_specifications, without_absent
+from .inputs import refuse_missing
 from .plots import PLOTS, with_plots
 
 
@@ -248,6 +249,18 @@ def input_digests(planned: Plan) -> dict[str, str]:
         elif artifact.file is not None:
             digests[artifact.name] = artifact_digest(artifact.file)
     return digests
+
+
+def check_inputs(planned: Plan) -> None:
+    """Open every file that the run reads, and read its artifacts.
+
+    Raises `ProblemsFound` where an input is not given, and `BadInput` where one cannot be used.
+    """
+    refuse_missing(planned.config)
+    input_digests(planned)
+    for artifact in planned.artifacts:
+        if artifact.file is not None:
+            check_artifact(artifact.file)
 
 
 def digests_of(graph: Graph) -> dict[str, str]:

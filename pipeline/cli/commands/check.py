@@ -12,7 +12,7 @@ from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.cli.objective import check_objective
 from omninav.pipeline.cli.words import condition_words
-from omninav.pipeline.engine.artifact import check_artifact, read_artifact
+from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import prefix_nodes
 from omninav.pipeline.graph.graph import LIFETIMES, Graph
@@ -21,8 +21,7 @@ from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Source
 from omninav.pipeline.jobs.executors import read_engine
-from omninav.pipeline.run.inputs import refuse_missing
-from omninav.pipeline.run.plan import Plan, input_digests, plan
+from omninav.pipeline.run.plan import Plan, check_inputs, plan
 
 MAX_TRIED = 1 << 26
 """Bytes of an artifact's file with which a first tick is tried: reading and preparing a larger one takes long."""
@@ -41,11 +40,7 @@ def command(arguments: list[str]) -> int:
         read_engine(OmegaConf.to_container(config.engine, resolve=True))
         planned = plan(complete(config))
     check_objective(planned.config.get("objective"), planned.graph)
-    refuse_missing(planned.config)
-    input_digests(planned)  # opens every file that the run reads
-    for artifact in planned.artifacts:
-        if artifact.file is not None:
-            check_artifact(artifact.file)
+    check_inputs(planned)
     _refuse_unwritable(planned.config, words)
     for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
         engine = Engine(graph, {}, EngineOptions(planned.seed))
