@@ -3,7 +3,8 @@
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -47,18 +48,10 @@ class Execution:
 
     def options(self, name: str, memory: Path, identity: str, folder: Path | None = None) -> EngineOptions:
         """The engine's options for the graph that is shown as `name`."""
-
-        def on_tick(done: int, total: int | None) -> None:
-            if self.display is not None:
-                self.display.update(name, done, total)
-
-        def on_doing(words: str) -> None:
-            if self.display is not None:
-                self.display.say(words)
-
-        return EngineOptions(
-            self.seed, folder, memory, identity, self.checkpoint_s, on_tick, on_doing, validate=self.validate
-        )
+        options = EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, validate=self.validate)
+        if self.display is None:
+            return options
+        return replace(options, on_tick=partial(self.display.update, name), on_doing=self.display.say)
 
 
 def identity(graph: Graph, seed: int, *more: str) -> str:
