@@ -14,13 +14,7 @@ PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Of each kind of data that was skipped: `kind`, `count`, and the `first` case as text."""
-    found = manifest.get("dropped") or {}
-    return [
-        {"kind": words(kind), "count": entry["count"], "first": entry.get("first", "")}
-        if isinstance(entry, Mapping)
-        else {"kind": words(kind), "count": entry, "first": ""}
-        for kind, entry in found.items()
-    ]
+    return [{"kind": words(kind), **entry} for kind, entry in (manifest.get("dropped") or {}).items()]
 
 
 def warning_lines(manifest: Mapping[str, Any]) -> list[str]:

@@ -15,7 +15,7 @@ def test_different_causes_stay_apart():
 
 
 def test_skipped_data_is_a_warning_where_a_first_case_is_known():
-    dropped = {"source.undecodable_image": {"count": 3, "first": "frame 7"}, "source.seen": 5}
+    dropped = {"source.undecodable_image": {"count": 3, "first": "frame 7"}, "source.seen": {"count": 5, "first": ""}}
     assert warning_lines({"warnings": ["a"], "dropped": dropped}) == [
         "a",
         "undecodable image, 3 times (first: frame 7)",
