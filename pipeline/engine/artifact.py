@@ -81,12 +81,8 @@ def _write(file: BinaryIO, value: Value, facts: dict[str, Any] | None) -> None:
                 write_npy(member, content)
         stated = f"{_FRONT}{end:0{_FRONT_BYTES - len(_FRONT)}}".encode() if front else b""
         archive.comment = stated + b" " * _SUM_BYTES
-    left, whole = file.seek(0, io.SEEK_END) - _SUM_BYTES - end, hashlib.sha256()
-    file.seek(end)
-    while left > 0:
-        whole.update(piece := file.read(min(left, _STEP)))
-        left -= len(piece)
-    file.write(_SUM.encode() + whole.hexdigest().encode())
+    size = file.seek(0, io.SEEK_END)
+    file.write(_SUM.encode() + _sum(file, end, size - _SUM_BYTES).encode())
 
 
 def _bytes_of(array: npt.NDArray[Any]) -> memoryview:
@@ -267,11 +263,16 @@ def _checked_sum(path: Path, file: BinaryIO) -> tuple[int, int]:
         raise BadInput(f"{path}: not an artifact file, or cut off at its end; make it again")
     number = front.removeprefix(_FRONT.encode())
     end = int(number) if len(number) == _FRONT_BYTES - len(_FRONT) and number.isdigit() else 0
-    whole, left = hashlib.sha256(), size - _SUM_BYTES - end
-    file.seek(end)
+    if stated[len(_SUM) :].decode("ascii", "replace") != _sum(file, end, size - _SUM_BYTES):
+        raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make it again")
+    return end, size
+
+
+def _sum(file: BinaryIO, begin: int, end: int) -> str:
+    """The sha256 of a part of a file, which is left at its end."""
+    whole, left = hashlib.sha256(), end - begin
+    file.seek(begin)
     while left > 0 and (piece := file.read(min(left, _STEP))):
         whole.update(piece)
         left -= len(piece)
-    if stated[len(_SUM) :].decode("ascii", "replace") != whole.hexdigest():
-        raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make it again")
-    return end, size
+    return whole.hexdigest()
