@@ -4,6 +4,7 @@ import json
 import queue
 import secrets
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
@@ -88,16 +89,16 @@ class Workers:
             with suppress(queue.Empty):
                 job, attempt, future = ends.get(timeout=throttle.pause)
                 outcome = _outcome(future)
-                mailbox.read(job)
+                mailbox.read([job])
                 if outcome.died and attempt + 1 < ATTEMPTS:
                     print(f"{job.name}: {outcome.error}; it is started again", flush=True)
                     self._submit(job, attempt + 1, ends)
                     continue
                 del open_jobs[job.name]
-                mailbox.close(job)
+                job.messages.unlink(missing_ok=True)
                 outcomes[job.name] = outcome
                 on_end(job, outcome)
-            throttle(lambda: mailbox.read_all(open_jobs.values()))
+            throttle(lambda: mailbox.read(open_jobs.values()))
         return outcomes
 
     def start(self, executor: Executor) -> None:
@@ -135,26 +136,16 @@ class _Mailbox:
 
     def __init__(self, on_message: Callable[[Job, Any], None]) -> None:
         self._on_message = on_message
-        self._read: dict[str, int] = {}
+        self._read: Counter[str] = Counter()
 
-    def read_all(self, jobs: Iterable[Job]) -> None:
+    def read(self, jobs: Iterable[Job]) -> None:
         """Read what jobs have sent since."""
-        for job in list(jobs):
-            self.read(job)
-
-    def read(self, job: Job) -> None:
-        """Read what a job has sent since."""
-        try:
-            with job.messages.open("rb") as file:
-                file.seek(self._read.get(job.name, 0))
+        for job in jobs:
+            lines = b""
+            with suppress(FileNotFoundError), job.messages.open("rb") as file:
+                file.seek(self._read[job.name])
                 lines = file.read()
-        except FileNotFoundError:
-            return
-        whole = lines[: lines.rfind(b"\n") + 1]
-        self._read[job.name] = self._read.get(job.name, 0) + len(whole)
-        for line in whole.splitlines():
-            self._on_message(job, json.loads(line))
-
-    def close(self, job: Job) -> None:
-        """The job has ended."""
-        job.messages.unlink(missing_ok=True)
+            whole = lines[: lines.rfind(b"\n") + 1]
+            self._read[job.name] += len(whole)
+            for line in whole.splitlines():
+                self._on_message(job, json.loads(line))
