@@ -41,6 +41,9 @@ class _Stop:
         if done == 7:
             raise KeyboardInterrupt
 
+    def say(self, words: str) -> None:
+        pass
+
 
 @contextmanager
 def inside(folder: Path) -> Iterator[None]:

@@ -41,6 +41,9 @@ class Stop:
         if done == 7:
             raise KeyboardInterrupt
 
+    def say(self, words: str) -> None:
+        pass
+
 
 @pytest.fixture(autouse=True)
 def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
