@@ -7,12 +7,11 @@ import base64
 import math
 from collections.abc import Sequence
 from html import escape
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-
-from .line_points import drawn_points
 
 Array = npt.NDArray[np.float64]
 Colour = Literal["blue", "orange", "green", "pink", "ink", "grey", "quiet", "line"]
@@ -35,6 +34,8 @@ WIDTH = 560.0
 """Pixels for which a drawing is made; it is shown at any width."""
 LEFT, RIGHT, TOP, BOTTOM, ROW = 64.0, 12.0, 30.0, 50.0, 24.0
 """Pixels around the axes, and of a row of the legend; wide enough for the larger letters of a narrow page."""
+STRETCHES = 1000
+"""Stretches of a line that has more than four points for each."""
 
 
 def ink(colour: Colour) -> str:
@@ -296,6 +297,29 @@ def stacked(charts: Sequence[Chart]) -> bytes:
     )
     size = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {top:g}"'
     return f"{BEGINNING} {size}>{look}{''.join(out)}</svg>".encode()
+
+
+def drawn_points(pixels: Array) -> Array:
+    """Those points of a line (N, 2) that are drawn; NaN interrupts it.
+
+    What moves by less than a third of a pixel is left out. Of a line that is still too long, each stretch keeps its
+    ends, its highest and its lowest point, and one interruption.
+    """
+    if len(pixels) <= 2:
+        return pixels
+    fine = np.round(np.nan_to_num(pixels, nan=-1e6) * 3)
+    moved = np.append(True, (fine[1:] != fine[:-1]).any(axis=1))
+    moved[-1] = True
+    pixels = pixels[moved]
+    if len(pixels) <= 4 * STRETCHES:
+        return pixels
+    known = np.asarray(np.isfinite(pixels).all(axis=1))
+    kept = [len(pixels) - 1]
+    lowest, highest = (np.where(known, pixels[:, 1], beyond) for beyond in (np.inf, -np.inf))
+    for start, end in pairwise(np.linspace(0, len(pixels), STRETCHES + 1).astype(int).tolist()):
+        kept += [start, end - 1, start + int(lowest[start:end].argmin()), start + int(highest[start:end].argmax())]
+        kept += (start + np.flatnonzero(~known[start:end])[:1]).tolist()
+    return pixels[np.unique(kept)]
 
 
 def broken(points: Array, rows: npt.NDArray[np.int64] | Sequence[int]) -> Array:

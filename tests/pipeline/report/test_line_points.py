@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline.report.line_points import STRETCHES, drawn_points
+from omninav.pipeline.report.chart import STRETCHES, drawn_points
 
 
 def test_a_short_line_loses_what_no_eye_tells_apart():
