@@ -1,6 +1,7 @@
 """A run as one self-contained page."""
 
 import base64
+import dataclasses
 import json
 import shlex
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,6 @@ from omninav.pipeline.graph.results import Figure, Metrics, Slide, Table
 
 from .chart import BEGINNING
 from .key_figures import key_figures
-from .parameter_table import parameter_rows
 from .quantities import digits, head_of, headlines, per_log, title, unit
 from .rendering import render
 from .results import results
@@ -160,6 +160,34 @@ def _provenance(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows += [("cached prefix", manifest.get("prefix")), ("Python", manifest.get("python"))]
     rows.append(("libraries", ", ".join(f"{k} {v}" for k, v in (manifest.get("libraries") or {}).items())))
     return [(name, str(value)) for name, value in rows if value]
+
+
+def parameter_rows(graph: Graph) -> list[dict[str, Any]]:
+    """All parameters in the order of the graph: value and default as texts, meaning, and whether they differ."""
+    rows = []
+    for node in graph.nodes.values():
+        for name, parameter in node.signature.parameters.items():
+            stated = parameter.default
+            default = _plain({} if stated is dataclasses.MISSING else stated)
+            value = _plain(node.parameters.get(name, default))
+            if isinstance(default, dict) and isinstance(value, dict):
+                value = default | value  # of settings that belong together, some may be left out
+            shown = "" if stated is dataclasses.MISSING else _text(default)
+            row = {"node": node.name, "name": name, "value": _text(value), "default": shown}
+            rows.append({**row, "meaning": parameter.meaning, "changed": value != default})
+    return rows
+
+
+def _plain(value: object) -> object:
+    """A value as a configuration has it."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+
+
+def _text(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 120 else f"{text[:119]}…"
 
 
 def _seen_from(folder: Path, cwd: Any) -> str:

@@ -14,8 +14,7 @@ from omninav.pipeline import Bounds, Context, Figure, Metrics, Quantity, Stage, 
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.report.chart import Chart
-from omninav.pipeline.report.parameter_table import parameter_rows
-from omninav.pipeline.report.run_page import write_report
+from omninav.pipeline.report.run_page import parameter_rows, write_report
 
 MANIFEST = {
     "status": "complete",
@@ -187,11 +186,11 @@ def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
 
     graph = graph_of(Smoothed, window=9)
     rows = parameter_rows(graph)
-    assert [(row.name, row.value, row.default, row.changed) for row in rows] == [
+    assert [(row["name"], row["value"], row["default"], row["changed"]) for row in rows] == [
         ("window", "9", "5", True),
         ("robust", "False", "False", False),
     ]
-    assert rows[0].meaning == "Readings that are averaged."
+    assert rows[0]["meaning"] == "Readings that are averaged."
     said = text_of(report(tmp_path, graph=graph))
     assert "Parameters (1 of 2 is not the default)" in said
     changed, every = said.partition("Parameters (")[2].split("All 2")
@@ -211,7 +210,7 @@ def test_settings_that_belong_together_are_compared_one_by_one_and_long_values_t
         names: tuple[str, ...] = ("x" * 200, "a")
 
     def changed(**parameters: object) -> list[bool]:
-        return [row.changed for row in parameter_rows(graph_of(Smoothed, **parameters))]
+        return [row["changed"] for row in parameter_rows(graph_of(Smoothed, **parameters))]
 
     assert changed(window={"size": 5, "shape": "flat"}, names=["x" * 200, "a"]) == [False, False]
     assert changed(window={"shape": "flat"}) == [False, False]
