@@ -113,7 +113,7 @@ class Engine:
         self._ticking: list[Call] = []
         self._total: int | None = None
         self._saved = 0.0
-        self._rows: GrownRows | None = None
+        self._rows = None if options.memory is None else GrownRows(options.memory)
 
     def _call(self, node: Node) -> Call:
         rng = np.random.default_rng([self.options.seed, zlib.crc32(node.name.encode())])
@@ -271,7 +271,7 @@ class Engine:
 
     def save(self) -> None:
         """Write a checkpoint, where there is a place for it."""
-        if self.options.memory is None:
+        if self.options.memory is None or self._rows is None:
             return
         self._saved = time.monotonic()
         held = {origin: held_key(origin) for origin in sorted(self.held)}
@@ -287,13 +287,7 @@ class Engine:
             notes={name: call.ctx.notes() for name, call in self.calls.items()},
             sequences={name: sequence.size for name, sequence in self.sequences.items()},
         )
-        checkpoints.save(self.options.memory / "checkpoint", present, self._grown())
-
-    def _grown(self) -> GrownRows:
-        if self._rows is None:
-            assert self.options.memory is not None
-            self._rows = GrownRows(self.options.memory)
-        return self._rows
+        checkpoints.save(self.options.memory / "checkpoint", present, self._rows)
 
     def _verify_sequences(self) -> None:
         """Check that the sequences hold exactly what the ticks gave, before anything is computed from them."""
@@ -306,10 +300,10 @@ class Engine:
     def _whole_checkpoint(self) -> Checkpoint | None:
         """The last checkpoint, where it is whole and the sequences are with it, cut back to it."""
         path = self.options.memory / "checkpoint" if self.options.memory is not None else None
-        if path is None or not path.exists():
+        if path is None or self._rows is None or not path.exists():
             return None
         try:
-            found = checkpoints.load(path, self._grown())
+            found = checkpoints.load(path, self._rows)
             if found.replayed and self.replay is None:  # the cache it read from is gone
                 return None
             if found.identity != self.options.identity:
