@@ -113,10 +113,10 @@ def type_of(path: Path) -> type[Value]:
         return _type(_header(archive))
 
 
-def read_artifact(path: str | Path, whole: bool = False) -> Value:
+def read_artifact(path: str | Path) -> Value:
     """The value in an artifact file, checked against what its fields state (see `graph.contents`).
 
-    A large array in the front of the file is read, and checked, where it is needed (`StoredRows`), or now with `whole`.
+    A large array in the front of the file is read, and checked, where it is needed (`StoredRows`).
     Raises `BadInput` naming the file where it is missing, cut or changed, and where its content is no such value.
     """
     path = user_path(path)
@@ -131,7 +131,7 @@ def read_artifact(path: str | Path, whole: bool = False) -> Value:
         if end:
             front, stored = Front(path, end, fields.pop(_SUMS)), stored_fields(cls)
             for name in header.get("front", ()):
-                fields[name] = front.array(archive.getinfo(f"{name}.npy"), whole or name not in stored)
+                fields[name] = front.array(archive.getinfo(f"{name}.npy"), name not in stored)
         try:
             value = cls(**fields | decode(fields.pop("rest").tobytes()))
         except (BadEncoding, TypeError) as error:
