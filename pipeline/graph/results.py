@@ -1,7 +1,7 @@
 """Results that any "after" stage may give: numbers for `metrics.json`, plots and tables for the report."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from typing import Any, Literal
 
@@ -91,6 +91,15 @@ def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
             _merge(into[key], value)
         else:
             into[key] = _as_json(value)
+
+
+def by_path(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """What mappings within each other hold, each with its keys joined by points."""
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from by_path(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
 
 
 def _as_json(value: Any) -> Any:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.results import Metrics, by_path
 
 from .key_figures import key_figures
 from .quantities import best_of, head_of, is_detail, numbers
@@ -121,17 +121,7 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
 
 def differing_settings(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
     """Dotted names of settings that are not the same in all configurations, with each one's value ('–': not there)."""
-    flat = [dict(_flat(config)) for config in configs]
+    flat = [dict(by_path(config)) for config in configs]
     names = dict.fromkeys(name for settings in flat for name in settings)
     found = [(name, [str(settings.get(name, "–")) for settings in flat]) for name in names]
     return [(name, values) for name, values in found if len(set(values)) > 1]
-
-
-def _flat(config: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    flat: list[tuple[str, Any]] = []
-    for key, value in config.items():
-        if isinstance(value, Mapping) and value:
-            flat += _flat(value, f"{prefix}{key}.")
-        else:
-            flat.append((f"{prefix}{key}", value))
-    return flat

@@ -1,10 +1,10 @@
 """Results of a graph that has run: metrics, figures, tables, counts and facts."""
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator
 from typing import Any
 
 from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.graph.results import Figure, Metrics, Table, merged
+from omninav.pipeline.graph.results import Figure, Metrics, Table, by_path, merged
 
 
 def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
@@ -18,7 +18,7 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
             for value in _flat(engine.last(origin)):
                 if isinstance(value, Metrics):
                     metrics.append(value)
-                    for path, figure in _leaves(merged([value]).values):
+                    for path, figure in by_path(merged([value]).values):
                         other, before = stated.setdefault(path, (node.name, figure))
                         if figure != before:
                             what = f"{path} in metrics.json is its own, not that of {other}"
@@ -28,14 +28,6 @@ def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
                 elif isinstance(value, Table):
                     tables.append(value)
     return merged(metrics), figures, tables
-
-
-def _leaves(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{before}{key}.")
-        else:
-            yield before + key, value
 
 
 def _flat(value: Any) -> Iterator[Any]:
