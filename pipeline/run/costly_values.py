@@ -23,11 +23,12 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
 
     `artifacts`: the content hash of each artifact. Others who want the same value wait until it is there.
     """
-    origins = [] if cache is None else sorted(_costly(engine.graph))
+    if cache is None:
+        yield
+        return
     with ExitStack() as held:
         made = {}
-        for origin in origins:
-            assert cache is not None
+        for origin in sorted(_costly(engine.graph)):
             key = _key(engine.graph, origin, artifacts)
             held.enter_context(cache.lock(key))
             found = found_value(cache, key, SUFFIX, seed)
@@ -38,7 +39,7 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
         yield
         for origin, key in made.items():
             value, ctx = engine.values.get(origin), engine.calls[origin.partition(".")[0]].ctx
-            if isinstance(value, Value) and cache is not None:
+            if isinstance(value, Value):
                 own = seeded(key, seed) if ctx.drew else key
                 with cache.unless_full(), cache.keep(own, SUFFIX, ctx.notes()) as part:
                     write_artifact(part, value)
