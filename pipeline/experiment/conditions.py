@@ -64,30 +64,18 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
     number = experiment.repetitions
     # Each scenario has seeds of its own, so that draws of stages differ, too.
     seeds = [tuple(range(begin, begin + number)) for begin in range(0, experiment.runs_of_a_condition, number)]
-    return [
-        _run(experiment, folder, overrides, condition, scenario, of_scenario)
-        for condition in experiment.conditions()
-        for of_scenario, scenario in zip(seeds, experiment.all_scenarios, strict=True)
-    ]
-
-
-def _run(
-    experiment: Experiment,
-    folder: Path,
-    overrides: Sequence[str],
-    condition: Condition,
-    scenario: str,
-    seeds: tuple[int, ...],
-) -> ConditionRun:
-    parts = experiment.common, experiment.set, condition.overrides, experiment.all_scenarios[scenario]
-    own = [word for part in parts for word in shlex.split(part)]
-    named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
-    typed = (*([] if named else [f"variant={experiment.variant}"]), *own, *overrides)
-    words = " ".join(part for part in (condition.name, scenario) if part)
-    place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", words).strip("_")
-    run = ConditionRun(condition, scenario, typed, place, seeds, experiment.shared)
-    run.development = scenario in experiment.development
-    return run
+    runs = []
+    for condition in experiment.conditions():
+        for of_scenario, (scenario, its_words) in zip(seeds, experiment.all_scenarios.items(), strict=True):
+            parts = experiment.common, experiment.set, condition.overrides, its_words
+            own = [word for part in parts for word in shlex.split(part)]
+            named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
+            typed = (*([] if named else [f"variant={experiment.variant}"]), *own, *overrides)
+            place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", f"{condition.name} {scenario}").strip("_")
+            run = ConditionRun(condition, scenario, typed, place, of_scenario, experiment.shared)
+            run.development = scenario in experiment.development
+            runs.append(run)
+    return runs
 
 
 def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose) -> None:
