@@ -5,7 +5,7 @@ import os
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -204,7 +204,7 @@ def write_page(sweep: Path) -> Path:
     from omninav.pipeline.report.sweep_page import write_sweep_page
 
     with locked(sweep / ".page.lock"):
-        return write_sweep_page(sweep, sorted(_sweep_rows(sweep), key=lambda row: int(row["job"])))
+        return write_sweep_page(sweep, _sweep_rows(sweep))
 
 
 def show_sweep(folder: Path) -> None:
@@ -212,7 +212,7 @@ def show_sweep(folder: Path) -> None:
     from omninav.pipeline.report.sweep_table import overview_of
     from omninav.pipeline.report.terminal_tables import sweep_table
 
-    sweep = overview_of(sorted(_sweep_rows(folder), key=lambda row: int(row["job"])))
+    sweep = overview_of(_sweep_rows(folder))
     if sweep.heads:
         show(sweep_table(sweep, terminal_width()))
     if sweep.same:
@@ -220,11 +220,14 @@ def show_sweep(folder: Path) -> None:
     print(f"sweep: {shown(folder / 'sweep.html')}", flush=True)
 
 
-def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:
+def _sweep_rows(sweep: Path) -> list[dict[str, Any]]:
+    """Rows of a sweep's tables, in the order of its jobs."""
     from omninav.pipeline.run.metrics_files import read_metrics
 
+    rows = []
     for file in sweep.rglob("manifest.json"):
         manifest, folder = json.loads(file.read_text(encoding="utf-8")), file.parent
         if "job" in manifest:
             metrics = read_metrics(folder) if (folder / "metrics.json").exists() else None
-            yield {"job": manifest["job"], "folder": folder, "manifest": manifest, "metrics": metrics}
+            rows.append({"job": manifest["job"], "folder": folder, "manifest": manifest, "metrics": metrics})
+    return sorted(rows, key=lambda row: int(row["job"]))

@@ -11,10 +11,11 @@ from omninav.pipeline.run.metrics_files import read_metrics
 
 def command(arguments: list[str]) -> int:
     """Print the figures of two or more runs, and what they differ in."""
-    if len([run for given in arguments for run in runs_in(given)]) < 2:
+    words = [run for given in arguments for run in runs_in(given)]
+    if len(words) < 2:
         raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")
     runs = []
-    for word in (run for given in arguments for run in runs_in(given)):
+    for word in words:
         folder = Path(word)
         metrics = read_metrics(folder)
         config = read_mapping(folder / "config.yaml")

@@ -31,11 +31,9 @@ def command(arguments: list[str]) -> int:
     Of the stages that the folder names, those that `omninav stages` lists are run; others only where their module or
     file is typed after the folder, and programs (`command=`) only where they are.
     """
-    if not arguments:
+    if not arguments or any(map(os.path.isdir, arguments[1:])):
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     given, *typed = arguments
-    if any(os.path.isdir(word) for word in typed):
-        raise BadInput("resume: give one run folder: omninav resume runs/latest")
     here, folder = Path.cwd(), Path(os.path.realpath(given))
     if not folder.is_dir():
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
