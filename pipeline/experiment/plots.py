@@ -10,7 +10,8 @@ import numpy as np
 
 from omninav.pipeline.report.plot_style import PALETTE, plot
 
-from .result import Cell, ExperimentResult, Line, rows_of
+from .intervals import Array
+from .result import ExperimentResult, Line, rows_of
 from .specification import Experiment, Labels
 
 LEGEND_LINES_IN = 0.45
@@ -107,20 +108,19 @@ def _lines(experiment: Experiment, result: ExperimentResult, name: str, along: s
     series = [factor for factor in experiment.sweep if factor not in (along, panels)]
     combinations = list(itertools.product(*(experiment.labels(factor) for factor in series)))
     heights: list[float] = []
+    places = experiment.labels(along)
     with plot(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
         grid = drawn.canvas.subplots(1, len(panel_labels), squeeze=False, sharey=True)[0]
         for axes, panel in zip(grid, panel_labels, strict=True):
             for index, chosen in enumerate(combinations):
                 labels = dict(zip(series, chosen, strict=True)) | ({panels: panel} if panels else {})
-                points = [
-                    (float(x), _cell(experiment, result, name, labels | {along: x})) for x in experiment.labels(along)
-                ]
-                known = [(x, cell) for x, cell in points if cell.figure is not None]
-                heights += [_height(cell) for _, cell in known]
+                means, spreads = _figures(experiment, result, name, [labels | {along: x} for x in places])
+                known = ~np.isnan(means)
+                heights += means[known].tolist()
                 axes.errorbar(
-                    [x for x, _ in known],
-                    [_height(cell) for _, cell in known],
-                    yerr=[_spread(cell) for _, cell in known],
+                    np.array(places, np.float64)[known],
+                    means[known],
+                    yerr=spreads[known],
                     color=PALETTE[index % len(PALETTE)],
                     marker="os^Dvx"[index % 6],
                     markersize=4,
@@ -131,7 +131,7 @@ def _lines(experiment: Experiment, result: ExperimentResult, name: str, along: s
                 )
             axes.set_title(panel)
             axes.set_xlabel(along)
-            axes.locator_params(axis="x", integer=all(float(x).is_integer() for x in experiment.labels(along)))
+            axes.locator_params(axis="x", integer=all(float(x).is_integer() for x in places))
         _scale(grid[0], heights)
         _title_beside(grid[0], measure.title)
         _legend_above(drawn.canvas, grid)
@@ -150,9 +150,8 @@ def _bars(experiment: Experiment, result: ExperimentResult, name: str) -> bytes:
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
             by = experiment.page.columns
-            cells = [_cell(experiment, result, name, labels | {by: column}) for column in columns]
-            heights, spreads = [_height(cell) for cell in cells], [_spread(cell) for cell in cells]
-            all_heights += heights
+            heights, spreads = _figures(experiment, result, name, [labels | {by: column} for column in columns])
+            all_heights += heights.tolist()
             colour = PALETTE[index % len(PALETTE)]
             title = ", ".join(labels.values())
             axes.bar(
@@ -192,9 +191,9 @@ def _points(experiment: Experiment, result: ExperimentResult, name: str) -> byte
     with plot(8.0, 1.3 + 0.28 * len(rows)) as drawn:
         axes = drawn.canvas.subplots()
         for index, column in enumerate(columns):
-            cells = [_cell(experiment, result, name, labels | {experiment.page.columns: column}) for labels in rows]
-            means, spreads = [_height(cell) for cell in cells], [_spread(cell) for cell in cells]
-            figures += means
+            of_column = [labels | {experiment.page.columns: column} for labels in rows]
+            means, spreads = _figures(experiment, result, name, of_column)
+            figures += means.tolist()
             axes.errorbar(
                 means,
                 places - 0.1 * (index - (len(columns) - 1) / 2),
@@ -213,19 +212,14 @@ def _points(experiment: Experiment, result: ExperimentResult, name: str) -> byte
     return drawn.content
 
 
-def _cell(experiment: Experiment, result: ExperimentResult, name: str, labels: Labels) -> Cell:
-    return result.cell(name, [labels[factor] for factor in (*experiment.page.rows, experiment.page.columns)])
-
-
-def _height(cell: Cell) -> float:
-    return np.nan if cell.figure is None else cell.figure
-
-
-def _spread(cell: Cell) -> float:
-    """Standard deviation over the repetitions, 0 of one; of a largest figure there is none."""
-    if cell.spread is None:
-        return 0.0 if cell.found == 1 else np.nan
-    return cell.spread
+def _figures(
+    experiment: Experiment, result: ExperimentResult, name: str, conditions: Sequence[Labels]
+) -> tuple[Array, Array]:
+    """A measure's figures in some conditions, and their spreads: 0 of one repetition; NaN where there is none."""
+    factors = (*experiment.page.rows, experiment.page.columns)
+    cells = [result.cell(name, [labels[factor] for factor in factors]) for labels in conditions]
+    spreads = [0.0 if cell.spread is None and cell.found == 1 else cell.spread for cell in cells]
+    return np.array([cell.figure for cell in cells], np.float64), np.array(spreads, np.float64)
 
 
 def _title_beside(axes: Any, title: str) -> None:
