@@ -100,9 +100,8 @@ class Entry:
 
 @dataclass(frozen=True)
 class Number:
-    """A single number (or text) of metrics.json by its full path; of a distribution each statistic is one."""
+    """A single number (or text) of metrics.json; of a distribution each statistic is one."""
 
-    path: str
     name: str
     entry: Entry
     value: float | int | str | None
@@ -173,7 +172,7 @@ def numbers(metrics: Metrics) -> dict[str, Number]:
         for statistic, value in (entry.statistics or {"": entry.value}).items():
             name = ", ".join(part for part in (entry.title, SPELLED.get(statistic, statistic), entry.where) if part)
             path = f"{entry.path}.{statistic}" if statistic else entry.path
-            flat[path] = Number(path, name, entry, value)
+            flat[path] = Number(name, entry, value)
     return flat
 
 
