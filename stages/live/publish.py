@@ -189,7 +189,6 @@ class PublishMessages(Publisher, Stage):
     """What `/grid` is published as: nav2 reads its map on `/map`."""
 
     def step(self, ctx: Context, messages: RosMessages) -> None:
-        """One tick."""
         if self._transport.status.live:
             for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
                 send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)

@@ -26,7 +26,6 @@ class PublishTruth(Stage):
         self._transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
 
     def step(self, ctx: Context, tick: Tick, truth: Pose, tally: EpisodeStatistics) -> None:
-        """One tick; it has the stamp that the driver gave it."""
         fields = {"header": header(tick.stamp), "pose": ros_pose(np.array([truth.x, truth.y, truth.heading]))}
         pose = "geometry_msgs/msg/PoseStamped"
         self._transport.publish("/ground_truth/pose", pose, encode_message(pose, fields))

@@ -59,7 +59,6 @@ class Calibration(Stage):
         reliability: ConfidenceReliability | None = None
 
     def step(self, ctx: Context, drive: Drive) -> Out:
-        """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth) & known(last.estimate))
         values = covered(last)

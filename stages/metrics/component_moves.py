@@ -30,7 +30,6 @@ class ComponentMoves(MetricStage):
     """
 
     def step(self, ctx: Context, mixtures: Sequence[MixturesNow | None]) -> MetricStage.Out:
-        """The whole run at once."""
         often = [moved[:MIN_MOVES] for moved in moves(mixtures, NEAR_M) if len(moved) >= MIN_MOVES]
         enough = len(often) >= MIN_COMPONENTS
         values = {

@@ -47,7 +47,6 @@ class Confidence(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
         values = confidence_of(drive.last_log)

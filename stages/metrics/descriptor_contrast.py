@@ -84,7 +84,6 @@ class DescriptorRecognition(MetricStage):
     """
 
     def step(self, ctx: Context, likenesses: Sequence[PlaceContrast | None]) -> MetricStage.Out:
-        """The whole run at once."""
         rows = np.array([(each.own, each.nearby, each.average, each.most) for each in likenesses if each is not None])
         if not len(rows):
             return self.Out()

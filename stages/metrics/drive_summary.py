@@ -26,7 +26,6 @@ class DriveSummary(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         values: dict[str, Any] = {"duration_s": float(drive.seconds[-1]) if len(drive) else 0.0}
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         if len(tallied):

@@ -33,7 +33,6 @@ class ErrorCurves(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         return self.Out(metrics=Metrics(error_curves(logs[-1]) if logs else {}))
 

@@ -31,7 +31,6 @@ class ErrorHistograms(MetricStage):
     """Share of each log's frames, from its start, that does not count."""
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         logs = [log.at(slice(int(self.skip * len(log)), None)) for log in drive.by_log]
         scored = [log.at(known(log.truth) & known(log.estimate)) for log in logs]
         errors = [position_errors(log.estimate, log.truth) for log in scored if len(log)]

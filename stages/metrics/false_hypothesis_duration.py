@@ -36,7 +36,6 @@ class FalseHypothesisDuration(MetricStage):
         beliefs: Sequence[GaussianMixture],
         wrong: Sequence[GaussianMixture | None],
     ) -> MetricStage.Out:
-        """The whole run at once."""
         motions = np.nan_to_num(drive.motion)
         places: dict[int, Array] = {}  # of the wrong hypotheses that are not gone yet, by the row of their statement
         weights: dict[int, list[float]] = {}

@@ -47,7 +47,6 @@ class FramesTable(Stage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> None:
-        """The whole run at once."""
         if ctx.folder is not None:
             logs = [columns_of(log) for log in drive.by_log] or [columns_of(drive)]
             whole: Any = np.ma.concatenate  # the plain one forgets masks

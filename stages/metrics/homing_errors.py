@@ -53,7 +53,6 @@ class HomingErrors(MetricStage):
         vectors: Sequence[HomingVector | None],
         progress: Sequence[PathProgress | None],
     ) -> MetricStage.Out:
-        """The whole run at once."""
         poses = drive.truth
         if not len(poses) or not known(poses).all():
             return self.Out()

@@ -45,7 +45,6 @@ class HomingFieldErrors(Stage):
         field: HomingField | None = None
 
     def step(self, ctx: Context, truth: Sequence[Pose | None], vectors: Sequence[HomingVector | None]) -> Out:
-        """The whole run at once."""
         poses = pose_rows(truth)
         rows = [row for row in range(1, len(poses)) if np.isfinite(poses[[0, row]]).all()]
         if not rows:

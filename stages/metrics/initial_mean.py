@@ -20,7 +20,6 @@ class InitialMean(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive, free: FreeSpace) -> MetricStage.Out:
-        """The whole run at once."""
         means = drive.last_log.mean
         means = means[known(means)]
         if not len(means):

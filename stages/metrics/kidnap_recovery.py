@@ -35,7 +35,6 @@ class KidnapRecovery(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         log = drive.last_log
         log = log.at(known(log.truth) & known(log.estimate))
         if not len(log):

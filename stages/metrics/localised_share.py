@@ -41,7 +41,6 @@ class LocalisedShare(MetricStage):
     """Position error (m) above which the robot counts as lost."""
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         placed = int(known(last.truth).sum())  # an image without an estimate is in no share
         if not placed:

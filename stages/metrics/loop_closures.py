@@ -55,7 +55,6 @@ class LoopClosures(Stage):
         figure: Figure | None = None
 
     def step(self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap) -> Out:
-        """The map and what it was made of."""
         size = len(artifact_bytes(map))
         held: dict[str, Any] = {
             "size_bytes": size,

@@ -21,7 +21,6 @@ class LoopEndError(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         log = drive.last_log
         rows = np.flatnonzero(known(log.truth) & known(log.estimate))
         if not len(rows):

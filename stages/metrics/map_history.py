@@ -47,7 +47,6 @@ class MapHistory(MetricStage):
         events: Sequence[ViewEvent | None],
         after_last: ViewEvent | None = None,
     ) -> MetricStage.Out:
-        """The whole run at once."""
         logs = drive.by_log
         counts = counted(events, after_last)
         if not len(counts):

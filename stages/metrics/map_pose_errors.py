@@ -34,7 +34,6 @@ class MapPoseErrors(MetricStage):
         map: ReferenceGraph,
         straightened: ReferenceGraph,
     ) -> MetricStage.Out:
-        """The map at the end of the run."""
         if map.pose_source == "truth" or not len(map):
             return self.Out()
         where = np.full((len(map), 3), np.nan)

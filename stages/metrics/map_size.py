@@ -16,7 +16,6 @@ class MapSize(MetricStage):
     """Measures the size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
 
     def step(self, ctx: Context, map: ReferenceGraph) -> MetricStage.Out:
-        """The map at the end of the run."""
         size = map.features.nbytes + map.poses.nbytes + map.edges.nbytes
         ctx.fact("map_poses", map.pose_source)
         values = {

@@ -40,7 +40,6 @@ class MislocalisedReferences(MetricStage):
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
     ) -> MetricStage.Out:
-        """The whole run at once."""
         path = drive.truth[:, :2]
         seen, came, shares = wrong_shares(events, mixtures, path, WRONG_M)
         values: dict[str, Any] = {"references": len(seen)}

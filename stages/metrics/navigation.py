@@ -79,7 +79,6 @@ class Navigation(MetricStage):
         routes: Sequence[PlannedRoute | None],
         map: TopologicalMap | ReferenceGraph,
     ) -> MetricStage.Out:
-        """The whole drive at once."""
         begun = first_of_last_goal(routes)
         planned = [route for route in routes[begun:] if route is not None]
         spots = drive.truth[begun:][known(drive.truth[begun:])][:, :2]

@@ -88,7 +88,6 @@ class OutsideLocaliser(Stage):
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
     ) -> Out:
-        """The whole run at once."""
         if len({tick.log for tick in ticks}) > 1:
             raise BadInput("a localiser of your own is given one log at a time: log=PATH")
         with tempfile.TemporaryDirectory(prefix="omninav_peer_") as place:

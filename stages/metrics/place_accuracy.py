@@ -47,7 +47,6 @@ class PlaceAccuracy(MetricStage):
         begun: Sequence[PlaceBelief | None],
         map: TopologicalMap,
     ) -> MetricStage.Out:
-        """The whole run at once."""
         medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
         images = map.poses[:, :2]
         if map.pose_source != "truth":

@@ -36,7 +36,6 @@ class RankReferences(Stage):
         ranked: RankedReferences
 
     def step(self, ctx: Context, similarities: Similarities) -> Out:
-        """One image."""
         order = (-similarities.best).argsort(kind="stable")[:BEST]
         candidates = similarities.candidates
         return self.Out(ranked=RankedReferences(order if candidates is None else candidates[order]))

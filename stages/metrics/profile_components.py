@@ -30,7 +30,6 @@ class ProfileComponents(MetricStage):
     """
 
     def step(self, ctx: Context, vertical_segments: Sequence[VerticalSegments | None]) -> MetricStage.Out:
-        """The whole log at once."""
         shown = [each.descriptors[:, COLOURS:].astype(np.float64) for each in vertical_segments if each is not None]
         halves = shown[: len(shown) // 2], shown[len(shown) // 2 :]
         if any(sum(map(len, half)) < 2 for half in halves):

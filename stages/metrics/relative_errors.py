@@ -45,7 +45,6 @@ class RelativeErrors(MetricStage):
         ctx: Context,
         drive: Drive,
     ) -> MetricStage.Out:
-        """The whole run at once."""
         return self.Out(
             metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), quantities(self.distance_m))
         )

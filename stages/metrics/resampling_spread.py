@@ -33,7 +33,6 @@ class ResamplingSpread(MetricStage):
         hypotheses: Sequence[GaussianMixture | None],
         beliefs: Sequence[Particles | GaussianMixture],
     ) -> MetricStage.Out:
-        """The whole run at once."""
         spreads = []
         for before, hypothesis, after in zip(predictions, hypotheses, beliefs, strict=True):
             if hypothesis is None or not isinstance(before, Particles) or not isinstance(after, Particles):

@@ -35,7 +35,6 @@ class RetrievalPrecision(MetricStage):
     def step(
         self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph
     ) -> MetricStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth))
         rows = []

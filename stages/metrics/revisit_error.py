@@ -33,7 +33,6 @@ class RevisitError(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         rows = [known(log.truth) & known(log.estimate) for log in logs]
         scored = [log.at(each) for log, each in zip(logs, rows, strict=True)]

@@ -37,7 +37,6 @@ class SmoothTrajectory(Stage):
         metrics: Metrics | None = None
 
     def step(self, ctx: Context, drive: Drive) -> Out:
-        """The whole run at once."""
         estimate = np.full_like(drive.estimate, np.nan)
         for log in drive.by_log:
             if known(log.estimate).any() and known(log.motion).any():

@@ -44,7 +44,6 @@ class SuccessRate(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         if not last.has_truth:
             return self.Out()

@@ -25,7 +25,6 @@ class TrackingSuccess(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         scored = known(last.truth)
         if not scored.any():

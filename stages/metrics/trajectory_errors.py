@@ -59,7 +59,6 @@ class TrajectoryErrors(MetricStage):
         ctx: Context,
         drive: Drive,
     ) -> MetricStage.Out:
-        """The whole run at once."""
         per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in drive.by_log]
         if not per_log:
             return self.Out(metrics=Metrics({"frames": 0}))

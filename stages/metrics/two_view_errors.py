@@ -29,7 +29,6 @@ class TwoViewErrors(MetricStage):
     def step(
         self, ctx: Context, truth: Sequence[RelativeView], found: Sequence[RelativeView | None]
     ) -> MetricStage.Out:
-        """All problems at once."""
         solved = [(true, view) for true, view in zip(truth, found, strict=True) if view is not None]
         turns = np.array([_turn_between(true.rotation, view.rotation) for true, view in solved])
         ways = np.array([_angle_between(true.translation, view.translation) for true, view in solved])

@@ -36,7 +36,6 @@ class ViewMapSize(MetricStage):
         drive: Drive,
         map: ViewMixtures,
     ) -> MetricStage.Out:
-        """The map at the end of the run."""
         ctx.fact("map_poses", map.pose_source)
         poses = drive.truth if drive.has_truth else drive.estimate
         path = poses[known(poses)][:, :2]

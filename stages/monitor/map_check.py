@@ -46,7 +46,6 @@ class CheckMap(Stage):
         conflicts: Conflicts
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
-        """Check one map."""
         if len(map) < MIN_REFERENCES:
             return self.Out(conflicts=Conflicts((), (), False))
         sentence = of_poses(map.poses)

@@ -67,7 +67,6 @@ class WidenCovariance(Stage):
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
     ) -> Out:
-        """One estimate."""
         state.driven_m = math.inf if ctx.tick.first_of_log else state.driven_m
         state.driven_m += 0.0 if motion is None else math.hypot(motion.x, motion.y)
         if fix is not None and is_the_estimate(fix, estimate):

@@ -42,7 +42,6 @@ class LearnWrongPoseAgreement(Stage):
         when_wrong: WrongPoseAgreement
 
     def step(self, ctx: Context, map: ReferenceGraph, length_scale: LengthScale) -> Out:
-        """Learn it from one map."""
         number, radians = len(map), math.radians(self.within_deg)
         samples = np.unique(np.linspace(0, number - 1, min(SAMPLES, number)).astype(np.int64))
         others = np.unique(np.linspace(0, number - 1, min(MAX_COMPARED, number)).astype(np.int64))

@@ -12,6 +12,5 @@ class CameraFile(Stage):
     """
 
     def step(self, ctx: Context, map: ReferenceGraph) -> None:
-        """Write it, if there is one."""
         if map.landmarks is not None and map.landmarks.camera and ctx.folder is not None:
             write_whole(ctx.folder / "camera.yaml", map.landmarks.camera.encode())

@@ -26,7 +26,6 @@ class ConfidenceOverTime(FigureStage):
     """
 
     def step(self, ctx: Context, drive: Drive, stretches: Stretches | None = None) -> FigureStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         if not np.isfinite(last.confidence).any():
             return self.Out()

@@ -23,7 +23,6 @@ class ErrorOverTime(FigureStage):
         ctx: Context,
         drive: Drive,
     ) -> FigureStage.Out:
-        """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         if not logs:
             return self.Out()

@@ -76,7 +76,6 @@ class FrameByFrame(FigureStage):
         routes: Sequence[PlannedRoute | None] | None = None,
         answers: Sequence[Answers | None] | None = None,
     ) -> FigureStage.Out:
-        """The whole run at once."""
         ticks = first_seen(events or ())
         last = drive.last_log
         shown = {frame for frame in even_frames(int(last.frames[-1]) + 1)} if len(last) else set()

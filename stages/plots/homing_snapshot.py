@@ -64,7 +64,6 @@ class HomingSnapshot(Stage):
         vector: HomingVector | None = None,
         tracks: TrackedFeatures | None = None,
     ) -> Out:
-        """One tick."""
         if not is_snapshot_frame(tick.frame):
             return self.Out()
         small = thumbnail(image.pixels, camera, COLUMNS)

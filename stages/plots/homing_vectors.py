@@ -26,7 +26,6 @@ class ShowHomingVectors(FigureStage):
     """
 
     def step(self, ctx: Context, field: HomingField | None = None, plan: FloorPlan | None = None) -> FigureStage.Out:
-        """Draw the field."""
         if field is None:
             return self.Out()
         found, degrees = np.isfinite(field.directions), np.degrees(field.errors)

@@ -22,7 +22,6 @@ class ImageAt(Stage):
         image: Image | None = None
 
     def step(self, ctx: Context, tick: Tick, image: Image) -> Out:
-        """One frame."""
         return self.Out(image=image if tick.frame == self.frame else None)
 
 
@@ -30,7 +29,6 @@ class ImageFile(Stage):
     """Writes the first image as `image.png` into the run's folder, without loss."""
 
     def step(self, ctx: Context, images: Sequence[Image]) -> None:
-        """Write it, if there is one."""
         if images and ctx.folder is not None:
             _, encoded = cv2.imencode(".png", images[0].pixels)
             write_whole(ctx.folder / "image.png", encoded.tobytes())

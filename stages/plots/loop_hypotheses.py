@@ -23,7 +23,6 @@ class ShowLoopHypotheses(FigureStage):
     def step(
         self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None = None
     ) -> FigureStage.Out:
-        """Draw both panels."""
         if not np.isfinite(hypotheses.poses).all(axis=1).any():
             return self.Out()
         accepted, number = int(hypotheses.accepted.sum()), len(hypotheses.accepted)

@@ -35,7 +35,6 @@ class MapEllipses(FigureStage):
         map: ViewMixtures,
         plan: FloorPlan | None = None,
     ) -> FigureStage.Out:
-        """The map at the end of the run."""
         if not len(map.weights):
             return self.Out()
         true = drive.has_truth

@@ -35,7 +35,6 @@ class PlaceBeliefOverTime(FigureStage):
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
     ) -> FigureStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         shares = np.full((len(last), len(map)), np.nan)
         for k, row in enumerate(last.row):

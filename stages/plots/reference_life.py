@@ -44,7 +44,6 @@ class ReferenceLife(FigureStage):
         mixtures: Sequence[MixturesNow | None],
         plan: FloorPlan | None = None,
     ) -> FigureStage.Out:
-        """The whole run at once."""
         name = farthest_moved(events) if self.name is None else self.name
         if name is None:
             return self.Out()

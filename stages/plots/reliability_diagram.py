@@ -14,7 +14,6 @@ class ReliabilityDiagram(FigureStage):
     """
 
     def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> FigureStage.Out:
-        """The whole run at once."""
         if reliability is None:
             return self.Out()
         chart = Chart((0.0, 1.0), (0.0, 1.0), "confidence", "share of frames within the tolerance",

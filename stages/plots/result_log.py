@@ -32,7 +32,6 @@ class ResultLog(Stage):
     """
 
     def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> None:
-        """The whole run at once."""
         if ctx.folder is None:
             return
         with LogWriter(ctx.folder / "result.mcap") as log:

@@ -45,7 +45,6 @@ class ResultMessages(Stage):
         messages: RosMessages
 
     def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> Out:
-        """One tick."""
         asked = [messages for messages in tick_messages([shown], before) if messages.topic in self.topics]
         (made,) = by_tick(asked, 1)
         return self.Out(messages=RosMessages.of(shown.tick.stamp, made))

@@ -128,7 +128,6 @@ class ShowTick(Stage):
         command: Command | None = None,
         confidence: PoseConfidence | None = None,
     ) -> Out:
-        """One tick."""
         similar, best = None, np.nan
         if similarities is not None and map is not None:
             similar, best = _shown_references(similarities, map)

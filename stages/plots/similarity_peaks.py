@@ -31,7 +31,6 @@ class SimilarityPeaks(Stage):
         peaks: Peaks | None = None
 
     def step(self, ctx: Context, tick: Tick, similarities: Similarities) -> Out:
-        """One frame."""
         values = similarities.values
         if not is_snapshot_frame(tick.frame) or not len(values):
             return self.Out()

@@ -24,7 +24,6 @@ class SmallPanorama(Stage):
         panorama: EncodedPanorama | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
-        """One frame."""
         if not self.columns:
             return self.Out()
         small, headings = small_image(panorama, self.columns)

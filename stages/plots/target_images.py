@@ -25,7 +25,6 @@ class FirstThumbnail(Stage):
         thumbnails: Thumbnails | None = None
 
     def step(self, ctx: Context, snapshots: Sequence[EncodedHomingView]) -> Out:
-        """The whole run at once."""
         return self.Out(thumbnails=joined([snapshots[0].jpeg]) if snapshots else None)
 
 

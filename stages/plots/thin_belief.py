@@ -21,7 +21,6 @@ class ThinBelief(Stage):
         belief: Particles | GaussianMixture | None = None
 
     def step(self, ctx: Context, belief: Belief, estimate: PoseEstimate | None = None) -> Out:
-        """One belief, thinned."""
         if isinstance(belief, Particles):
             return self.Out(belief=thin(belief, PARTICLES))
         if isinstance(belief, GaussianMixture):

@@ -46,7 +46,6 @@ class ReferenceSnapshot(Stage):
         snapshots: ReferenceThumbnails | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows, map: ReferenceGraph, thumbnails: ThumbnailsState) -> Out:
-        """One tick."""
         if len(map) <= thumbnails.references:
             return self.Out()
         seen = list(panorama.pixels) if isinstance(panorama, Windows) else [panorama.pixels]
@@ -65,7 +64,6 @@ class CollectThumbnails(Stage):
         thumbnails: Thumbnails
 
     def step(self, ctx: Context, snapshots: Sequence[ReferenceThumbnails]) -> Out:
-        """The whole tour at once."""
         return self.Out(thumbnails=joined([jpeg for some in snapshots for jpeg in some.jpegs]))
 
 
@@ -81,7 +79,6 @@ class TourSnapshot(Stage):
         snapshots: ReferenceThumbnails
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """One tick."""
         jpeg = thumbnail(image.pixels, camera, TOUR_COLUMNS).jpeg(QUALITY)
         return self.Out(snapshots=ReferenceThumbnails((jpeg,)))
 

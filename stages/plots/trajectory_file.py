@@ -25,7 +25,6 @@ class TrajectoryFile(Stage):
     """The same of the file of true poses; null: none."""
 
     def step(self, ctx: Context, drive: Drive) -> None:
-        """The whole run at once."""
         for log in drive.by_log:
             for frame in log.frames[~known(log.estimate)]:
                 ctx.count("frame_without_estimate", detail=f"frame {frame} of log {log.log[0]} has no estimate")

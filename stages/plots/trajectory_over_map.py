@@ -42,7 +42,6 @@ class TrajectoryOverMap(Stage):
         plan: FloorPlan | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
     ) -> Out:
-        """The whole run at once."""
         logs = drive.by_log
         if not logs:
             return self.Out()

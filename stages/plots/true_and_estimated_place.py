@@ -40,7 +40,6 @@ class TrueAndEstimatedPlace(FigureStage):
         map: TopologicalMap,
         plan: FloorPlan | None = None,
     ) -> FigureStage.Out:
-        """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth))
         spots, places, shares = [], [], []

@@ -36,7 +36,6 @@ class WatchRun(Stage):
             self._server.clear()
 
     def step(self, ctx: Context, before: PathSoFar, shown: ShownTick, map: AnyMap | None = None) -> None:
-        """One tick."""
         if self.viewer == "rerun":
             self._rerun.show(shown, map)
         elif self.viewer is not False:

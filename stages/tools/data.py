@@ -19,7 +19,6 @@ class ListData(Tool):
     """Folders with further layouts (`nodes.source.layout_folders`)."""
 
     def run(self, ctx: Context) -> None:
-        """List them."""
         known: dict[str, DataSet] = {}
         broken: dict[str, BadInput] = {}
         for name, path in known_layouts(self.layout_folders).items():

@@ -23,7 +23,6 @@ class ExplainRun(Tool):
     """The run's folder."""
 
     def run(self, ctx: Context) -> None:
-        """Explain it."""
         ended = Run(user_path(self.run_folder))
         columns, lost_m = columns_of_run(ended), float(ended.settings.get("lost_m", 2.5))
         if not np.isfinite(columns["estimate_x"].astype(float)).any():

@@ -28,7 +28,6 @@ class CutMap(Tool):
     """The file to write."""
 
     def run(self, ctx: Context) -> None:
-        """Cut the map."""
         (source,) = read_saved(self.maps, at_most=1)
         path, whole = target(self.out, [source]), source.map
         poses = whole.poses if isinstance(whole, ReferenceGraph) else whole.poses[whole.places]

@@ -47,7 +47,6 @@ class ExportMap(Tool):
     """The folder to write its images to, or the file (.ply) for its landmarks."""
 
     def run(self, ctx: Context) -> None:
-        """Export the map."""
         (source,) = read_saved(self.maps, at_most=1)
         if self.out.endswith(".ply"):
             return self._export_points(source)

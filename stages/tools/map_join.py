@@ -36,7 +36,6 @@ class JoinMaps(Tool):
     """The file to write."""
 
     def run(self, ctx: Context) -> None:
-        """Join the maps."""
         sources = read_saved(self.maps, at_least=2)
         path = target(self.out, sources)
         refuse_other_views(sources)

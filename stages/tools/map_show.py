@@ -37,7 +37,6 @@ class ShowMap(Tool):
     """The file to write; of several maps one beneath the other."""
 
     def run(self, ctx: Context) -> None:
-        """Show the maps."""
         names = (self.maps,) if isinstance(self.maps, str) else self.maps
         path = user_path(self.out)
         if not names or path.suffix != ".png":

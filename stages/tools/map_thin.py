@@ -26,7 +26,6 @@ class ThinMap(Tool):
     """The file to write."""
 
     def run(self, ctx: Context) -> None:
-        """Thin the map."""
         (source,) = read_saved(self.maps, at_most=1)
         path, map = target(self.out, [source]), source.map
         if isinstance(map, ReferenceGraph):

@@ -27,7 +27,6 @@ class Simulate(Tool):
     """Further ones besides those of the route."""
 
     def run(self, ctx: Context) -> None:
-        """Render the whole drive and write it."""
         path = user_path(self.log)
         if path.suffix != ".mcap":
             raise BadInput("simulate: name the log to write, an MCAP file: log=out.mcap")

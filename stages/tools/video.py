@@ -62,7 +62,6 @@ class MakeVideo(Tool):
     """Times as fast as it was."""
 
     def run(self, ctx: Context) -> None:
-        """Draw it."""
         log, out = user_path(self.run_folder) / "result.mcap", user_path(self.out)
         if out.suffix not in CODECS:
             raise BadInput(f"out: {self.out} is no .mp4 or .webm; type out=video.mp4")
