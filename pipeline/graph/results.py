@@ -169,3 +169,9 @@ class FigureStage(Stage):
         """`figure`: for the report."""
 
         figure: Figure | None = None
+
+    def drawn(
+        self, name: str, title: str, caption: str, content: bytes, order: int, slides: tuple[Slide, ...] = ()
+    ) -> Out:
+        """A figure whose content is SVG; all else as in `Figure`."""
+        return self.Out(figure=Figure(name, title, caption, content, "image/svg+xml", order, slides))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.stretches import Stretches, StretchState
@@ -40,13 +40,11 @@ class ConfidenceOverTime(FigureStage):
         low = float((last.confidence < 0.5).mean())
         longest = sorted(found, key=lambda each: each.first - each.last)[:MAX_TOLD]
         told = [f" Images {each.first} to {each.last}, {each.cause}: {each.evidence}." for each in longest]
-        figure = Figure(
+        return self.drawn(
             name="confidence_over_time",
             title="Confidence over time",
             caption="The probability that the estimate is right, from the images and the belief; no ground truth is "
             f"used. {100 * low:.0f} % of the frames are below a half (dotted).{''.join(told)}",
             content=chart.svg(),
-            media_type="image/svg+xml",
             order=12,
         )
-        return self.Out(figure=figure)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
 from omninav.stages.geometry.arrays import Array
@@ -26,16 +26,13 @@ class ErrorOverTime(FigureStage):
         logs = [log for log in drive.by_log if log.has_truth]
         if not logs:
             return self.Out()
-        return self.Out(
-            figure=Figure(
-                name="error_over_time",
-                title="Error over time",
-                caption=" ".join(_summary(log, len(logs) > 1) for log in logs) + " Odometry alone starts at each log's "
-                "first true pose and is not aligned. The scale is logarithmic.",
-                content=_draw(logs),
-                media_type="image/svg+xml",
-                order=11,
-            )
+        return self.drawn(
+            name="error_over_time",
+            title="Error over time",
+            caption=" ".join(_summary(log, len(logs) > 1) for log in logs) + " Odometry alone starts at each log's "
+            "first true pose and is not aligned. The scale is logarithmic.",
+            content=_draw(logs),
+            order=11,
         )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
@@ -134,16 +134,13 @@ class FrameByFrame(FigureStage):
             chart.name("planned route", "green")
         if isinstance(map, TopologicalMap) and thumbnails is not None:
             words.append("The map's images are as the camera took them.")
-        return self.Out(
-            figure=Figure(
-                name="frame_by_frame",
-                title="Frame by frame",
-                caption=" ".join(words),
-                content=chart.svg(),
-                media_type="image/svg+xml",
-                order=30,
-                slides=tuple(slides),
-            )
+        return self.drawn(
+            name="frame_by_frame",
+            title="Frame by frame",
+            caption=" ".join(words),
+            content=chart.svg(),
+            order=30,
+            slides=tuple(slides),
         )
 
 

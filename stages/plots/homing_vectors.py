@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField
@@ -30,17 +30,14 @@ class ShowHomingVectors(FigureStage):
             return self.Out()
         found, degrees = np.isfinite(field.directions), np.degrees(field.errors)
         median = float(np.median(np.where(found, degrees, 180.0)))
-        return self.Out(
-            figure=Figure(
-                name="homing_vectors",
-                title="Homing vectors",
-                caption=f"From {len(degrees)} views to one target; {int(found.sum())} of them have a homing vector. "
-                f"Median error of the direction: {median:.1f}° (a view without a vector counts as 180°). Crosses: no "
-                "vector. Rings: every 2 m.",
-                content=_draw(field, plan),
-                media_type="image/svg+xml",
-                order=8,
-            )
+        return self.drawn(
+            name="homing_vectors",
+            title="Homing vectors",
+            caption=f"From {len(degrees)} views to one target; {int(found.sum())} of them have a homing vector. "
+            f"Median error of the direction: {median:.1f}° (a view without a vector counts as 180°). Crosses: no "
+            "vector. Rings: every 2 m.",
+            content=_draw(field, plan),
+            order=8,
         )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.floor_plan import FloorPlan
@@ -26,19 +26,16 @@ class ShowLoopHypotheses(FigureStage):
         if not np.isfinite(hypotheses.poses).all(axis=1).any():
             return self.Out()
         accepted, number = int(hypotheses.accepted.sum()), len(hypotheses.accepted)
-        return self.Out(
-            figure=Figure(
-                name="loop_hypotheses",
-                title="Loop hypotheses and the topological map",
-                caption=f"Above: the {len(hypotheses.poses)} images of the tour that took part, where each was taken "
-                f"(from {SOURCE_WORDS[hypotheses.pose_source]}); {accepted} of {number} hypotheses that two views show "
-                f"one place were accepted, the others rejected. Below: {len(map)} places at their medoids, "
-                f"{len(map.links)} links, and the path images between them: {len(map.views)} views in all. It was made "
-                "from images alone.",
-                content=_draw(hypotheses, map, plan),
-                media_type="image/svg+xml",
-                order=9,
-            )
+        return self.drawn(
+            name="loop_hypotheses",
+            title="Loop hypotheses and the topological map",
+            caption=f"Above: the {len(hypotheses.poses)} images of the tour that took part, where each was taken "
+            f"(from {SOURCE_WORDS[hypotheses.pose_source]}); {accepted} of {number} hypotheses that two views show "
+            f"one place were accepted, the others rejected. Below: {len(map)} places at their medoids, "
+            f"{len(map.links)} links, and the path images between them: {len(map.views)} views in all. It was made "
+            "from images alone.",
+            content=_draw(hypotheses, map, plan),
+            order=9,
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
@@ -43,17 +43,14 @@ class MapEllipses(FigureStage):
         size = (
             f"{len(map)} views seen from {len(map.weights)} places ({per_view:.2f} each), learned in {map.steps} steps."
         )
-        return self.Out(
-            figure=Figure(
-                name="map_ellipses",
-                title="The map",
-                caption=f"{size} Each place is an ellipse of {SIGMAS:g} sigma, fainter where it "
-                f"weighs less. The line is the {'true path' if true else 'estimate'}. "
-                f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
-                content=_draw(map, paths, plan if true else None, true),
-                media_type="image/svg+xml",
-                order=12,
-            )
+        return self.drawn(
+            name="map_ellipses",
+            title="The map",
+            caption=f"{size} Each place is an ellipse of {SIGMAS:g} sigma, fainter where it "
+            f"weighs less. The line is the {'true path' if true else 'estimate'}. "
+            f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
+            content=_draw(map, paths, plan if true else None, true),
+            order=12,
         )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.drive import Drive
@@ -46,27 +46,24 @@ class MapGrowth(FigureStage):
         starts = [int(log.row[0]) for log in drive.by_log]
         reasons = {why: sum(len(e.removed) for e in found if e.why == why) for why in ("forgotten", "merged", "full")}
         counted = ", ".join(f"{number} {why}" for why, number in reasons.items() if number)
-        return self.Out(
-            figure=Figure(
-                name="map_growth",
-                title="Map size over time",
-                caption=f"{came.sum()} references were added, {went.sum()} removed"
-                f"{f' ({counted})' if counted else ''}; "
-                f"{found[-1].views} with {found[-1].components} components are left. Below: how many were added and "
-                f"removed per {_width(len(drive))} frames, at the time of learning, which is after they were seen. "
-                "Upright lines: a new log begins.",
-                content=_draw(
-                    len(drive),
-                    starts,
-                    at,
-                    np.array([event.views for event in found]),
-                    np.array([event.components for event in found]),
-                    came,
-                    went,
-                ),
-                media_type="image/svg+xml",
-                order=14,
-            )
+        return self.drawn(
+            name="map_growth",
+            title="Map size over time",
+            caption=f"{came.sum()} references were added, {went.sum()} removed"
+            f"{f' ({counted})' if counted else ''}; "
+            f"{found[-1].views} with {found[-1].components} components are left. Below: how many were added and "
+            f"removed per {_width(len(drive))} frames, at the time of learning, which is after they were seen. "
+            "Upright lines: a new log begins.",
+            content=_draw(
+                len(drive),
+                starts,
+                at,
+                np.array([event.views for event in found]),
+                np.array([event.components for event in found]),
+                came,
+                went,
+            ),
+            order=14,
         )
 
 

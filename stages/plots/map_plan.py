@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
@@ -33,17 +33,14 @@ class MapPlot(FigureStage):
             return self.Out()
         before = None if as_driven is None or np.array_equal(as_driven.poses, map.poses) else as_driven.poses
         straightened = "" if before is None else " They were straightened where the tour came back to a place."
-        return self.Out(
-            figure=Figure(
-                name="map_plan",
-                title="The map",
-                caption=f"{len(map)} reference views and {len(map.edges)} edges, from {len(drive)} frames. Arrows "
-                f"point along the robot's heading when the view was taken. "
-                f"The poses are taken from {SOURCE_WORDS[map.pose_source]}.{straightened}",
-                content=_draw(map, plan, before),
-                media_type="image/svg+xml",
-                order=8,
-            )
+        return self.drawn(
+            name="map_plan",
+            title="The map",
+            caption=f"{len(map)} reference views and {len(map.edges)} edges, from {len(drive)} frames. Arrows "
+            f"point along the robot's heading when the view was taken. "
+            f"The poses are taken from {SOURCE_WORDS[map.pose_source]}.{straightened}",
+            content=_draw(map, plan, before),
+            order=8,
         )
 
 

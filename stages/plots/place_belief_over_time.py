@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.geometry.arrays import Array, Ints
@@ -52,17 +52,14 @@ class PlaceBeliefOverTime(FigureStage):
         if both.any():
             rate = float((np.argmax(shares[both], axis=1) == nearest[both]).mean())
             right = f" In {100 * rate:.0f} % of the images the most probable place is that one."
-        return self.Out(
-            figure=Figure(
-                name="place_belief",
-                title="Belief over places",
-                caption=f"Above: the probability of each of {len(map)} places, darker where it is higher.{truly}"
-                f"{right} Below: the probability of the most probable place, and of the truly nearest one, alone and "
-                "with the places linked to it.",
-                content=_draw(last.seconds, shares, nearest, map),
-                media_type="image/svg+xml",
-                order=28,
-            )
+        return self.drawn(
+            name="place_belief",
+            title="Belief over places",
+            caption=f"Above: the probability of each of {len(map)} places, darker where it is higher.{truly}"
+            f"{right} Below: the probability of the most probable place, and of the truly nearest one, alone and "
+            "with the places linked to it.",
+            content=_draw(last.seconds, shares, nearest, map),
+            order=28,
         )
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, FigureStage
+from omninav.pipeline import Bounds, Context, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.geometry.arrays import Array
@@ -56,19 +56,16 @@ class ReferenceLife(FigureStage):
         gone = next((row for row, event in enumerate(events) if event is not None and name in event.removed), None)
         lives = lives_of(snapshots, SAME_M)
         ended = f"it was removed in frame {gone}" if gone is not None else "it was in the map to the end"
-        return self.Out(
-            figure=Figure(
-                name="reference_life",
-                title="History of a reference",
-                caption=f"Reference {name} was added in frame {snapshots[0][0]} and changed in "
-                f"{counted(len(snapshots), 'frame')}; {ended}. It was kept at {counted(len(lives), 'place')}, each in "
-                f"one colour in both plots{'; grey: all but the heaviest four' if len(lives) > len(COLOURS) else ''}. "
-                "Below: larger dots weigh more, circles are last places, crosses the true positions at these frames "
-                "(a map that learns with delay changes a little after the view was seen).",
-                content=_draw(lives, drive.truth[:, :2], [row for row, _, _ in snapshots], plan, gone, len(drive)),
-                media_type="image/svg+xml",
-                order=16,
-            )
+        return self.drawn(
+            name="reference_life",
+            title="History of a reference",
+            caption=f"Reference {name} was added in frame {snapshots[0][0]} and changed in "
+            f"{counted(len(snapshots), 'frame')}; {ended}. It was kept at {counted(len(lives), 'place')}, each in "
+            f"one colour in both plots{'; grey: all but the heaviest four' if len(lives) > len(COLOURS) else ''}. "
+            "Below: larger dots weigh more, circles are last places, crosses the true positions at these frames "
+            "(a map that learns with delay changes a little after the view was seen).",
+            content=_draw(lives, drive.truth[:, :2], [row for row, _, _ in snapshots], plan, gone, len(drive)),
+            order=16,
         )
 
 

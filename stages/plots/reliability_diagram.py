@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.values.confidence import ConfidenceReliability
 
@@ -24,14 +24,12 @@ class ReliabilityDiagram(FigureStage):
         chart.base.discs(points, 3.0 + 9.0 * np.sqrt(reliability.counts / reliability.counts.sum()), "blue", 0.7)
         chart.name("as observed, larger for more frames", "blue", "dot")
         chart.name("as it should be", "quiet", "dashes")
-        figure = Figure(
+        return self.drawn(
             name="reliability",
             title="Reliability diagram of the confidence",
             caption="Share of the estimates that were within "
             f"{reliability.within_m:g} m and {reliability.within_deg:g}°, over the probability that was stated for it. "
             "Below the dashed line the confidence was too high.",
             content=chart.svg(),
-            media_type="image/svg+xml",
             order=12,
         )
-        return self.Out(figure=figure)

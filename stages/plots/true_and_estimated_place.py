@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.report.chart import Colour, broken
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.geometry.arrays import Array, Ints
@@ -54,18 +54,15 @@ class TrueAndEstimatedPlace(FigureStage):
         path, believed = np.array(spots), np.array(places)
         kinds = judged(path, believed, map)
         counted = [100.0 * float((kinds == kind).mean()) for kind in (RIGHT, BESIDE, WRONG)]
-        return self.Out(
-            figure=Figure(
-                name="believed_places",
-                title="True and estimated place",
-                caption="A line from each image of the true path to the most probable place, faint where its "
-                f"probability is below a half: the truly nearest place (green, {counted[RIGHT]:.0f} % of the images), "
-                f"one linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). "
-                "Off the tour's path no place is near.",
-                content=_draw(path, believed, np.array(shares), kinds, map, plan),
-                media_type="image/svg+xml",
-                order=12,
-            )
+        return self.drawn(
+            name="believed_places",
+            title="True and estimated place",
+            caption="A line from each image of the true path to the most probable place, faint where its "
+            f"probability is below a half: the truly nearest place (green, {counted[RIGHT]:.0f} % of the images), "
+            f"one linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). "
+            "Off the tour's path no place is near.",
+            content=_draw(path, believed, np.array(shares), kinds, map, plan),
+            order=12,
         )
 
 
