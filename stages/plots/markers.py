@@ -15,6 +15,8 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 Colour = tuple[float, float, float]
 ARROW, LINES, POINTS, TEXT = 0, 5, 8, 9
 """Types of visualization_msgs/Marker."""
+AXIS_M = 0.02
+"""Width of the line that an ellipse's axis is drawn as, metres."""
 DARK, LIGHT, PINK, GREEN = (0.35, 0.4, 0.45), (0.65, 0.68, 0.72), (0.8, 0.47, 0.65), (0.0, 0.62, 0.45)
 
 
@@ -56,7 +58,9 @@ def gaussian_markers(
     stamp: int, namespace: str, colour: Colour, means: Array, covariances: Array, weights: Array
 ) -> Fields:
     """Gaussians (K, …) as a list of lines: the two axes of each, one standard deviation to either side."""
-    return weighted_points(stamp, namespace, colour, 0.02, axis_ends(means, covariances), np.repeat(weights, 4), LINES)
+    return weighted_points(
+        stamp, namespace, colour, AXIS_M, axis_ends(means, covariances), np.repeat(weights, 4), LINES
+    )
 
 
 def axis_ends(means: Array, covariances: Array) -> Array:

@@ -26,7 +26,7 @@ from omninav.stages.plots.pose_messages import (
 )
 from omninav.stages.values.drive import known
 
-from .markers import GREEN, PINK, axis_ends, gaussian_markers, homing_arrow, opacity, weighted_points
+from .markers import AXIS_M, GREEN, LINES, PINK, POINTS, Colour, axis_ends, homing_arrow, opacity, weighted_points
 from .show_tick import ROW, ShownTick
 
 PATH_POSES = 500
@@ -179,7 +179,7 @@ class _Block:
         return row_bytes(rows)
 
     def odometries(self, at: Ints) -> list[bytes]:
-        rows = self._made(_plain("nav_msgs/msg/Odometry", ODOM, BASE), at)
+        rows = self._made(_plain("nav_msgs/msg/Odometry", ODOM, child_frame_id=BASE), at)
         set_poses(rows["pose"]["pose"], self.odometry[at])
         return row_bytes(rows)
 
@@ -215,8 +215,7 @@ class _Block:
         return _equally_long(at, [self.ticks[n].belief for n in at.tolist()], encode)
 
     def belief_markers(self, at: Ints) -> list[bytes]:
-        ellipses = [n for n in at.tolist() if self.ticks[n].covariances is not None]
-        points = []
+        points, marks = [], ("belief", PINK, 0.35, POINTS)
         for n in at.tolist():
             shown = self.ticks[n]
             assert shown.belief is not None
@@ -226,15 +225,16 @@ class _Block:
             else:
                 ends = axis_ends(shown.belief, shown.covariances)
                 points.append(np.column_stack([ends, np.repeat(shown.weights, 4)]))
-        kind = _belief_ellipses if ellipses else _likely_places
-        return _equally_long(at, points, partial(self._points, kind))
+                marks = "belief", PINK, AXIS_M, LINES
+        return _equally_long(at, points, partial(self._points, marks))
 
     def similar_references(self, at: Ints) -> list[bytes]:
-        return _equally_long(at, [self.ticks[n].similar for n in at.tolist()], partial(self._points, _similar))
+        marks = "similarity", GREEN, 0.2, POINTS
+        return _equally_long(at, [self.ticks[n].similar for n in at.tolist()], partial(self._points, marks))
 
-    def _points(self, of_number: Callable[[int], MessageRows], points: Array, at: Ints) -> list[bytes]:
-        """Markers of points (ticks, M, 3): x, y and weight."""
-        rows = of_number(points.shape[1]).rows(len(at))
+    def _points(self, marks: tuple[str, Colour, float, int], points: Array, at: Ints) -> list[bytes]:
+        """Markers of points (ticks, M, 3), x, y and weight; `marks`: their namespace, colour, size (m) and type."""
+        rows = _weighted(points.shape[1], *marks).rows(len(at))
         markers = rows["markers"][:, 0]
         set_stamps(markers["header"], self.stamps[at])
         if points.shape[1]:
@@ -243,7 +243,7 @@ class _Block:
         return row_bytes(rows)
 
     def panoramas(self, at: Ints) -> list[bytes]:
-        heads = row_bytes(self._made(_image(), at))
+        heads = row_bytes(self._made(_plain("sensor_msgs/msg/CompressedImage", BASE, format="jpeg"), at))
         images = (self.ticks[n].jpeg or b"" for n in at.tolist())
         return [
             b"".join((head[:-4], len(image).to_bytes(4, "little"), image))
@@ -278,20 +278,14 @@ def _equally_long(
 
 
 @cache
-def _plain(msgtype: str, frame: str = "", child: str = "") -> MessageRows:
-    fields = ({"header": header(0, frame)} if frame else {}) | ({"child_frame_id": child} if child else {})
-    return MessageRows(msgtype, fields)
+def _plain(msgtype: str, frame: str = "", **texts: str) -> MessageRows:
+    return MessageRows(msgtype, ({"header": header(0, frame)} if frame else {}) | texts)
 
 
 @cache
 def _transforms() -> MessageRows:
     frames = [transform(0, MAP, ODOM, np.zeros(3)), transform(0, ODOM, BASE, np.zeros(3))]
     return MessageRows("tf2_msgs/msg/TFMessage", {"transforms": frames})
-
-
-@cache
-def _image() -> MessageRows:
-    return MessageRows("sensor_msgs/msg/CompressedImage", {"header": header(0, BASE), "format": "jpeg"})
 
 
 @cache
@@ -306,18 +300,6 @@ def _pose_array(number: int) -> MessageRows:
 
 
 @lru_cache(SHAPES)
-def _similar(number: int) -> MessageRows:
-    shown = weighted_points(0, "similarity", GREEN, 0.2, np.zeros((number, 2)), np.zeros(number))
+def _weighted(number: int, namespace: str, colour: Colour, size: float, kind: int) -> MessageRows:
+    shown = weighted_points(0, namespace, colour, size, np.zeros((number, 2)), np.zeros(number), kind)
     return MessageRows(MARKERS, {"markers": [shown]})
-
-
-@lru_cache(SHAPES)
-def _likely_places(number: int) -> MessageRows:
-    shown = weighted_points(0, "belief", PINK, 0.35, np.zeros((number, 2)), np.zeros(number))
-    return MessageRows(MARKERS, {"markers": [shown]})
-
-
-@lru_cache(SHAPES)
-def _belief_ellipses(number: int) -> MessageRows:
-    none = np.zeros((number // 4, 3)), np.zeros((number // 4, 3, 3)), np.zeros(number // 4)
-    return MessageRows(MARKERS, {"markers": [gaussian_markers(0, "belief", PINK, *none)]})
