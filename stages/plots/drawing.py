@@ -39,13 +39,14 @@ def draw_map(axes: "Axes", map: AnyMap) -> None:
     if not len(map):
         return
     from matplotlib.collections import LineCollection
+    from matplotlib.colors import to_rgba_array
 
     if isinstance(map, ViewMixtures):
         size = float(np.clip(3000 / max(len(map.weights), 1), 1.5, 9))
         name = f"views ({len(map)}) at {len(map.weights)} places"
         x, y = map.means[:, :2].T
         heaviest = float(map.weights.max(initial=0.0)) or 1.0
-        colours = faded(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
+        colours = to_rgba_array(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
         axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
         return
     if isinstance(map, TopologicalMap):
@@ -91,9 +92,11 @@ def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
     """What is occupied in dark grey and what is unknown in light grey, under everything else."""
     if grid is None:
         return
+    from matplotlib.colors import to_rgba
+
     colours = np.zeros((*grid.cells.shape, 4))
-    colours[grid.cells == OCCUPIED] = faded("#6d727b", np.ones(1))[0]
-    colours[grid.cells == UNKNOWN] = faded("#eceef1", np.ones(1))[0]
+    colours[grid.cells == OCCUPIED] = to_rgba("#6d727b")
+    colours[grid.cells == UNKNOWN] = to_rgba("#eceef1")
     axes.imshow(colours, extent=grid_extent(grid), origin="lower", interpolation="nearest", zorder=0.4)
 
 
@@ -102,13 +105,6 @@ def grid_extent(grid: OccupancyGrid) -> tuple[float, float, float, float]:
     rows, columns = grid.cells.shape
     x, y = grid.origin
     return x, x + columns * grid.resolution, y, y + rows * grid.resolution
-
-
-def faded(colour: str, opacity: Array) -> Array:
-    """A colour with opacities (N,) in [0, 1]: (N, 4) red, green, blue, opacity."""
-    from matplotlib.colors import to_rgb
-
-    return np.column_stack([np.tile(to_rgb(colour), (len(opacity), 1)), opacity])
 
 
 def draw_pose(axes: "Axes", pose: Array, length: float, colour: str) -> None:

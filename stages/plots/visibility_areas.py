@@ -21,7 +21,6 @@ from .drawing import (
     TRUTH,
     draw_grid,
     extent_of,
-    faded,
     fitting_height,
     grid_extent,
     plan_axes,
@@ -125,6 +124,8 @@ def _draw(
 def _draw_view(
     axes: "Axes", pose: Array, areas: VisibilityAreas, targets: npt.NDArray[np.int32], grid: OccupancyGrid
 ) -> None:
+    from matplotlib.colors import to_rgba
+
     draw_grid(axes, grid)
     for sector, target in enumerate(targets):
         if target < 0:
@@ -132,7 +133,7 @@ def _draw_view(
         hue, point = HUES[sector % len(HUES)], areas.points[target]
         opacity = 0.45 if len(targets) == 1 else 0.22
         colours = np.zeros((*areas.shape, 4))
-        colours[areas.mask(int(target))] = faded(hue, np.array([opacity]))[0]
+        colours[areas.mask(int(target))] = to_rgba(hue, opacity)
         axes.imshow(colours, extent=grid_extent(grid), origin="lower", interpolation="nearest", zorder=0.6)
         axes.plot([pose[0], point[0]], [pose[1], point[1]], color=hue, linewidth=1.0, zorder=2)
         axes.plot([point[0]], [point[1]], "x", color=hue, markersize=6, markeredgewidth=2, zorder=3)
