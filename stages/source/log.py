@@ -20,14 +20,11 @@ from .dead_reckoning import VisualCompass, advance, assumed_speed, dead_reckon
 from .log_parts import LogPart
 from .outputs import motion_of, pose_of
 from .playback import Playback, PlaybackState
-from .synthetic_odometry import add_odometry_noise
 
-SYNTHETIC_DISTANCE_NOISE = 0.1
+DISTANCE_NOISE = 0.1
 """Standard deviation of synthetic odometry's distance after one metre, metres; it grows with the root of the path."""
-SYNTHETIC_TURN_NOISE_DEG_PER_M = 3.0
-"""Standard deviation of synthetic odometry's heading after one metre, degrees."""
-SYNTHETIC_TURN_NOISE_DEG_PER_RAD = 3.0
-"""Standard deviation that a turn of one radian adds to it, degrees."""
+TURN_NOISE_PER_M = TURN_NOISE_PER_RAD = math.radians(3.0)
+"""Standard deviation of synthetic odometry's heading after one metre, and what a turn of one radian adds to it, rad."""
 
 
 class LogSource(Playback):
@@ -37,7 +34,7 @@ class LogSource(Playback):
     images' own times, absent at the first image of each log; where images are left out it spans the gap.
 
     A recording without odometry but with positions gets a synthetic one (`odometry: synthetic` in the manifest): the
-    true increment with the noise of `add_odometry_noise`, drawn frame by frame from the run's seed. Raises
+    true increment with the noise of `synthetic_increment`, drawn frame by frame from the run's seed. Raises
     `UnreadableRecording` for a log that cannot be read.
 
     A log without odometry and positions (a video, images alone) is driven by a guess: `speed_m_s` straight ahead, and
@@ -104,7 +101,9 @@ class LogSource(Playback):
             seconds = None if last is None else float(recording.stamps[frame] - recording.stamps[last]) / 1e9
             motion = dead_reckon(self._compass, self._speed, position, image, recording.camera, seconds)
         elif last is not None:
-            motion = motion_of(self._synthetic(ctx, between(part.driven[last], part.driven[frame])))
+            motion = motion_of(
+                synthetic_increment(between(part.driven[last], part.driven[frame]), ctx.rng.standard_normal(2))
+            )
             advance(position, motion)
         odometry = np.array([position.x, position.y, position.heading])
         return pose_of(odometry, AssumedPose if part.kind == "guessed" else Pose), motion
@@ -116,11 +115,20 @@ class LogSource(Playback):
         placed = part.truth is not None and not isinstance(part.recording, LiveRecording)
         return assumed_speed(ctx, part.recording.name, part.recording.camera, self.speed_m_s, placed)
 
-    def _synthetic(self, ctx: Context, increment: Array) -> Array:
-        return add_odometry_noise(
-            increment,
-            ctx.rng.standard_normal(2),
-            SYNTHETIC_DISTANCE_NOISE,
-            math.radians(SYNTHETIC_TURN_NOISE_DEG_PER_M),
-            math.radians(SYNTHETIC_TURN_NOISE_DEG_PER_RAD),
-        )
+
+def synthetic_increment(increment: Array, noise: Array) -> Array:
+    """A true increment of motion (3,) as a poor odometry would have measured it.
+
+    `noise`: two independent standard normal numbers n1, n2. With d the length of the increment (m) and t its turn
+    (rad), the length becomes d + DISTANCE_NOISE sqrt(d) n1 and the turn t + e, e = sqrt(TURN_NOISE_PER_M^2 d +
+    TURN_NOISE_PER_RAD^2 |t|) n2; the translation is turned by e / 2, as if the error had grown evenly on the way.
+    Variances grow with the way, so that cutting it into more frames changes nothing. The model is the odometry motion
+    model of Thrun, Burgard & Fox, Probabilistic Robotics (2005), section 5.4, with variances in place of standard
+    deviations.
+    """
+    length, turn = math.hypot(increment[0], increment[1]), abs(float(increment[2]))
+    error = math.sqrt(TURN_NOISE_PER_M**2 * length + TURN_NOISE_PER_RAD**2 * turn) * float(noise[1])
+    scale = 1.0 + DISTANCE_NOISE / math.sqrt(length) * float(noise[0]) if length > 0 else 1.0
+    cos, sin = math.cos(error / 2) * scale, math.sin(error / 2) * scale
+    x, y = float(increment[0]), float(increment[1])
+    return np.array([cos * x - sin * y, sin * x + cos * y, float(increment[2]) + error])

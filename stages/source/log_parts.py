@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 
@@ -15,6 +16,11 @@ from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thin
 
 NEW_LOG_AFTER_S = 3600.0
 """Longest pause within a log, seconds: a longer one begins another, since several days may lie in one file."""
+STILL = 1e-9
+"""Metres and radians: below, odometry has not changed between two images."""
+MIN_STEP_M, MIN_STEPS, MIN_DISTANCE_M = 0.01, 5, 0.5
+"""Truth that moves by this much between two images, so often in a row and so far in all, is neither noise nor a robot
+that was lifted."""
 OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 
@@ -77,6 +83,24 @@ def pauses(parts: Sequence[LogPart]) -> list[str]:
                 "follows counts as another drive; check the clock if the robot did not pause"
             )
     return said
+
+
+def frozen_steps(odometry: Array, truth: Array) -> tuple[int, float]:
+    """Number of images between which odometry stood still while the truth moved on, and how far that went (m).
+
+    Both are poses (N, 3) at the images; a row of truth that is NaN moves nothing.
+    """
+    still = (np.abs(between(odometry[:-1], odometry[1:])) < STILL).all(axis=1)
+    moved = np.hypot(*(truth[1:, :2] - truth[:-1, :2]).T)
+    frozen = still & (moved > MIN_STEP_M)
+    steps, metres, at = 0, 0.0, 0
+    for is_frozen, group in groupby(frozen.tolist()):
+        length = len(list(group))
+        way = float(np.hypot(*(truth[at + length, :2] - truth[at, :2])))
+        if is_frozen and length >= MIN_STEPS and way >= MIN_DISTANCE_M:
+            steps, metres = steps + length, metres + way
+        at += length
+    return steps, metres
 
 
 def _odometry_kind(recording: Recording, truth: Array | None, guess: bool) -> OdometryKind:

@@ -23,8 +23,7 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
-from .frozen_odometry import frozen_steps
-from .log_parts import LogPart, parts_of, pauses
+from .log_parts import LogPart, frozen_steps, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 

@@ -17,9 +17,8 @@ from omninav.stages.camera.model import MODELS
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource
+from omninav.stages.source.log import LogSource, synthetic_increment
 from omninav.stages.source.playback import PlaybackState
-from omninav.stages.source.synthetic_odometry import add_odometry_noise
 from omninav.stages.values.pose import AssumedMotion
 
 
@@ -142,8 +141,8 @@ def test_without_odometry_and_truth_a_path_is_guessed_for_drawing(tmp_path: Path
 @pytest.mark.parametrize("cuts", [1, 5, 50])
 def test_made_up_odometry_has_its_deviations_over_one_metre_however_it_is_cut(cuts: int) -> None:
     random = np.random.default_rng(0)
-    step, sigma = np.array([1 / cuts, 0, 0]), math.radians(3)
-    steps = [add_odometry_noise(step, pair, 0.1, sigma, sigma) for pair in random.standard_normal((2000 * cuts, 2))]
+    step = np.array([1 / cuts, 0, 0])
+    steps = [synthetic_increment(step, pair) for pair in random.standard_normal((2000 * cuts, 2))]
     drives = np.array(steps).reshape(2000, cuts, 3)
     lengths, turns = np.hypot(drives[..., 0], drives[..., 1]).sum(axis=1), drives[..., 2].sum(axis=1)
     # 2000 drives know a standard deviation to 1.6 %; noise on 2 cm steps folds a little where a step would go back
@@ -154,10 +153,10 @@ def test_made_up_odometry_has_its_deviations_over_one_metre_however_it_is_cut(cu
 
 def test_made_up_odometry_errs_with_the_turn_and_not_when_nothing_moves() -> None:
     noise = np.random.default_rng(0).standard_normal((4000, 2))
-    still = add_odometry_noise(np.zeros(3), noise[0], 0.1, 0.05, 0.05)
+    still = synthetic_increment(np.zeros(3), noise[0])
     np.testing.assert_array_equal(still, np.zeros(3))
-    turns = [add_odometry_noise(np.array([0, 0, 1.0]), pair, 0.1, 0.05, 0.04)[2] - 1 for pair in noise]
-    assert np.std(turns) == pytest.approx(0.04, rel=0.06)
+    turns = [synthetic_increment(np.array([0, 0, 1.0]), pair)[2] - 1 for pair in noise]
+    assert np.degrees(np.std(turns)) == pytest.approx(3, rel=0.06)
 
 
 def test_a_selection_without_frames_is_refused(log: str) -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.source.frozen_odometry import frozen_steps
+from omninav.stages.source.log_parts import frozen_steps
 
 AHEAD = np.column_stack([np.arange(20) * 0.2, np.zeros(20), np.zeros(20)])
 
