@@ -4,32 +4,33 @@ import signal
 import threading
 import time
 from collections import Counter
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from omninav.pipeline import BadInput, Bounds, Context, Source
+import numpy as np
+
+from omninav.pipeline import BadInput, Bounds, Context, Source, Tick
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera
 from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, LiveRecording, OdometryBuffer, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.topics import IMAGE_TOPICS
-from omninav.stages.source.dead_reckoning import VisualCompass, assumed_speed, dead_reckon
-from omninav.stages.source.outputs import DriveOutputs, pose_of
+from omninav.stages.source.dead_reckoning import Reckoned, VisualCompass, assumed_speed, dead_reckon
+from omninav.stages.source.outputs import DriveOutputs, motion_of, pose_of
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import AssumedPose, Pose
+from omninav.stages.values.pose import AssumedPose, Motion, Pose
 
 from .amcl_services import serve_amcl, serve_restart
 from .camera_device import TOPIC, device_camera
 from .camera_transport import connect_camera
 from .drive_record import DriveRecord, unfinished
 from .intake import Intake
-from .live_position import Guess, LiveSourceState
 from .publish import publish_diagnostics
 from .transport import Transport, TransportName, connect, disconnect, full_name
 
@@ -41,6 +42,37 @@ WATCH_S = 1.0
 """Seconds between two reports to diagnostics and the terminal."""
 PATIENCE_S = 1.0
 """Time for which an image waits for the odometry after it, and for which a topic may be silent, seconds."""
+
+
+class LiveSourceState(Reckoned):
+    """Ticks made, logs begun (a clock that is set back begins one), and of the last tick the stamp (ns), the position
+    in the odometry's frame, and the seconds of odometry not believed. `first` and `ended`: stamps of the first tick,
+    and of that at which the planned route ended (0: it has not)."""
+
+    ticks: int = 0
+    log: int = 0
+    stamp: int = 0
+    unmeasured_s: float = 0.0
+    first: int = 0
+    ended: int = 0
+
+    def turn(self, stamp: int) -> tuple[Tick, float | None]:
+        """The tick of an image, and the seconds since the one before; None at the first of a log."""
+        first = self.ticks == 0 or stamp <= self.stamp
+        self.log += first and self.ticks > 0
+        seconds = None if first else (stamp - self.stamp) / 1e9
+        tick = Tick(index=self.ticks, stamp=stamp, log=self.log, frame=self.ticks, first_of_log=first)
+        self.ticks, self.stamp, self.first = self.ticks + 1, stamp, self.first or stamp
+        return tick, seconds
+
+    def move(self, frame: Frame, seconds: float | None) -> Motion | None:
+        """Go on by a frame's odometry, `seconds` after the one before; gives the motion, None at the first of a log."""
+        assert frame.odometry is not None  # an image that odometry does not reach is no tick
+        before = np.array([self.x, self.y, self.heading])
+        unmeasured_s = abs(frame.unmeasured_s - self.unmeasured_s)
+        self.x, self.y, self.heading = frame.odometry.tolist()
+        self.unmeasured_s = frame.unmeasured_s
+        return None if seconds is None else motion_of(between(before, frame.odometry), unmeasured_s)
 
 
 class LiveSource(Source):
@@ -108,10 +140,9 @@ class LiveSource(Source):
         device = self._device()
         roles = self._roles(ctx.is_read("scan")) if device is None else dict[str, Role]({TOPIC: "image"})
         self._header = LiveHeader(roles, self.limits)
-        self._guess: Guess | None = None
-        if self._odometry_topic() is None:
-            self._guess = partial(dead_reckon, VisualCompass(), self._assumed_speed(ctx))
-        ctx.fact("odometry", "guessed" if self._guess else "measured")
+        self._compass = VisualCompass()
+        self._speed = self._assumed_speed(ctx) if self._odometry_topic() is None else None
+        ctx.fact("odometry", "measured" if self._speed is None else "guessed")
         self._transport, assumed = self._connect()
         if assumed:
             ctx.warn(f"assumed: {assumed}")
@@ -260,8 +291,12 @@ class LiveSource(Source):
     def _out(self, position: LiveSourceState, stamp: int, camera: Camera, pixels: Pixels, frame: Frame) -> Out:
         image = Image(pixels)
         tick, since = position.turn(stamp)
-        motion = position.move(self._guess, image, camera, since, frame)
-        pose = Pose if self._guess is None else AssumedPose
+        if self._speed is None:
+            pose, motion = Pose, position.move(frame, since)
+        else:
+            if since is None:
+                position.x = position.y = position.heading = 0.0
+            pose, motion = AssumedPose, dead_reckon(self._compass, self._speed, position, image, camera, since)
         return self.Out(
             tick=tick,
             image=image,

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Iterable
-from typing import Protocol
 
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Context
+from omninav.pipeline import BadInput, Context, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.appearance.visual_compass import Strip, turn_between
@@ -54,13 +53,19 @@ class VisualCompass:
         return np.asarray(cv2.GaussianBlur(around, (0, 0), BLUR_PX)[:, ends:-ends], np.float32)
 
 
-class Reckoned(Protocol):
-    """Guessed pose of a source (m, rad), and what the compass keeps of the last image."""
+class Reckoned(State):
+    """Position of a source by its odometry, measured or guessed (m, rad), and what the compass keeps of the last image
+    (`view`)."""
 
-    x: float
-    y: float
-    heading: float
-    view: Strip | None
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    view: Strip | None = None
+
+    def advance(self, motion: Motion) -> None:
+        """Add a motion."""
+        moved = compose((self.x, self.y, self.heading), (motion.x, motion.y, motion.turn))
+        self.x, self.y, self.heading = (float(value) for value in moved)
 
 
 def dead_reckon(
@@ -74,14 +79,8 @@ def dead_reckon(
     if seconds is None:
         return None
     motion = assumed_motion(before, position.view, seconds, speed)
-    advance(position, motion)
+    position.advance(motion)
     return motion
-
-
-def advance(position: Reckoned, motion: Motion) -> None:
-    """Add a motion to where a source is."""
-    moved = compose((position.x, position.y, position.heading), (motion.x, motion.y, motion.turn))
-    position.x, position.y, position.heading = (float(value) for value in moved)
 
 
 def assumed_motion(before: Strip | None, after: Strip | None, seconds: float, speed: float) -> AssumedMotion:

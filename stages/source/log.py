@@ -16,7 +16,7 @@ from omninav.stages.recordings.recording import Recording, Topics, UnreadableRec
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import AssumedPose, Motion, Pose
 
-from .dead_reckoning import VisualCompass, advance, assumed_speed, dead_reckon
+from .dead_reckoning import VisualCompass, assumed_speed, dead_reckon
 from .log_parts import LogPart
 from .outputs import motion_of, pose_of
 from .playback import Playback, PlaybackState
@@ -104,7 +104,7 @@ class LogSource(Playback):
             motion = motion_of(
                 synthetic_increment(between(part.driven[last], part.driven[frame]), ctx.rng.standard_normal(2))
             )
-            advance(position, motion)
+            position.advance(motion)
         odometry = np.array([position.x, position.y, position.heading])
         return pose_of(odometry, AssumedPose if part.kind == "guessed" else Pose), motion
 

@@ -8,11 +8,10 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Source, State, Tick
+from omninav.pipeline import Bounds, Context, Source, Tick
 from omninav.pipeline.engine.code_version import module_version
 from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import counted
-from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
@@ -23,23 +22,19 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
+from .dead_reckoning import Reckoned
 from .log_parts import LogPart, frozen_steps, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
-class PlaybackState(State):
+class PlaybackState(Reckoned):
     """Position in the recordings: recording, next frame and last used frame (-1: none) as positions in the selection,
-    ticks made, the synthetic or guessed odometry so far (x, y in metres, heading in radians), and what the compass
-    keeps of the last image."""
+    and ticks made; of odometry that is synthetic or guessed, the position so far."""
 
     log: int = 0
     next: int = 0
     last: int = -1
     ticks: int = 0
-    x: float = 0.0
-    y: float = 0.0
-    heading: float = 0.0
-    view: Floats | None = None
 
 
 class Playback(Source, ABC):
