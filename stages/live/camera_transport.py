@@ -70,7 +70,7 @@ class CameraTransport(Transport):
             pixels = self.device.read()
             if pixels is not None:
                 with self._changed:
-                    self.overtaken[TOPIC] += self._newest is not None
+                    self.inbox.overtaken[TOPIC] += self._newest is not None
                     self._newest = time.time_ns(), pixels
                     self._changed.notify()
             elif self.device.is_video:

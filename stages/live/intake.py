@@ -187,7 +187,7 @@ class Intake:
         tracks = (self.drive.odometry, self.drive.truth)
         found = sum((track.dropped for track in tracks if track is not None), self.counts.copy())
         images = [topic for topic, role in self.header.topics.items() if role == "image"]
-        found["overtaken_image"] += sum(self.transport.overtaken[topic] for topic in images)
+        found["overtaken_image"] += sum(self.transport.inbox.overtaken[topic] for topic in images)
         return +found
 
     def _drop(self, kind: str, detail: str) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
-from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.plots.pose_messages import (
     BASE,
@@ -25,6 +24,7 @@ from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimat
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.conflicts import Conflicts
+from omninav.stages.values.drive import pose_row
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
 
@@ -120,13 +120,13 @@ class Publish(Publisher, Stage):
         self._transport.status.published(tick.stamp)
 
     def _publish_estimate(self, stamp: int, estimate: PoseEstimate, odometry: Pose | None) -> None:
-        at = _row(estimate.pose)
+        at = np.array(pose_row(estimate.pose))
         if self.pose is not None:
             pose = {"pose": ros_pose(at), "covariance": covariance_6x6(estimate.covariance)}
             self._send(self.pose, POSE, {"header": header(stamp, self.map_frame), "pose": pose}, latched=True)
         if self.tf is not None and odometry is not None:
             until = stamp + round(self.tf_tolerance_s * 1e9)
-            correction = compose(at, between(_row(odometry), np.zeros(3)))
+            correction = compose(at, between(pose_row(odometry), np.zeros(3)))
             self._send(self.tf, TF, {"transforms": [transform(until, self.map_frame, self.odom_frame, correction)]})
 
     def _drive(self, stamp: int, command: Command) -> None:
@@ -235,7 +235,3 @@ def publish_diagnostics(transport: Transport, topic: str) -> None:
         "values": [{"key": key, "value": value} for key, value in values.items()],
     }
     send(transport, topic, DIAGNOSTICS, encode_message(DIAGNOSTICS, {"status": [state]}, time.time_ns()))
-
-
-def _row(pose: Pose) -> Array:
-    return np.array([pose.x, pose.y, pose.heading])

@@ -41,6 +41,7 @@ class MessageQueue:
 
     def __init__(self) -> None:
         self.overtaken: Counter[str] = Counter()
+        """How many messages of each topic were overtaken by later ones before they were taken."""
         self._changed = threading.Condition()
         self._arrivals: dict[str, deque[Arrival]] = {}
 
@@ -111,11 +112,6 @@ class Transport(ABC):
     def take(self, timeout_s: float = 0.0) -> Arrival | None:
         """The message that was received first of those that wait; None where none comes in time."""
         return self.inbox.take(timeout_s)
-
-    @property
-    def overtaken(self) -> Counter[str]:
-        """How many messages of each topic were overtaken by later ones before they were taken."""
-        return self.inbox.overtaken
 
     @property
     def ended(self) -> bool:
