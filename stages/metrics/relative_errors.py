@@ -40,11 +40,7 @@ class RelativeErrors(MetricStage):
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Metres of true path between the two frames of a relative pose error."""
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-    ) -> MetricStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         return self.Out(
             metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), quantities(self.distance_m))
         )

@@ -54,11 +54,7 @@ class TrajectoryErrors(MetricStage):
     the same frames for every method, where `after_convergence` leaves out more of a method that stays lost for longer.
     None: no such entry."""
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-    ) -> MetricStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in drive.by_log]
         if not per_log:
             return self.Out(metrics=Metrics({"frames": 0}))

@@ -30,12 +30,7 @@ class ViewMapSize(MetricStage):
     says too much.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-        map: ViewMixtures,
-    ) -> MetricStage.Out:
+    def step(self, ctx: Context, drive: Drive, map: ViewMixtures) -> MetricStage.Out:
         ctx.fact("map_poses", map.pose_source)
         poses = drive.truth if drive.has_truth else drive.estimate
         path = poses[known(poses)][:, :2]

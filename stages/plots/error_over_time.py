@@ -18,11 +18,7 @@ class ErrorOverTime(FigureStage):
     Nothing is drawn for logs without ground truth.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-    ) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> FigureStage.Out:
         logs = [log for log in drive.by_log if log.has_truth]
         if not logs:
             return self.Out()

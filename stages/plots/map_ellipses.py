@@ -28,13 +28,7 @@ class MapEllipses(FigureStage):
     nothing where the map is empty.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-        map: ViewMixtures,
-        plan: FloorPlan | None = None,
-    ) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, plan: FloorPlan | None = None) -> FigureStage.Out:
         if not len(map.weights):
             return self.Out()
         true = drive.has_truth

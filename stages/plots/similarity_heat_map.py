@@ -11,15 +11,7 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.maps import ReferenceGraph
 
-from .drawing import (
-    ESTIMATE,
-    REFERENCE,
-    TRUTH,
-    draw_pose,
-    extent_of,
-    fitting_height,
-    plan_axes,
-)
+from .drawing import ESTIMATE, REFERENCE, TRUTH, draw_pose, extent_of, fitting_height, plan_axes
 from .similarity_peaks import Peaks
 from .snapshot_times import spread_out
 
@@ -32,13 +24,7 @@ class SimilarityHeatMap(FigureStage):
 
     on_request = True
 
-    def step(
-        self,
-        ctx: Context,
-        drive: Drive,
-        peaks: Sequence[Peaks | None],
-        map: ReferenceGraph,
-    ) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive, peaks: Sequence[Peaks | None], map: ReferenceGraph) -> FigureStage.Out:
         """The whole run at once; frames of the last log are shown."""
         last = drive.last_log
         kept = [
