@@ -3,14 +3,12 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricStage
-from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
 
-Index = npt.NDArray[np.int64]
 HOME_M = 2.0
 """Radius of the circle around the start, metres; a lap leaves twice as far and comes back into it."""
 POINTS = 60
@@ -99,6 +97,6 @@ def lap_ends(poses: Array, start: Array, home_m: float) -> list[int]:
     return ends[1:]  # the first visit is the start itself; the last is not left again
 
 
-def _mean(values: Array, rows: Index) -> float | None:
+def _mean(values: Array, rows: Ints) -> float | None:
     there = values[rows]
     return float(there.mean()) if len(there) and np.isfinite(there).all() else None

@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.arrays import Floats, Shorts
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Pixels
 
-from .homing_snapshot import EncodedHomingView, Points
+from .homing_snapshot import EncodedHomingView
 
 Colour = tuple[int, int, int]
 LOST, TRACKED, AGAIN, MATCHED = range(4)
@@ -62,7 +63,7 @@ def draw_target_view(pixels: Pixels | None, snapshot: EncodedHomingView, size: t
     return drawn
 
 
-def _features(drawn: Pixels, points: Points, kinds: npt.NDArray[np.int8]) -> None:
+def _features(drawn: Pixels, points: Floats, kinds: npt.NDArray[np.int8]) -> None:
     size = float(np.clip(drawn.shape[1] / 120, 1.8, 3.5))
     for kind in (LOST, MATCHED, AGAIN, TRACKED):
         for x, y in _finite(points[kinds == kind]):
@@ -74,14 +75,14 @@ def _features(drawn: Pixels, points: Points, kinds: npt.NDArray[np.int8]) -> Non
                 disc(drawn, (x, y), size, BRIGHT[kind])
 
 
-def _finite(points: Points) -> Points:
-    kept: Points = points[np.isfinite(points).all(axis=1)]
+def _finite(points: Floats) -> Floats:
+    kept: Floats = points[np.isfinite(points).all(axis=1)]
     return kept
 
 
-def fixed(points: npt.ArrayLike) -> npt.NDArray[np.int32]:
+def fixed(points: npt.ArrayLike) -> Shorts:
     """Points in OpenCV's fixed-point pixels."""
-    whole: npt.NDArray[np.int32] = np.round(np.asarray(points, np.float64) * 2**FINE).astype(np.int32)
+    whole: Shorts = np.round(np.asarray(points, np.float64) * 2**FINE).astype(np.int32)
     return whole
 
 
@@ -96,7 +97,7 @@ def disc(drawn: Pixels, centre: tuple[float, float], radius: float, colour: Colo
     cv2.circle(drawn, (x, y), round(radius * 2**FINE), colour, cv2.FILLED, cv2.LINE_AA, FINE)
 
 
-def arrow_head(drawn: Pixels, tip: Points, along: Points, colour: Colour, size: float) -> None:
+def arrow_head(drawn: Pixels, tip: Floats, along: Floats, colour: Colour, size: float) -> None:
     """A triangle that points along a direction."""
     length = float(np.hypot(*along))
     if length == 0.0:

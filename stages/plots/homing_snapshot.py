@@ -9,13 +9,11 @@ from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.panorama import camera_behind
 from omninav.stages.camera.thumbnail import thumbnail
-from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 
 from .snapshot_times import is_snapshot_frame
-
-Points = npt.NDArray[np.float32]
 
 COLUMNS = 480
 """Largest width of a kept image, pixels."""
@@ -34,10 +32,10 @@ class EncodedHomingView(Value):
 
     jpeg: bytes
     size: tuple[int, int]
-    points: Points
+    points: Floats
     kinds: npt.NDArray[np.int8]
-    floor_line: Points
-    target_points: Points
+    floor_line: Floats
+    target_points: Floats
     target_kinds: npt.NDArray[np.int8]
     target: str = ""
     vector: HomingVector | None = None

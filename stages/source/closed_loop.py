@@ -4,10 +4,10 @@ from dataclasses import field
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
@@ -33,9 +33,6 @@ from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
-F64 = npt.NDArray[np.float64]
-
-
 TRACK_TICKS = 2500
 """Ticks of its path that people who keep the robot company know of."""
 CARRIED_AT_S = 0.5
@@ -49,10 +46,10 @@ class ClosedLoopState(State):
     everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given.
     """
 
-    robot: F64 = field(default_factory=lambda: np.zeros(0))
-    track: F64 = field(default_factory=lambda: np.zeros((0, 4)))
-    crowd: F64 = field(default_factory=lambda: np.zeros((0, 5)))
-    odometry: F64 = field(default_factory=lambda: np.zeros(3))
+    robot: Array = field(default_factory=lambda: np.zeros(0))
+    track: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    crowd: Array = field(default_factory=lambda: np.zeros((0, 5)))
+    odometry: Array = field(default_factory=lambda: np.zeros(3))
     ticks: int = 0
     ended: int = 0
     asked: int = 0
@@ -195,7 +192,7 @@ class ClosedLoop(Source):
             tally=EpisodeStatistics(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
         )
 
-    def _look(self, ctx: Context, robot: F64, now: float, people: tuple[Person, ...]) -> Image | None:
+    def _look(self, ctx: Context, robot: Array, now: float, people: tuple[Person, ...]) -> Image | None:
         sensor, delivery = self.world.sensor, self.world.delivery
         fate, key = ctx.rng.uniform(size=2), int(ctx.rng.integers(2**62))
         if fate[0] < delivery.dropped or fate[1] < delivery.late:
@@ -219,7 +216,7 @@ class ClosedLoop(Source):
         """Who is about at the last tick that was made."""
         return self._world.crowd.visible(simulation.crowd, float(simulation.track[-1, 0]))
 
-    def _first_pose(self, world: World, rng: np.random.Generator) -> F64:
+    def _first_pose(self, world: World, rng: np.random.Generator) -> Array:
         if self.start == "drawn":
             pose, put = drawn_way_back(world, rng, self.carried_m)
             if self.carried_m:

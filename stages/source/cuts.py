@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 
-Frames = npt.NDArray[np.int64]
 Cut = tuple[int, int]
 
 
@@ -33,7 +31,7 @@ def remaining_frames(cuts: Sequence[Cut], frames: int) -> Ints:
     return np.flatnonzero(kept)
 
 
-def thinned(frames: Frames, stamps: Frames, rate_hz: float | None) -> Frames:
+def thinned(frames: Ints, stamps: Ints, rate_hz: float | None) -> Ints:
     """Of some frames the first in each period of 1 / `rate_hz` seconds, by the `stamps` (ns) of all; None: all.
 
     A tenth of a period early is on time, since clocks jitter.

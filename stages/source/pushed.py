@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Context, Source, State, Tick
 from omninav.pipeline.files import digest_text, user_path
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.problems import cut
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
 from omninav.stages.recordings.messages import is_blank
@@ -28,7 +28,6 @@ from omninav.stages.values.scan import Scan
 
 from .outputs import DriveOutputs, motion_of, pose_of
 
-Row = npt.NDArray[np.float64]
 INTERVAL_NS = 100_000_000
 """Time between images that come without a time stamp, ns."""
 MAX_STAMP_NS = 10**9 << 31
@@ -47,7 +46,7 @@ class PushedFrame(NamedTuple):
 
     image: Image
     stamp: int | None
-    rows: dict[str, Row | None]
+    rows: dict[str, Array | None]
     scan: Scan | None
     new_log: bool
 
@@ -264,7 +263,7 @@ def _refuse_masked(name: str, given: object) -> None:
         raise BadInput(f"step: {name} has masked values, expected an array without a mask; fill them, or leave it out")
 
 
-def _row(name: str, given: Sequence[float]) -> Row:
+def _row(name: str, given: Sequence[float]) -> Array:
     row = np.empty(0)
     _refuse_masked(name, given)
     with suppress(TypeError, ValueError, OverflowError, LookupError):  # no three numbers; a large array is not copied
