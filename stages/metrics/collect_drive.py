@@ -37,8 +37,6 @@ class CollectDrive(Stage):
     """Collects ticks, estimates, ground truth, odometry, matches and evidence of a whole run, a row per tick."""
 
     class Out(Outputs):
-        """`drive`: for metrics and plots."""
-
         drive: Drive
 
     def step(

@@ -50,8 +50,6 @@ class DescriptorContrast(Stage):
     """
 
     class Out(Outputs):
-        """`likeness`: of one view."""
-
         likeness: PlaceContrast | None = None
 
     def step(self, ctx: Context, similarities: Similarities, truth: Pose | None, map: ReferenceGraph) -> Out:

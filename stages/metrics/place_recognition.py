@@ -31,8 +31,6 @@ class RankReferences(Stage):
     """Ranks references by their similarity to the present image at the heading at which that is largest."""
 
     class Out(Outputs):
-        """`ranked`: the most similar references."""
-
         ranked: RankedReferences
 
     def step(self, ctx: Context, similarities: Similarities) -> Out:

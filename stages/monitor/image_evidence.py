@@ -35,8 +35,6 @@ class MeasureEvidence(Stage):
     """
 
     class Out(Outputs):
-        """The evidence of one image."""
-
         evidence: ImageEvidence
 
     def step(

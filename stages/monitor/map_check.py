@@ -41,8 +41,6 @@ class CheckMap(Stage):
     """
 
     class Out(Outputs):
-        """What was found."""
-
         conflicts: Conflicts
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:

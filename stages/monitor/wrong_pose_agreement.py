@@ -37,8 +37,6 @@ class LearnWrongPoseAgreement(Stage):
     """Tolerance in heading, as the monitor's."""
 
     class Out(Outputs):
-        """How often a wrong estimate looks right."""
-
         when_wrong: WrongPoseAgreement
 
     def step(self, ctx: Context, map: ReferenceGraph, length_scale: LengthScale) -> Out:

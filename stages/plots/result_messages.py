@@ -40,8 +40,6 @@ class ResultMessages(Stage):
     """Topics of `result.mcap` of which messages are made."""
 
     class Out(Outputs):
-        """`messages`: of this tick."""
-
         messages: RosMessages
 
     def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> Out:

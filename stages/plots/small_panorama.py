@@ -19,8 +19,6 @@ class SmallPanorama(Stage):
     """Largest width (px); some 10 kB an image at 360; 0: none are kept."""
 
     class Out(Outputs):
-        """`panorama`: encoded."""
-
         panorama: EncodedPanorama | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:

@@ -59,8 +59,6 @@ class CollectThumbnails(Stage):
     """Collects the thumbnails of all references of a map, to be saved in a file of their own."""
 
     class Out(Outputs):
-        """A thumbnail per reference of the map."""
-
         thumbnails: Thumbnails
 
     def step(self, ctx: Context, snapshots: Sequence[ReferenceThumbnails]) -> Out:
@@ -74,8 +72,6 @@ class TourSnapshot(Stage):
     """
 
     class Out(Outputs):
-        """One thumbnail."""
-
         snapshots: ReferenceThumbnails
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
@@ -87,8 +83,6 @@ class ViewThumbnails(Stage):
     """Collects the thumbnails of a topological map's views; those of a `known` map's views are missing."""
 
     class Out(Outputs):
-        """A thumbnail per view of the map."""
-
         thumbnails: Thumbnails
 
     def step(
