@@ -236,10 +236,6 @@ def median(values: Array) -> float:
 
 def without_short(flags: Bools, least: int) -> Bools:
     """Bools (N,), those taken away of which fewer than `least` follow each other."""
-    kept, row = flags.copy(), 0
-    for flag, group in groupby(flags.tolist()):
-        length = len(list(group))
-        if flag and length < least:
-            kept[row : row + length] = False
-        row += length
-    return kept
+    from scipy.ndimage import binary_opening  # type: ignore[attr-defined]
+
+    return np.asarray(binary_opening(flags, np.ones(least)))
