@@ -23,31 +23,27 @@ class ListData(Tool):
         broken: dict[str, BadInput] = {}
         for name, path in known_layouts(self.layout_folders).items():
             try:
-                about = read_description(path, self.layout_folders).about
+                described = read_description(path, self.layout_folders).about
             except BadInput as error:
                 broken[name] = error
             else:
-                if about is not None:
-                    known[name] = about
+                if described is not None:
+                    known[name] = described
         if not self.name:
             lines = [f"{name:<16} {about.what}\n{'':<16} {about.site}" for name, about in known.items()]
             print("\n".join([*lines, *(f"{name:<16} {error}" for name, error in broken.items())]))
         elif self.name in broken:
             raise broken[self.name]
         elif self.name in known:
-            print("\n".join(f"{name:<10} {value}" for name, value in facts(known[self.name])))
+            about = known[self.name]
+            facts = {
+                "what": about.what,
+                "from": about.site,
+                "run": f"omninav {about.run}",
+                "published": about.published,
+            }
+            print("\n".join(f"{name:<10} {value}" for name, value in facts.items() if value))
         else:
             near = nearest(self.name, known)
             hint = f"did you mean '{near}'?" if near else f"there are {', '.join(known)}"
             raise BadInput(f"name={self.name:.60}: no such data set; {hint}")
-
-
-def facts(about: DataSet) -> list[tuple[str, str]]:
-    """Facts about a data set, by name."""
-    found = [
-        ("what", about.what),
-        ("from", about.site),
-        ("run", f"omninav {about.run}"),
-        ("published", about.published),
-    ]
-    return [(name, value) for name, value in found if value]
