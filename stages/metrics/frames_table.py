@@ -22,28 +22,8 @@ PLANE = (("xx", 0, 0), ("xy", 0, 1), ("xh", 0, 2), ("yy", 1, 1), ("yh", 1, 2), (
 class FramesTable(Stage):
     """Writes `frames.csv` and `frames.parquet`: a row for every frame, with estimate, truth, odometry and best match.
 
-    Poses are in metres and radians in the map frame. What there is none of is an empty cell.
-
-    | column | meaning |
-    |---|---|
-    | `log`, `frame` | number of the log, and of the frame within it, from 0 |
-    | `stamp_ns`, `time_s` | the image's header stamp (ns), and the time since the log's first frame (s) |
-    | `estimate_x`, `_y`, `_heading` | the belief's heaviest mode |
-    | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance, where one is stated (m², m rad, rad²) |
-    | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
-    | `confident` | 1 where the estimate is confident (see `Confidence`), else 0 |
-    | `confidence` | probability that the estimate is right (see `ConfidenceMonitor`), where a monitor tells it |
-    | `state` | `searching`, `tracking`, `lost` or `blind`, by that confidence (see `TrackingState`) |
-    | `mean_x`, `_y`, `_heading` | the mean of the whole belief |
-    | `truth_x`, `_y`, `_heading` | the ground truth |
-    | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
-    | `motion_x`, `_y`, `_turn` | odometry's motion since the frame before, in the robot's frame |
-    | `odometry_x`, `_y`, `_heading` | odometry alone, from the first true pose on, or through the last estimate |
-    | `reference` | number of the map's reference, view or place that looked most like the image |
-    | `similarity`, `visual_distance` | how much: 1 and 0 are equal; which of them, depends on the comparison |
-    | `reference_turn` | how far the robot stood turned against it (rad, counter-clockwise) |
-    | `place` | the most probable place of a topological map |
-    | `nearest_m` … `correlation`, `conflict` | what the image says of the estimate (see `ImageEvidence`) |
+    Poses are in metres and radians in the map frame. What there is none of is an empty cell. `runs/README.md` says what
+    the columns are.
     """
 
     def step(self, ctx: Context, drive: Drive) -> None:
