@@ -14,7 +14,7 @@ from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.files import user_path, write_whole
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.map_files.point_cloud import ply
-from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved
+from omninav.stages.map_files.saved import SavedMap, read_saved
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.maps import ReferenceGraph
@@ -52,11 +52,13 @@ class ExportMap(Tool):
             return self._export_points(source)
         folder = self._folder()
         file, thumbnails = self._thumbnails(source)
-        if self.field_deg is not None and not _has_panoramas(source.map):
+        map = source.map
+        panoramas = isinstance(map, ReferenceGraph) and map.features.shape[1] > 1
+        if self.field_deg is not None and not panoramas:
             raise BadInput(f"field_deg={self.field_deg:g}: the images of {source.path} are no panoramas; leave it out")
-        poses, order = _in_order(source.map)
+        order = np.arange(len(map)) if isinstance(map, ReferenceGraph) else np.argsort(map.frames, kind="stable")
         there = order[np.diff(thumbnails.ends)[order] > 0]
-        kept = there[spaced(poses[there], self.spacing)]
+        kept = there[spaced(map.poses[there], self.spacing)]
         if not len(kept):
             raise BadInput(f"{source.path}: it has no image to write")
         part = folder.with_name(f"{folder.name}.{os.getpid()}.part")
@@ -120,14 +122,3 @@ def spaced(poses: Array, spacing: float) -> Ints:
         if not kept or math.dist(poses[kept[-1], :2], (x, y)) >= spacing:
             kept.append(row)
     return np.array(kept, np.int64)
-
-
-def _has_panoramas(map: MapOfPlaces) -> bool:
-    return isinstance(map, ReferenceGraph) and map.features.shape[1] > 1
-
-
-def _in_order(map: MapOfPlaces) -> tuple[Array, Ints]:
-    """Poses of views, and their rows in the order of the tour."""
-    if isinstance(map, ReferenceGraph):
-        return map.poses, np.arange(len(map))
-    return map.poses, np.argsort(map.frames, kind="stable")
