@@ -29,17 +29,6 @@ APART_M = 0.3
 """Distance below which two images are not compared, metres: a map that was not tracked so far has no tracks."""
 
 
-class Span(NamedTuple):
-    """A local map: the ticks in which it was made and first tracked, and the last in which it was tracked.
-
-    Both are None for a map that was lost at once.
-    """
-
-    made: int
-    first: int | None
-    last: int | None
-
-
 class Judged(NamedTuple):
     """Pairs of bearings of two images taken `metres` apart, one for each feature of a map.
 
@@ -83,16 +72,15 @@ class MatchedAndTracked(MetricStage):
         if not len(poses) or not known(poses).all():
             return self.Out()
         matched, tracked = [], []
-        for span in spans(maps, tracks):
-            made, target = maps[span.made], targets[span.made]
-            seen, pairs = features[span.made], correspondences[span.made]
-            home = between(poses[span.made], poses[0])
+        for begun, ticks in spans(maps, tracks):
+            made, target, seen, pairs = maps[begun], targets[begun], features[begun], correspondences[begun]
+            home = between(poses[begun], poses[0])
             if made is None or target is None or seen is None or pairs is None or metres(home) < APART_M:
                 continue
             partner = dict(zip(pairs.second.tolist(), pairs.first.tolist(), strict=True))
             here = seen.point_bearings()[[partner[row] for row in made.rows.tolist()]]
             matched.append(self._judged(here, target.features.point_bearings()[made.rows], home))
-            tracked.append(self._tracked(span, poses, maps, tracks, len(made)))
+            tracked.append(self._tracked(begun, ticks, poses, maps, tracks, len(made)))
         if not matched:
             return self.Out()
         right, still = sum(int(each.right.sum()) for each in matched), sum(int(each.right.sum()) for each in tracked)
@@ -109,17 +97,18 @@ class MatchedAndTracked(MetricStage):
 
     def _tracked(
         self,
-        span: Span,
+        begun: int,
+        ticks: Sequence[int],
         poses: Array,
         maps: Sequence[LocalMap | None],
         tracks: Sequence[TrackedFeatures | None],
         number: int,
     ) -> Judged:
         none = Judged(math.nan, np.full(number, np.nan), np.zeros(number, np.bool_))
-        if span.first is None or span.last is None:
+        if not ticks:
             return none
-        start, end, last = tracks[span.first], tracks[span.last], maps[span.last]
-        moved = between(poses[span.made], poses[span.last])
+        start, end, last = tracks[ticks[0]], tracks[ticks[-1]], maps[ticks[-1]]
+        moved = between(poses[begun], poses[ticks[-1]])
         if start is None or end is None or last is None or metres(moved) < APART_M:
             return none
         # The tracker lays each place along the bearing of the point that it tracks, in the image the map was made in.
@@ -139,17 +128,19 @@ class MatchedAndTracked(MetricStage):
         return Judged(metres(moved), angles, right)
 
 
-def spans(maps: Sequence[LocalMap | None], tracks: Sequence[TrackedFeatures | None]) -> Iterator[Span]:
-    """Every local map that was made, in their order."""
+def spans(maps: Sequence[LocalMap | None], tracks: Sequence[TrackedFeatures | None]) -> Iterator[tuple[int, list[int]]]:
+    """Every local map that was made, in their order: the tick in which it was, and those in which it was tracked."""
     made = {each.number: k for k, each in enumerate(maps) if each is not None and each.state == "new"}
     for number, begun in made.items():
-        ticks = [
-            k
-            for k, (each, track) in enumerate(zip(maps, tracks, strict=True))
-            if each is not None and each.number == number and each.state == "tracking"
-            if track is not None and track.number == number
-        ]
-        yield Span(begun, ticks[0] if ticks else None, ticks[-1] if ticks else None)
+        yield (
+            begun,
+            [
+                k
+                for k, (each, track) in enumerate(zip(maps, tracks, strict=True))
+                if each is not None and each.number == number and each.state == "tracking"
+                if track is not None and track.number == number
+            ],
+        )
 
 
 def metres(motion: Array) -> float:
