@@ -32,9 +32,6 @@ def serve_amcl(transport: Transport, node: str, initial_pose: str | None) -> Non
     """
     state = ACTIVE
 
-    def update(_: bytes) -> bytes:
-        return NOTHING  # every image is an update, in motion or not
-
     def set_pose(request: bytes) -> bytes:
         assert initial_pose is not None
         # The request is that message.
@@ -51,7 +48,8 @@ def serve_amcl(transport: Transport, node: str, initial_pose: str | None) -> Non
         state = STATE_AFTER.get(transition, state)
         return encode_message("std_msgs/msg/Bool", {"data": known})
 
-    _serve(transport, "/request_nomotion_update", "std_srvs/srv/Empty", update)
+    # Every image is an update, in motion or not.
+    _serve(transport, "/request_nomotion_update", "std_srvs/srv/Empty", lambda _: NOTHING)
     if initial_pose is not None:
         _serve(transport, "/set_initial_pose", "nav2_msgs/srv/SetInitialPose", set_pose)
     _serve(transport, f"/{node}/get_state", "lifecycle_msgs/srv/GetState", get_state)

@@ -123,7 +123,8 @@ class InputConflicts(Stage):
         if sentence := leap(recent, ctx.tick, odometry):
             self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)
-        if strip is not None and is_known(recent.pose) and self._due(ctx, recent):
+        is_due = not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
+        if strip is not None and is_known(recent.pose) and is_due:
             # nothing is compared with a map that is wrong by itself
             metres = math.inf if length_scale is None or of_map else length_scale.metres
             remember(recent, ctx.tick.stamp, strip.pixels)
@@ -140,9 +141,6 @@ class InputConflicts(Stage):
         standing = of_map + tuple([recent.found[kind] for kind in kinds])
         misleading = bool(of_map) or not recent.standing.keys() <= HARMLESS
         return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), standing, misleading))
-
-    def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
-        return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
 
     def _judge(self, ctx: Context, recent: InputConflictsState, length_scale_m: float) -> None:
         kind, sentence = judge(Watched(recent.rows), length_scale_m)

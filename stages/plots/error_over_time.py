@@ -6,7 +6,7 @@ import numpy as np
 
 from omninav.pipeline import Context, FigureStage
 from omninav.pipeline.graph.problems import counted
-from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
+from omninav.pipeline.report.chart import Chart, stacked
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive
@@ -65,9 +65,9 @@ def _draw(logs: Sequence[Drive]) -> bytes:
         for drive, begin, estimate, alone in lines:
             seconds = drive.seconds + begin
             if alone is not None:
-                _line(chart.base, seconds, np.clip(alone, low, None), "orange", dashed=True)
+                chart.base.line(np.column_stack([seconds, np.clip(alone, low, None)]), "orange", 1.6, dashed=True)
                 chart.name("odometry alone", "orange", "dashes")
-            _line(chart.base, seconds, np.clip(estimate, low, None), "blue")
+            chart.base.line(np.column_stack([seconds, np.clip(estimate, low, None)]), "blue", 1.6)
             chart.name("estimate", "blue")
             settled = _settled(drive)
             if settled is not None:
@@ -78,10 +78,6 @@ def _draw(logs: Sequence[Drive]) -> bytes:
         charts.append(chart)
     charts[0].unnamed()
     return stacked(charts)
-
-
-def _line(layer: Layer, seconds: Array, errors: Array, colour: Colour, dashed: bool = False) -> None:
-    layer.line(np.column_stack([seconds, errors]), colour, 1.6, dashed)
 
 
 def _settled(drive: Drive) -> int | None:
