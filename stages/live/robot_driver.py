@@ -128,9 +128,9 @@ class RobotDriver(Stage):
         self._wait(ctx, robot, seconds, tick.stamp)
         leaps = sum(jump.by for jump in self.clock_jumps if jump.at <= seconds)
         stamp = tick.stamp + self._offset + round(leaps * 1e9)
-        self._publish(robot, tick.stamp, stamp - tick.stamp, camera, odometry, motion, scan)
+        self._publish(robot, tick.stamp, stamp - tick.stamp, odometry, motion, scan)
         if image is not None and not any(stop.at <= seconds < stop.at + stop.seconds for stop in self.camera_stops):
-            self._publish_image(stamp, camera, image)
+            self._publish_image(stamp, image)
         self._note(ctx, seconds)
         robot.stamp, robot.odometry = tick.stamp, np.array([odometry.x, odometry.y, odometry.heading])
         self._wait(ctx, robot, seconds + period - 1.5 * self._worked, tick.stamp)
@@ -180,14 +180,7 @@ class RobotDriver(Stage):
                 return
 
     def _publish(
-        self,
-        robot: RobotDriverState,
-        now: int,
-        shift: int,
-        camera: Camera,
-        odometry: Pose,
-        motion: Motion | None,
-        scan: Scan | None,
+        self, robot: RobotDriverState, now: int, shift: int, odometry: Pose, motion: Motion | None, scan: Scan | None
     ) -> None:
         stamp = now + shift
         clock = {"sec": stamp // 10**9, "nanosec": stamp % 10**9}
@@ -218,7 +211,7 @@ class RobotDriver(Stage):
         for share, row in zip(shares.tolist(), poses, strict=True):
             yield now - round((1.0 - share) * (now - robot.stamp)) if steps > 1 else now, row
 
-    def _publish_image(self, stamp: int, camera: Camera, image: Image) -> None:
+    def _publish_image(self, stamp: int, image: Image) -> None:
         _, packed = cv2.imencode(".jpg", image.pixels, [cv2.IMWRITE_JPEG_QUALITY, 90])
         self._send("/camera/camera_info", "sensor_msgs/msg/CameraInfo", self._info | {"header": header(stamp, CAMERA)})
         fields = {"header": header(stamp, CAMERA), "format": "jpeg", "data": packed.ravel()}
