@@ -78,7 +78,7 @@ class FrameByFrame(FigureStage):
     ) -> FigureStage.Out:
         ticks = first_seen(events or ())
         last = drive.last_log
-        shown = {frame for frame in even_frames(int(last.frames[-1]) + 1)} if len(last) else set()
+        shown = even_frames(int(last.frames[-1]) + 1) if len(last) else ()
         rows = [n for n, frame in enumerate(last.frames.tolist()) if frame in shown]
         if not rows:
             return self.Out()
