@@ -38,12 +38,7 @@ class PlaybackState(Reckoned):
 
 
 class Playback(Source, ABC):
-    """Plays recordings one after another, wherever they come from.
-
-    There is a tick for every image that can be used. Poses are metres and radians; stamps are header stamps. `motion`
-    is the SE(2) increment of the odometry between the images' own times, absent at the first image of each recording;
-    where images are left out it spans the gap.
-    """
+    """Plays recordings one after another, wherever they come from; `LogSource` says what it gives."""
 
     limits: MotionLimits = MotionLimits()
     """Limits of the robot: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
