@@ -5,7 +5,6 @@ from made_beliefs import along_x, even
 from omninav.pipeline import Context
 from omninav.stages.fusion.auxiliary import auxiliary_filter
 from omninav.stages.fusion.conditional_resampling import ConditionalResampling
-from omninav.stages.geometry.plane.odometry_motion import move_poses
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 
@@ -41,21 +40,6 @@ def test_its_mean_and_variance_are_those_of_the_exact_filter() -> None:
     mean = float(out.weights @ out.poses[:, 0])
     assert mean == pytest.approx((1 / 0.13 + 1.4 / 0.09) / precision, abs=0.005)
     assert float(out.weights @ (out.poses[:, 0] - mean) ** 2) == pytest.approx(1 / precision, rel=0.03)
-
-
-def test_as_an_option_it_gives_the_belief_of_importance_sampling_up_to_chance() -> None:
-    before = known(50_000)
-    rng = np.random.default_rng(2)
-    particles = Particles(
-        move_poses(before.poses, AHEAD.steps, AHEAD.sigmas, rng.standard_normal((3, 50_000))), before.weights
-    )
-    beliefs = [
-        ConditionalResampling(sampling=sampling).step(Context("fusion"), particles, at(1.4, 0.3), before, AHEAD).belief
-        for sampling in ("importance", "auxiliary")
-    ]
-    means = [float(belief.weights @ belief.poses[:, 0]) for belief in beliefs]
-    assert means[0] == pytest.approx(means[1], abs=0.01)
-    assert not np.array_equal(beliefs[0].weights, beliefs[1].weights)
 
 
 def test_particles_are_selected_by_their_predicted_poses() -> None:

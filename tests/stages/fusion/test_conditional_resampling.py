@@ -35,13 +35,6 @@ def test_where_map_and_belief_agree_the_belief_becomes_their_product() -> None:
     assert np.allclose(out.weights, 1 / 20_000)
 
 
-def test_where_they_do_not_a_fifth_of_the_weight_goes_to_what_the_map_says() -> None:
-    out = fuse(around(0.0), at(9.0))
-    assert len(out.poses) == 2000
-    assert out.weights[out.poses[:, 0] > 5.0].sum() == pytest.approx(0.2)
-    assert out.weights.sum() == pytest.approx(1.0)
-
-
 def test_new_hypotheses_are_drawn_by_their_weight() -> None:
     out = fuse(around(0.0, 20_000), at(9.0, 20.0, weights=(0.25, 0.75)))
     far = out.poses[:, 0] > 15.0
@@ -62,30 +55,6 @@ def test_without_anything_near_in_the_map_the_belief_stays_as_it_is() -> None:
     particles = around(0.0)
     assert fuse(particles, None) is particles
     assert fuse(particles, at()) is particles
-
-
-def kidnapped(**options: Any) -> list[float]:
-    """Share of the weight at B, tick by tick, when the robot is carried there from A and the map knows both."""
-    ctx, stage, belief = Context("fusion", np.random.default_rng(3)), ConditionalResampling(**options), around(0.0)
-    shares = []
-    for _ in range(10):
-        belief = stage.step(ctx, belief, at(9.0)).belief
-        belief = Particles(belief.poses + np.random.default_rng(4).normal(0.0, 0.02, (2000, 3)), belief.weights)
-        shares.append(float(belief.weights[belief.poses[:, 0] > 5.0].sum()))
-    return shares
-
-
-def test_a_kidnapped_robot_is_found_again_and_with_an_outlier_probability_one_look_alike_is_outlived() -> None:
-    # The second picture agrees with the fifth that went there, and takes all, unless a share of views may be strays.
-    assert kidnapped()[:2] == pytest.approx([0.2, 1.0])
-    careful = kidnapped(outlier_probability=0.2)
-    assert 0.5 < careful[1] < 0.95
-    assert careful[-1] > 0.99
-
-
-def test_equal_seeds_give_equal_beliefs() -> None:
-    one, other = fuse(around(0.0), at(9.0)), fuse(around(0.0), at(9.0))
-    assert np.array_equal(one.poses, other.poses)
 
 
 def test_agreement_is_the_mean_density_by_the_particles_weights() -> None:

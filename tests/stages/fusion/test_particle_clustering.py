@@ -28,11 +28,6 @@ def test_two_clouds_become_two_gaussians_with_their_weights() -> None:
     assert np.sqrt(np.diagonal(state.covariances, axis1=1, axis2=2)) == pytest.approx(0.1, rel=0.15)
 
 
-def test_one_place_in_two_headings_is_two_hypotheses() -> None:
-    poses = np.concatenate([cloud((0, 0, 0), 0.1, 500), cloud((0, 0, np.pi), 0.1, 500, 1)])
-    assert len(gather(poses)) == 2
-
-
 def test_a_cloud_across_half_a_turn_is_one_and_keeps_its_mean() -> None:
     poses = cloud((1, 2, np.pi), 0.1, 500)
     poses[:, 2] = np.mod(poses[:, 2] + np.pi, 2 * np.pi) - np.pi

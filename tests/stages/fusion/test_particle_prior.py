@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from made_references import references
+from made_ticks import at_tick
 
-from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Particles
@@ -18,9 +18,7 @@ TRUTH = Pose(3.0, 4.0, 3.1)
 
 
 def begun(stage: ParticlePrior, first: bool = True, **ports: object) -> Particles | None:
-    ctx = Context("start", np.random.default_rng(0))
-    ctx.tick = Tick(7, 7, first_of_log=first)
-    return stage.step(ctx, ports.pop("map", MAP), ports.pop("truth", TRUTH), **ports).belief
+    return stage.step(at_tick(7, first), ports.pop("map", MAP), ports.pop("truth", TRUTH), **ports).belief
 
 
 @pytest.mark.parametrize(("scale", "reach"), [(None, 1.5), (LengthScale(0.2), 0.6)])
@@ -92,7 +90,6 @@ def test_a_belief_begins_again_where_somebody_asks_for_it() -> None:
     ("source", "at", "warned"), [("odometry", "truth", 1), ("truth", "truth", 0), ("odometry", "origin", 0)]
 )
 def test_a_true_start_in_a_map_of_odometry_is_warned_of(source: str, at: str, warned: int) -> None:
-    ctx = Context("start", np.random.default_rng(0))
-    ctx.tick = Tick(0, 0, first_of_log=True)
+    ctx = at_tick(first=True)
     ParticlePrior(at=at).step(ctx, references([[5.0, 5.0, 0.0]], source=source), TRUTH)
     assert len(ctx.warnings) == warned

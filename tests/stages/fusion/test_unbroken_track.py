@@ -154,11 +154,6 @@ def test_without_recovery_particles_the_others_share_the_weight():
     assert without_recovery(lost) is lost  # it is all that is left
 
 
-def test_the_track_is_confirmed_for_twenty_length_scales_at_most():
-    out = driven(twin_from=18, scale=0.05)
-    assert sum(each.fix is None for each in out) == pytest.approx(3, abs=1)
-
-
 def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_as_without_it():
     pose, poses = np.zeros(3), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
     rivals = replace(fix_at(pose), poses=poses[::-1], inliers=np.array([40, 30]), probabilities=np.array([0.9, 0.08]))

@@ -36,11 +36,6 @@ def test_random_samples_replace_as_many_resampled_ones_and_weigh_alike():
     assert len(np.unique(out.poses[fresh, 0])) == 50
 
 
-def test_the_same_seed_gives_the_same_samples():
-    one, other = (fused(5000, anywhere(), np.linspace(0, 1, 5000)) for _ in range(2))
-    assert np.array_equal(one.poses, other.poses)
-
-
 def test_proposals_are_drawn_by_their_weights():
     two = Particles(np.array([[60.0, 0, 0], [70.0, 0, 0]]), np.array([0.1, 0.9]))
     out = fused(5000, two)

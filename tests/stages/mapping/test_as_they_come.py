@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from made_beliefs import along_x
 from made_references import references
+from made_ticks import at_tick
 from made_view_maps import view
 from made_views import NO_FEATURES, between_looks, made_hypotheses, made_views
 from made_words import features_of
@@ -38,27 +39,16 @@ from omninav.stages.values.views import NoveltyThreshold
 CTX = Context("mapping")
 
 
-def context(tick: int = 0, first: bool = False) -> Context:
-    ctx = Context("mapping")
-    ctx.tick = Tick(tick, tick * 10**9, 0, tick, first)
-    return ctx
-
-
 def test_a_threshold_is_half_the_median_of_the_first_hundred_views_twenty_apart() -> None:
     looks = np.random.default_rng(0).uniform(0.0, 100.0, 130).astype(np.float32).astype(np.float64)
-    state, found = CalibratedThresholdState(), []
-    for look in looks:
-        found.append(CalibratedThreshold().step(CTX, view(look), Motion(0.0101, 0.0, 0.0), state).threshold)
-    for seen in (21, 60, 100, 130):
-        some = looks[: min(seen, 100)]
-        later, earlier = np.nonzero(np.subtract.outer(np.arange(len(some)), np.arange(len(some))) >= 20)
-        threshold = found[seen - 1]
-        assert threshold is not None
-        assert threshold.distance == pytest.approx(0.5 * np.median(np.abs(some[later] - some[earlier])), rel=1e-6)
-        assert threshold.settled == (seen >= 100)
+    state, stage, step = CalibratedThresholdState(), CalibratedThreshold(), Motion(0.0101, 0.0, 0.0)
+    found = [stage.step(CTX, view(look), step, state).threshold for look in looks]
     assert found[19] is None
-    assert found[98] is not None
-    assert not found[98].settled
+    for seen in (21, 99, 100, 130):
+        gaps, threshold = between_looks(looks[: min(seen, 100)]), found[seen - 1]
+        assert threshold is not None
+        assert threshold.distance == pytest.approx(0.5 * np.median(gaps[np.tril_indices(len(gaps), -20)]), rel=1e-6)
+        assert threshold.settled == (seen >= 100)
     standing = CalibratedThresholdState()
     for _ in range(3):
         CalibratedThreshold().step(CTX, view(1.0), Motion(0.0049, 0.0, 0.0), standing)
@@ -69,11 +59,11 @@ def test_a_view_is_learned_after_four_metres_and_at_most_500_wait() -> None:
     stage, queue, given = DelayedByDistance(), DelayedByDistanceState(), []
     for tick in range(12):
         model = UncertainMotion((0.0, 0.5, 0.0), (0.0, 0.0, 0.0)) if tick else None
-        given.append([u.index for u in stage.step(context(tick), view(0.0), along_x(0.0), model, queue).updates.items])
+        given.append([u.index for u in stage.step(at_tick(tick), view(0.0), along_x(0.0), model, queue).updates.items])
     assert given == [[]] * 8 + [[0], [1], [2], [3]]
     standing = DelayedByDistanceState()
     for tick in range(502):
-        stage.step(context(tick), view(0.0), along_x(0.0), None, standing)
+        stage.step(at_tick(tick), view(0.0), along_x(0.0), None, standing)
     assert len(standing.waiting) == 500
 
 
@@ -81,7 +71,7 @@ def test_a_queue_of_unimodal_states_is_twenty_ticks_long() -> None:
     # Gross, Koenig & Mueller 2005, section 2.1.
     stage, pending, given = UnimodalQueue(), UnimodalQueueState(), []
     for tick in range(23):
-        given.append([u.index for u in stage.step(context(tick), view(0.0), along_x(0.0), None, pending).updates.items])
+        given.append([u.index for u in stage.step(at_tick(tick), view(0.0), along_x(0.0), None, pending).updates.items])
     assert given == [[]] * 20 + [[0], [1], [2]]
 
 
@@ -91,7 +81,7 @@ def test_a_state_is_unimodal_where_more_than_half_is_at_its_heaviest_component(
 ) -> None:
     state = along_x(0.0, (2 * squared) ** 0.5 * 0.1, weights=(share, 1.0 - share))
     pending = UnimodalQueueState()
-    UnimodalQueue().step(context(), view(0.0), state, None, pending)
+    UnimodalQueue().step(at_tick(), view(0.0), state, None, pending)
     assert (pending.last is not None) == one
 
 
@@ -102,7 +92,7 @@ def test_odometry_explains_a_state_up_to_999_of_1000_drives(missed: float, expla
     still = UncertainMotion((0.0, 0.5, 0.0), (1e-9, 0.1 * 0.5**0.5, 1e-9))
     end = along_x(1.0 + (missed * 0.03) ** 0.5)
     for tick, state in enumerate((along_x(0.0), along_x(0.0, 9.0), end)):
-        out = stage.step(context(tick), view(0.0), state, still if tick else None, pending)
+        out = stage.step(at_tick(tick), view(0.0), state, still if tick else None, pending)
     assert [update.index for update in out.updates.items] == ([1, 2] if explained else [2])
 
 
@@ -150,7 +140,7 @@ def ring(share: float) -> SegmentHistograms:
 def test_references_are_apart_or_unlike_those_around_them(drive: list[tuple[float, float]], kept: int) -> None:
     map, state = ReferenceGraph.empty(), LearnReferenceGraphState()
     for tick, (x, share) in enumerate(drive):
-        LearnReferenceGraph().step(context(tick, not tick), ring(share), None, Pose(x, 0.0, 0.0), map, state)
+        LearnReferenceGraph().step(at_tick(tick, not tick), ring(share), None, Pose(x, 0.0, 0.0), map, state)
     assert len(map) == kept
 
 
@@ -159,7 +149,7 @@ def test_views_of_a_drive_are_kept_a_centimetre_apart(step: float, kept: int) ->
     sessions: Sessions | None = None
     for tick in range(2):
         motion = Motion(step, 0.0, 0.0) if tick else None
-        sessions = KeyframeHistory().step(context(tick, not tick), view(0.0), motion, along_x(0.0), sessions).sessions
+        sessions = KeyframeHistory().step(at_tick(tick, not tick), view(0.0), motion, along_x(0.0), sessions).sessions
     assert sessions is not None
     assert len(sessions) == kept
 
@@ -200,21 +190,6 @@ def test_a_vocabulary_has_at_most_2048_words() -> None:
     looks = np.random.default_rng(0).integers(0, 256, (2100, 128)).astype(np.uint8)
     words = LearnVisualWords().step(CTX, [features_of(looks)], [ReferenceEvent(0, "first")]).words
     assert len(words.centres) == 2048
-
-
-def compared(seconds: list[float], colours: list[float]) -> list[list[bool]]:
-    """Of images at these times with one colour each: which have anything in common."""
-    ticks = [Tick(n, round(s * 1e9), 0, n, not n) for n, s in enumerate(seconds)]
-    looks = features_of(np.random.default_rng(0).integers(0, 256, (8, 128)).astype(np.uint8))
-    grey = [GlobalDescriptor(np.array([c, 0.0, 0.0], np.float32)) for c in colours]
-    found = ViewComparison().step(CTX, ticks, [looks] * len(seconds), grey, odometry=[]).views
-    return np.isfinite(found.distances).tolist()
-
-
-def test_views_are_a_second_apart_and_compared_up_to_half_in_colours_by_eight_matches() -> None:
-    assert len(compared([0.0, 0.89, 0.91], [0.0] * 3)) == 2
-    assert compared([0.0, 1.0], [0.0, 0.49])[0][1]
-    assert not compared([0.0, 1.0], [0.0, 0.51])[0][1]
 
 
 def test_views_are_compared_by_the_numbers_of_the_system() -> None:

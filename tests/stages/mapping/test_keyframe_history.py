@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from made_ticks import at_tick
 from made_view_maps import learned, view
 
-from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.keyframe_history import KeyframeHistory
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
@@ -29,10 +29,8 @@ def keep(
     known: ViewMixtures | None = None,
     stage: KeyframeHistory | None = None,
 ) -> Sessions:
-    ctx = Context("sessions")
-    ctx.tick = Tick(tick, tick, first_of_log=first)
     state = believed(1.0) if state is None else state
-    kept = (stage or KeyframeHistory()).step(ctx, view(tick), motion, state, sessions, known).sessions
+    kept = (stage or KeyframeHistory()).step(at_tick(tick, first), view(tick), motion, state, sessions, known).sessions
     assert kept is not None
     return kept
 
@@ -94,8 +92,7 @@ def test_drives_of_a_known_map_come_first_and_are_of_no_tick() -> None:
 
 def test_a_known_map_without_drives_keeps_none_so_that_it_is_not_forgotten() -> None:
     known = learned(1.0)
-    ctx = Context("sessions")
-    ctx.tick = Tick(2, 2, first_of_log=True)
+    ctx = at_tick(2, first=True)
     out = KeyframeHistory().step(ctx, view(2), None, believed(1.0), None, known)
     assert out.sessions is None
     assert ctx.facts["map_straightened"] == "no: the map it continued was saved without its drives"

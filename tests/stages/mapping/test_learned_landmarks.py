@@ -58,10 +58,12 @@ def test_next_to_nothing_agrees_in_the_images_of_a_mirrored_camera() -> None:
     assert len(found.seen) < 0.1 * len(mapped_room().landmarks.seen)
 
 
-def test_images_without_features_give_a_map_without_landmarks() -> None:
-    landmarks = with_landmarks(graph_of(tour_poses()[:3]), [NOTHING, None, NOTHING]).landmarks
-    assert (len(landmarks), landmarks.references) == (0, 3)
-    assert landmarks.seen_by(np.array([0, 1, 2])).shape == (0,)
+def test_images_without_features_one_reference_or_none_give_a_map_without_landmarks() -> None:
+    poses = tour_poses()[:3]
+    for number, features in ((3, [NOTHING, None, NOTHING]), (1, seen_along(poses[:1])), (0, [])):
+        landmarks = with_landmarks(graph_of(poses[:number]), features).landmarks
+        assert (len(landmarks), landmarks.references) == (0, number)
+        assert landmarks.seen_by(np.arange(number)).shape == (0,)
 
 
 def test_a_black_image_among_others_sees_nothing() -> None:
@@ -70,13 +72,6 @@ def test_a_black_image_among_others_sees_nothing() -> None:
     features[3] = NOTHING
     landmarks = with_landmarks(graph_of(poses), features).landmarks
     assert [bool(len(landmarks.seen_by(np.array([n])))) for n in range(10)] == [n != 3 for n in range(10)]
-
-
-def test_one_reference_or_none_sees_no_landmark() -> None:
-    for number in (0, 1):
-        poses = tour_poses()[:number]
-        landmarks = with_landmarks(graph_of(poses), seen_along(poses)).landmarks
-        assert (len(landmarks), landmarks.references) == (0, number)
 
 
 def learned(poses: np.ndarray, source: str, features: list, **more):

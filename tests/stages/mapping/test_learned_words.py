@@ -24,23 +24,11 @@ def test_a_view_is_most_similar_to_the_references_around_it_whatever_its_heading
         assert abs(words.similarities(turned.descriptors).argmax() - n / 2) <= 2
 
 
-def test_a_reference_is_itself() -> None:
-    views = seen_along(20)
-    words = learned(views, words=300)
-    assert words.similarities(views[7].descriptors)[7] == pytest.approx(1.0, abs=1e-5)
-
-
 def test_only_images_that_became_references_have_words() -> None:
     views = seen_along(12)
     some = learned(views, [n % 3 == 0 for n in range(12)], words=100)
     assert len(some) == 4
     assert int(np.argmax(some.similarities(views[9].descriptors))) == 3
-
-
-def test_the_same_tour_gives_the_same_words() -> None:
-    one, other = learned(seen_along(10), words=64), learned(seen_along(10), words=64)
-    for name in ("centres", "rarity", "starts", "words", "weights"):
-        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
 
 
 def test_a_map_of_black_images_has_no_words_and_resembles_nothing() -> None:

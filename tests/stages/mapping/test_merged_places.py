@@ -54,28 +54,11 @@ def test_without_a_spacing_every_view_stays_where_it_was(twice: Mapped) -> None:
     assert merged(twice).place.tolist() != twice.hypotheses.place.tolist()
 
 
-def test_only_places_at_the_same_spot_are_merged(twice: Mapped) -> None:
-    found = merged(twice)
-    map = map_of(twice, found)
-    off = np.hypot(*(found.poses - map.poses[map.places[found.place]])[:, :2].T)
-    assert off.max() < 6.0
-    assert found.place.tolist() == merged(twice).place.tolist()
-
-
 def test_what_looks_alike_by_chance_stays_apart() -> None:
     out = mapped(furnished_alike(), [along(SQUARE, 1.2)])
     found = merged(out)
     map = map_of(out, found)
     assert np.hypot(*(found.poses - map.poses[map.places[found.place]])[:, :2].T).max() < 6.0
-
-
-def test_places_of_a_known_map_stay_with_their_views() -> None:
-    known = mapped(WORLD, [along(SQUARE, 1.2)]).map
-    out = mapped(WORLD, [along([(8.0, 8.0), (20.0, 8.0), (20.0, 32.0), (8.0, 32.0)], 1.2)], known=known)
-    found = merged(out)
-    old = found.place[: len(known.owner)]
-    assert [len(set(old[known.owner == place])) for place in range(len(known))] == [1] * len(known)
-    assert found.place.max() + 1 > len(set(old))
 
 
 def test_images_that_have_nothing_in_common_are_places_of_their_own() -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from made_ticks import at_tick
 
-from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.mapping.pose_of_view import Supervised, pose_of_view
 from omninav.stages.values.maps import ReferenceGraph
@@ -13,14 +13,8 @@ VIEW = np.ones((1, 1), np.float32)
 TRUE, DRIVEN = Pose(1.0, 2.0, 0.0), Pose(9.0, 9.0, 0.0)
 
 
-def context(log: int = 0, first: bool = True) -> Context:
-    ctx = Context("mapping")
-    ctx.tick = Tick(5, 5, log=log, first_of_log=first)
-    return ctx
-
-
 def begun(supervised: Supervised = "auto", odometry: Pose | None = DRIVEN, truth: Pose | None = TRUE):
-    map, ctx = ReferenceGraph.empty(), context()
+    map, ctx = ReferenceGraph.empty(), at_tick(first=True)
     return pose_of_view(ctx, odometry, truth, map, supervised), map.pose_source, ctx
 
 
@@ -48,7 +42,7 @@ def test_a_guess_is_called_one_and_truth_that_is_asked_for_must_be_there() -> No
 
 @pytest.mark.parametrize(("source", "pose"), [("truth", TRUE), ("odometry", DRIVEN)])
 def test_a_map_keeps_its_source_and_a_view_without_it_is_counted(source: str, pose: Pose) -> None:
-    map, ctx = ReferenceGraph.empty(), context(first=False)
+    map, ctx = ReferenceGraph.empty(), at_tick()
     map.put(pose_source=source)
     map.insert(TRUE, VIEW, "histograms")
     assert pose_of_view(ctx, DRIVEN, TRUE, map, "auto") is pose
@@ -62,16 +56,16 @@ def test_a_map_keeps_its_source_and_a_view_without_it_is_counted(source: str, po
 def test_frames_of_two_logs_are_not_mixed(source: str) -> None:
     map = ReferenceGraph.empty()
     map.put(pose_source=source)
-    assert pose_of_view(context(log=1), DRIVEN, None, map, "auto") is DRIVEN  # the first log had no view
+    assert pose_of_view(at_tick(first=True, log=1), DRIVEN, None, map, "auto") is DRIVEN  # the first log had no view
     map.insert(TRUE, VIEW, "histograms")
-    assert pose_of_view(context(log=0), DRIVEN, None, map, "auto") is DRIVEN
-    assert pose_of_view(context(log=1, first=False), DRIVEN, None, map, "auto") is DRIVEN
+    assert pose_of_view(at_tick(first=True, log=0), DRIVEN, None, map, "auto") is DRIVEN
+    assert pose_of_view(at_tick(log=1), DRIVEN, None, map, "auto") is DRIVEN
     with pytest.raises(BadInput, match="a frame of its own"):
-        pose_of_view(context(log=1), DRIVEN, None, map, "auto")
+        pose_of_view(at_tick(first=True, log=1), DRIVEN, None, map, "auto")
 
 
 def test_logs_with_ground_truth_go_into_one_map() -> None:
     map = ReferenceGraph.empty()
     map.put(pose_source="truth")
     map.insert(TRUE, VIEW, "histograms")
-    assert pose_of_view(context(log=1), DRIVEN, TRUE, map, "auto") is TRUE
+    assert pose_of_view(at_tick(first=True, log=1), DRIVEN, TRUE, map, "auto") is TRUE

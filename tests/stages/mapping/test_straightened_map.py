@@ -43,11 +43,9 @@ def error(map, poses=TRUTH):
 
 
 def test_a_tour_that_comes_back_is_straightened():
-    out, ctx = straightened(bent())
+    out, _ = straightened(bent())
     assert error(bent()) > 1.5
     assert error(out.map) < 0.4 * error(bent())
-    assert out.metrics.values["straightened"]["closures"] > 10
-    assert "closures" in ctx.facts["map_straightened"]
 
 
 def test_true_poses_are_left_alone():
@@ -63,19 +61,6 @@ def test_without_a_crossing_or_with_few_views_it_says_so(seen):
     out, ctx = straightened(map)
     assert out.map is map
     assert ctx.facts["map_straightened"].startswith("no: ")
-
-
-def test_it_says_by_how_much_references_were_moved_and_the_first_and_the_map_that_went_in_were_not():
-    map = bent()
-    out, ctx = straightened(map)
-    assert (map.poses == bent().poses).all()
-    values = out.metrics.values["straightened"]
-    moved = np.hypot(*(out.map.poses - map.poses)[:, :2].T)
-    assert moved[0] < 1e-6
-    assert values["moved_median_m"] == np.median(moved)
-    assert values["moved_max_m"] == moved.max()
-    assert 0 <= values["rejected"] < values["closures"]
-    assert ctx.facts["map_straightened"] == f"by {values['closures']} closures, {moved.max():.2f} m at most"
 
 
 def test_views_of_one_direction_and_places_that_are_too_near_along_the_drive_close_no_loop(monkeypatch):
@@ -109,7 +94,7 @@ def test_poses_are_those_of_odometry_and_closures_in_units_of_the_length_scale()
     looks = map.features[:].copy()
     looks[60] = looks[20]  # one that is wrong
     map = references(map.poses, looks, source="odometry")
-    out, _ = straightened(map)
+    out, ctx = straightened(map)
     unit = length_scale(map.poses, map.features, "histograms")
     steps = np.hypot(*np.diff(map.poses[:, :2], axis=0).T)
     driven = np.append(0.0, np.cumsum(steps))
@@ -117,5 +102,15 @@ def test_poses_are_those_of_odometry_and_closures_in_units_of_the_length_scale()
     drives = np.zeros(len(looks), np.int64)
     poses, weights = straightened_drives(map.poses, drives, closures, 0.5 * unit, np.radians(5.0))
     np.testing.assert_allclose(out.map.poses, poses, atol=1e-9)
-    assert 0 < (weights < 0.1).sum() < len(weights)
-    assert out.metrics.values["straightened"]["rejected"] == (weights < 0.1).sum()
+    moved = np.hypot(*(out.map.poses - map.poses)[:, :2].T)
+    rejected = int((weights < 0.1).sum())
+    assert out.metrics.values["straightened"] == {
+        "closures": len(weights),
+        "rejected": rejected,
+        "moved_median_m": np.median(moved),
+        "moved_max_m": moved.max(),
+    }
+    assert 0 < rejected < len(weights)
+    assert moved[0] < 1e-6
+    assert (map.poses == bent().poses).all()
+    assert ctx.facts["map_straightened"] == f"by {len(weights)} closures, {moved.max():.2f} m at most"

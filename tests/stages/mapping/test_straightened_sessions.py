@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from made_ticks import at_tick
 
-from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
@@ -12,7 +12,6 @@ from omninav.stages.mapping.session_closures import closures_between
 from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
-from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold, Spectrum
@@ -44,8 +43,7 @@ def drive(sessions, poses, drift=0.01, believed=True):
 
 
 def at_log(sessions, updates=None, threshold=THRESHOLD, first=True, ticks=None, **options):
-    ctx = Context("straightened", np.random.default_rng(0))
-    ctx.tick = Tick(index=500, stamp=0, first_of_log=first)
+    ctx = at_tick(500, first)
     return StraightenSessions(**options).step(ctx, sessions, updates, threshold, ticks), ctx
 
 
@@ -62,16 +60,6 @@ def error(poses, truth):
     return float(np.hypot(*(poses - truth)[:, :2].T).max())
 
 
-def test_a_drive_that_comes_back_is_straightened_and_learned_again():
-    sessions = drive(None, TWICE)
-    out, ctx = straightened(sessions)
-    assert out.updates.relearn
-    assert out.updates.sessions is sessions
-    assert error(learned(out), TWICE) < 0.4 * error(sessions.by_odometry, TWICE)
-    assert "closures" in ctx.facts["map_straightened"]
-    assert out.metrics.values["straightened"]["moved_max_m"] >= 0.0
-
-
 def test_drives_without_a_common_frame_are_joined_where_they_look_alike():
     sessions = drive(drive(None, TWICE), AGAIN, drift=-0.01, believed=False)
     out, _ = straightened(sessions)
@@ -79,26 +67,10 @@ def test_drives_without_a_common_frame_are_joined_where_they_look_alike():
     assert error(learned(out), np.concatenate([TWICE, AGAIN])) < 0.6
 
 
-@pytest.mark.parametrize(("turns", "fits"), [((0.0, 2.0, -2.0), False), ((0.0, 0.1, -0.1), True)])
-def test_closures_join_a_drive_only_where_they_agree(turns, fits):
-    own = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)] * 2)
-    closures = Closures(np.array([(0, 3), (1, 4), (2, 5)]), np.array(turns))
-    poses, joined = placed_drives(own, np.repeat([0, 1], 3), closures, 5.0)
-    assert joined.tolist() == [True, fits]
-    assert fits or (poses == own).all()
-
-
-def test_a_drive_elsewhere_stays_where_it_was_believed_to_be():
-    out, _ = straightened(drive(drive(None, TWICE), AWAY))
-    assert out.metrics.values["straightened"]["joined"] == 1
-    assert error(learned(out)[-25:], AWAY) < 1.0
-
-
-@pytest.mark.parametrize("share", [0.1, 0.3])
-def test_wrong_closures_do_not_bend_the_map(share):
+def test_wrong_closures_do_not_bend_the_map():
     sessions = drive(None, TWICE)
     right = closures_between(sessions, 0.6 * THRESHOLD.distance, 2.0, 1000)
-    number = round(share / (1.0 - share) * len(right.pairs))
+    number = round(0.3 / 0.7 * len(right.pairs))
     rng = np.random.default_rng(1)
     wrong = np.sort(np.column_stack([rng.integers(0, 50, number), rng.integers(55, 110, number)]))
     both = Closures(np.concatenate([right.pairs, wrong]), np.append(right.turns, rng.uniform(-3, 3, number)))
@@ -113,21 +85,10 @@ def test_a_map_of_one_view_stays():
     assert not out.updates.relearn
 
 
-def kept(poses, restored_at=None):
-    sessions, stage = None, KeyframeHistory()
-    steps = between(poses[:-1], poses[1:])
-    for row, pose in enumerate(poses):
-        if row == restored_at:
-            sessions = decode(encode(sessions))
-        ctx = Context("sessions", np.random.default_rng(0))
-        ctx.tick = Tick(index=row, stamp=0.2 * row, first_of_log=row == 0)
-        state = GaussianMixture(pose[None], 0.01 * np.eye(3)[None], np.ones(1))
-        sessions = stage.step(ctx, view(pose), Motion(*steps[row - 1]) if row else None, state, sessions).sessions
-    return sessions
-
-
 def test_sessions_that_were_written_and_read_again_go_on_to_the_same_bytes():
-    assert encode(kept(TWICE[:40], restored_at=20)) == encode(kept(TWICE[:40]))
+    begun = drive(None, TWICE[:20])
+    read = decode(encode(begun))
+    assert encode(drive(read, AGAIN)) == encode(drive(begun, AGAIN))
 
 
 def test_drives_of_which_no_beginning_is_known_are_one_drive():
@@ -140,8 +101,7 @@ def test_drives_of_which_no_beginning_is_known_are_one_drive():
 def test_drives_with_other_views_are_not_gone_on_with():
     known = ViewMixtures.empty()
     known.put(sessions=drive(None, TWICE[:3]))
-    ctx = Context("sessions", np.random.default_rng(0))
-    ctx.tick = Tick(0, 0, first_of_log=True)
+    ctx = at_tick(first=True)
     other = Spectrum(np.ones(8, np.float32), 2, 36)
     state = GaussianMixture(np.zeros((1, 3)), 0.01 * np.eye(3)[None], np.ones(1))
     assert len(KeyframeHistory().step(ctx, other, None, state, None, known).sessions) == 1
@@ -201,12 +161,13 @@ def test_without_a_crossing_the_last_updates_go_on_with_the_drives_to_be_kept():
     assert straightened(once)[0].updates.items == ()
 
 
-def test_it_says_how_many_drives_and_closures_there_were_and_by_how_much_views_were_moved():
+def test_a_drive_elsewhere_stays_and_it_says_how_many_drives_and_closures_there_were_and_by_how_much_views_were_moved():
     sessions = drive(drive(None, TWICE), AWAY)
     out, ctx = straightened(sessions)
     values = out.metrics.values["straightened"]
     moved = np.hypot(*(learned(out) - sessions.believed)[: len(TWICE), :2].T)
     assert (values["sessions"], values["joined"]) == (2, 1)
+    np.testing.assert_array_equal(learned(out)[-25:], AWAY)
     assert values["moved_rms_m"] == pytest.approx(np.sqrt(np.mean(moved**2)))
     assert values["moved_max_m"] == pytest.approx(moved.max())
     assert values["closures"] == len(closures_between(sessions, 2.4, 2.0, 1000).pairs)

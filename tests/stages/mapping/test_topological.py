@@ -5,14 +5,13 @@ import math
 
 import numpy as np
 import pytest
-from made_tour import Landmarks, Mapped, along, furnished_alike, mapped, scattered
+from made_tour import Landmarks, Mapped, along, mapped, scattered
 from made_views import made_views
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.place_clusters import (
     between_hypotheses,
     complete_linkage,
@@ -22,11 +21,8 @@ from omninav.stages.geometry.appearance.place_clusters import (
     waypoint_views,
 )
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
-from omninav.stages.geometry.probability.dempster_shafer import SUPPORT
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
-from omninav.stages.match.visual_distance import VisualDistance
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
@@ -127,34 +123,12 @@ def test_a_second_round_is_found_to_be_the_first(twice: Mapped) -> None:
     assert (found.masses.sum(axis=1) == pytest.approx(1.0)) if len(found.masses) else False
 
 
-def test_what_looks_alike_by_chance_is_left_apart() -> None:
-    out = mapped(furnished_alike(), [along(SQUARE, 1.2)])
-    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()
-
-
-def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: Mapped) -> None:
-    made, found = once.map, once.hypotheses
-    match, context = VisualDistance(), Context("match")
-    match.setup(context)
-    apart = []
-    for row, pose in enumerate(found.poses):
-        seen, grey = WORLD.seen(Pose(*pose.tolist())), GlobalDescriptor(np.zeros(3, np.float32))
-        distances = match.step(context, features=seen, descriptor=grey, map=made).distances
-        if row != made.frames[made.places[found.place[row]]]:
-            apart.append(distances.distances[found.place[row]])
-    assert made.spread == pytest.approx(np.sqrt(np.mean(np.square(apart))), rel=0.01)
-
-
 def test_the_paper_s_deviation_is_that_of_all_views_that_have_anything_in_common() -> None:
     apart = np.array([[0.0, 1.0, 3.0], [1.0, 0.0, math.inf], [3.0, math.inf, 0.0]])
     assert made_views(apart).deviation() == 1.0  # of 1 and 3
     assert made_views(np.zeros((1, 1))).deviation() == 0.0
     within, over_all = (mapped(WORLD, [along(SQUARE[:3], 1.6)], spread=of).map.spread for of in SPREADS)
     assert over_all > 1.5 * within  # most views are of other places
-
-
-def test_two_maps_of_one_tour_are_the_same_bytes() -> None:
-    assert encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map) == encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map)
 
 
 def test_a_view_is_kept_small_and_can_still_be_matched(once: Mapped) -> None:
@@ -187,13 +161,6 @@ def test_a_map_grows_from_a_second_tour(once: Mapped) -> None:
     assert out.hypotheses.accepted.any()
 
 
-def test_two_tours_at_once_make_one_map_with_no_link_from_end_to_start() -> None:
-    first, second = along(SQUARE[:3], 1.2), along([(8.0, 32.0), (8.0, 8.0), (20.0, 8.0)], 1.2)
-    made = mapped(WORLD, [first, second]).map
-    jump = made.poses[made.places[made.links]][:, :, :2]
-    assert np.hypot(*np.diff(jump, axis=1)[:, 0].T).max() < 10.0
-
-
 def test_accepted_places_can_stay_two_with_a_link(twice: Mapped) -> None:
     found = LoopClosure(accepted="link").step(Context("loops"), twice.views).hypotheses
     linked = TopologicalMapping().step(Context("mapping"), twice.views, found).map
@@ -214,43 +181,3 @@ def test_a_second_tour_is_recognised_by_the_few_features_that_a_map_keeps() -> N
     across = np.diff(found.tour[found.pairs], axis=1)[:, 0] != 0
     assert across.sum() >= 5
     assert found.accepted[across].mean() > 0.8
-
-
-def test_the_reach_of_evidence_is_counted_in_pictures_that_take_part(twice: Mapped) -> None:
-    every = twice.hypotheses
-    second = mapped(WORLD, [along(SQUARE + SQUARE[1:], 0.6)], every_s=2.0).hypotheses
-    assert len(every.masses) > 5
-    assert second.masses == pytest.approx(every.masses)
-
-
-def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are(
-    monkeypatch: pytest.MonkeyPatch, twice: Mapped
-) -> None:
-    monkeypatch.setattr("omninav.stages.mapping.loop_closure.NEIGHBOUR_DISTANCE", 0.1)
-    found = LoopClosure().step(Context("loops"), twice.views).hypotheses
-    assert (found.masses[:, SUPPORT] > 0.5).any()
-    assert not found.accepted.any()
-
-
-def test_pictures_closer_together_than_asked_are_passed_over() -> None:
-    out = mapped(WORLD, [along(SQUARE[:2], 0.2)], every_s=4.0)
-    assert len(out.hypotheses.poses) == 30
-
-
-def test_poses_are_the_tours_truth_or_its_odometry_and_say_which() -> None:
-    tour = along(SQUARE[:2], 1.6)
-    assert mapped(WORLD, [tour]).map.pose_source == "truth"
-    known = mapped(WORLD, [tour], truth=False).map
-    assert known.pose_source == "odometry"
-    with pytest.raises(BadInput, match="no frame in common"):
-        mapped(WORLD, [tour], known=known)
-    with pytest.raises(BadInput, match=r"nodes\.views\.supervised=auto"):
-        mapped(WORLD, [tour], truth=False, supervised="truth")
-
-
-def test_a_tour_that_shows_nothing_makes_no_map() -> None:
-    with pytest.raises(BadInput, match="use another tour"):
-        mapped(WORLD, [[]])
-    nowhere = mapped(Landmarks(scattered(1.0, 1.0)), [along([(50.0, 50.0), (60.0, 50.0)], 2.0)])
-    assert len(nowhere.map) == 5  # each picture a place of its own, as far as anybody can tell
-    assert isinstance(nowhere.map.views.features(0), LocalFeatures)
