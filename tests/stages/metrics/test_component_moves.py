@@ -28,21 +28,6 @@ def test_a_component_is_followed_from_update_to_update():
     assert moves(ticks, 1.0) == [[0.5, 0.25], [], []]
 
 
-def test_a_running_mean_moves_less_with_every_update(monkeypatch: pytest.MonkeyPatch):
-    places, rng = np.zeros(40), np.random.default_rng(0)
-    ticks = []
-    for update in range(12):
-        seen = rng.normal(0.0, 0.2, 40)
-        places = places + (seen - places) / (update + 1)
-        ticks += [now((view, x)) for view, x in enumerate(places.tolist())]
-    needs(monkeypatch, moves=11)
-    found = measured(*ticks)
-    assert found["updates"] == list(range(11))
-    assert found["components"] == 40
-    assert found["moved_m"][-1] < 0.2 * found["moved_m"][0]
-    assert found["moved_m"][0] == pytest.approx(0.2 * np.sqrt(1 / np.pi), rel=0.3)  # half the gap between two draws
-
-
 def test_every_entry_is_of_the_same_components(monkeypatch: pytest.MonkeyPatch):
     # Ten that move twice by 0.25 and 0.5, and ten that move once, by 1.0, and are in neither entry.
     first = [(view, 0.0) for view in range(20)]

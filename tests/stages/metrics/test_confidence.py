@@ -9,7 +9,6 @@ from measured_drives import AT_ORIGIN, figures, made_drive
 
 from omninav.pipeline import Context
 from omninav.stages.metrics.confidence import Confidence, confident
-from omninav.stages.metrics.frames_table import columns_of
 from omninav.stages.values.belief import PoseEstimate, SinglePose
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.pose import Pose
@@ -34,11 +33,6 @@ SEEN = [estimate(0.0, 2.0, 0.9), estimate(1.0, 0.5, 0.4), estimate(4.0, 0.5, 0.8
 METRE_BY_METRE = [None, *[(1.0, 0.0, 0.0)] * 3]
 DRIVE = blind(SEEN, METRE_BY_METRE, matches=[BestMatch(0, 0.0, similarity=s) for s in (0.9, 0.8, 0.7)] + [None])
 """Four frames a metre apart by odometry; the third estimate jumps by two metres, the fourth lacks."""
-
-
-def test_an_estimate_is_confident_where_it_is_heavy_and_narrow():
-    assert confident(DRIVE).tolist() == [False, False, True, False]
-    assert columns_of(DRIVE)["confident"].tolist() == [0, 0, 1, -1]
 
 
 def test_figures_of_a_run_without_truth():

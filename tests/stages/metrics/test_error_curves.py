@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
 from measured_drives import AT_ORIGIN, Row, figures, made_drive, on_x
-from world_files import world_of
 
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.metrics.error_curves import ErrorCurves, lap_ends
-from omninav.stages.simulator.simulated_recording import SimulatedRecording
 
 MODULE = "omninav.stages.metrics.error_curves"
 
@@ -25,18 +23,6 @@ def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: 
 
 def along_x(*xs: float) -> np.ndarray:
     return np.array(on_x(xs))
-
-
-def test_who_comes_back_past_the_start_to_leave_by_the_other_side_has_not_ended_a_lap():
-    along = np.concatenate([np.arange(20), np.arange(20, -20, -1), np.arange(-20, 20)]).astype(float)
-    there_and_back = np.stack([along, 0 * along, np.where(np.gradient(along) < 0, np.pi, 0.0)], axis=1)
-    assert lap_ends(there_and_back, there_and_back[0], 2.0) == [80]
-
-
-def test_the_seven_laps_around_the_shelves_are_seven_though_the_first_is_driven_by_either_side():
-    truth = SimulatedRecording(world_of("home_store_small"), "laps", 0).truth
-    ends = lap_ends(truth, truth[0], 2.0)
-    assert np.diff([0, *ends, len(truth)]) / len(truth) == pytest.approx([0.255, *[0.124] * 6], abs=0.002)
 
 
 def test_over_the_steps_each_entry_is_the_mean_of_its_share(monkeypatch):

@@ -1,5 +1,4 @@
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -36,29 +35,9 @@ def test_a_reference_comes_when_it_is_seen_and_goes_when_it_is_removed():
     assert counted([None, None], event(1, [0], [1])).tolist() == [[0, 0, 0, 0], [1, 1, 1, 0]]
 
 
-def test_ticks_without_an_event_change_nothing():
-    assert counted([None, None]).tolist() == [[0, 0, 0, 0], [0, 0, 0, 0]]
-
-
 def test_a_known_map_is_there_before_the_first_event_with_what_that_removes():
     first = dataclasses.replace(event(2, [5], [1], [0]), components=7)
     assert counted([None, first]).tolist() == [[2, 7, 0, 0], [2, 7, 1, 1]]
-
-
-def turned(*angles: float, radius: float = 5.0) -> np.ndarray:
-    """Places on a circle (N, 2), a frame a degree, from each angle (degrees) to the next."""
-    way = np.concatenate([np.arange(a, b, np.sign(b - a)) for a, b in itertools.pairwise(angles)])
-    return radius * np.stack([np.cos(np.radians(way)), np.sin(np.radians(way))], axis=1)
-
-
-def test_new_ground_ends_where_the_robot_comes_to_what_it_has_left_however_often_it_was_back_before():
-    near = np.degrees(2 * np.arcsin(0.5 / 2 / 5.0))  # on the circle, half a metre from a place
-    assert last_new_ground(turned(0, 360), 0.5) == last_new_ground(turned(0, 3 * 360), 0.5) == int(360 - near)
-    not_yet_left = np.degrees(2 * np.arcsin(1.0 / 2 / 5.0))  # turning where new ground ends: a metre back
-    assert last_new_ground(turned(0, 90, 0, -180, 0, -180), 0.5) == int(180 + 180 + not_yet_left)
-    assert last_new_ground(turned(0, 90), 0.5) == 89
-    standing = np.concatenate([turned(0, 90), np.tile(turned(0, 1), (9, 1))])
-    assert last_new_ground(standing, 0.5) == 89
 
 
 @pytest.mark.parametrize(
@@ -69,6 +48,7 @@ def test_new_ground_ends_where_the_robot_comes_to_what_it_has_left_however_often
         ([0.0, 6.5, 2.0], 1),  # within the radius of where it had been
         ([0.0, 6.5, 2.25], 2),
         ([0.0, 6.0, 2.0], 2),
+        ([0.0, 5.0, 0.0, -5.0, 0.0], 3),  # however often it was back before
         ([0.0], 0),
     ],
 )

@@ -7,9 +7,6 @@ import pytest
 from made_places import made_map
 from measured_drives import AT_ORIGIN, figures, made_drive, on_x
 
-from omninav.pipeline import Context, Tick
-from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.fusion.place_prior import PlacePrior
 from omninav.stages.metrics.place_accuracy import PlaceAccuracy
 from omninav.stages.values.belief import PlaceBelief
 
@@ -75,8 +72,3 @@ def test_places_beside_each_other_are_near_in_any_direction():
     found = hits([2, 0], [(0.0, 1.9, 0.0), (1.9, 1.9, 0.0)], map=corner)
     assert (found["accuracy"], found["adjacent_accuracy"]) == (0.0, 0.5)
     assert found["place_distance_m"] == pytest.approx((np.hypot(2.0, 0.1) + np.hypot(1.9, 1.9)) / 2)
-
-
-def test_a_start_at_the_truth_needs_one():
-    with pytest.raises(BadInput, match="start=uniform"):
-        PlacePrior(at="truth").step(Context("start"), Tick(0, 0, first_of_log=True), ROW)

@@ -3,14 +3,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from measured_drives import figures, made_drive, on_x
-from scipy.optimize import minimize
 from small_run import eight, small_run
 
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.metrics.relative_errors import (
     RelativeErrors,
     absolute_trajectory_errors,
-    align,
     pairs_apart,
     relative_pose_errors,
 )
@@ -21,20 +19,6 @@ def test_a_trajectory_moved_as_a_whole_has_no_absolute_error(turn, x, y):
     truth = eight(30)
     moved = compose(np.array([x, y, turn]), truth)
     np.testing.assert_allclose(absolute_trajectory_errors(moved, truth), 0.0, atol=1e-9)
-
-
-def test_the_alignment_is_the_best_that_a_search_finds():
-    rng = np.random.default_rng(3)
-    points, target = rng.normal(size=(20, 2)), rng.normal(size=(20, 2))
-
-    def left(p):
-        turn = np.array([[np.cos(p[0]), -np.sin(p[0])], [np.sin(p[0]), np.cos(p[0])]])
-        return ((points @ turn.T + p[1:] - target) ** 2).sum()
-
-    starts = [np.array([angle, 0.0, 0.0]) for angle in (-2.0, 0.0, 2.0)]
-    best = min(minimize(left, start, tol=1e-12).fun for start in starts)
-    rotation, translation = align(points, target)
-    assert ((points @ rotation.T + translation - target) ** 2).sum() == pytest.approx(best, rel=1e-6)
 
 
 def test_pairs_are_the_first_frames_that_lie_far_enough_apart_along_the_path():

@@ -29,16 +29,6 @@ def test_each_view_is_as_far_as_its_nearest_other_one_in_views_and_in_metres():
     assert found["between_views"]["unevenness"] == pytest.approx(np.std([5, 1, 1, 7]) / 3.5)
 
 
-def test_of_many_views_only_some_are_asked_but_all_are_neighbours(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("omninav.stages.metrics.view_spacing.MAX_VIEWS", 3)
-    found = spacing(a_map([(k * k, 0) for k in range(9)], [(k, 0) for k in range(9)]))["spacing"]
-    assert found["between_views"]["mean"] == pytest.approx((1 + 7 + 15) / 3)  # of views 0, 4 and 8
-
-
-def test_two_views_have_no_spacing():
-    assert spacing(a_map([(0, 0), (1, 1)], [(0, 0), (1, 0)])) == {}
-
-
 def test_views_that_are_all_alike_have_no_unevenness():
     assert spaced(np.zeros(4))["unevenness"] is None
 
@@ -56,6 +46,7 @@ def test_figures_are_those_of_the_distances():
 def test_places_lie_apart_in_any_direction_and_three_views_are_enough():
     found = spacing(a_map([(0, 0), (3, 4), (9, 9)], [(0, 0), (3, 4), (0, 12)]))["spacing"]
     assert found["between_places_m"]["mean"] == pytest.approx((5.0 + 5.0 + np.hypot(3, 8)) / 3)
+    assert spacing(a_map([(0, 0), (1, 1)], [(0, 0), (1, 0)])) == {}
 
 
 def test_a_view_that_was_seen_turned_is_compared_as_it_is_kept():

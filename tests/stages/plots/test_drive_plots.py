@@ -170,23 +170,19 @@ def test_several_logs_get_a_picture_of_the_earlier_ones():
     assert out.earlier is not None
 
 
-def test_without_truth_there_is_a_trajectory_but_no_error():
+def test_without_truth_or_estimates_there_is_a_trajectory_but_no_error():
     run = small_run(frames=20)
     assert ErrorOverTime().step(CTX, run.blind).figure is None
     assert "no ground truth" in TrajectoryOverMap().step(CTX, run.blind, run.map).figure.caption
+    run.estimates = [None] * 20
+    assert ErrorOverTime().step(CTX, run.drive).figure is not None
+    assert TrajectoryOverMap().step(CTX, run.drive, run.map).figure is not None
 
 
 def test_an_empty_run_gives_no_pictures():
     run = small_run(frames=0)
     run.map = reference_graph(0)
     assert list(all_figures(run)) == [None] * 5
-
-
-def test_a_run_whose_estimates_are_all_absent_still_gives_a_picture():
-    run = small_run(frames=12)
-    run.estimates = [None] * 12
-    assert TrajectoryOverMap().step(CTX, run.drive, run.map).figure is not None
-    assert ErrorOverTime().step(CTX, run.drive).figure is not None
 
 
 def test_peaks_are_kept_with_their_best_headings():

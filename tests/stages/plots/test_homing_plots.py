@@ -18,7 +18,7 @@ from omninav.stages.plots.homing_frames import draw_vector
 from omninav.stages.plots.homing_snapshot import HomingSnapshot
 from omninav.stages.plots.plan_chart import plan_chart
 from omninav.stages.plots.target_images import FirstThumbnail, image_of, target_view
-from omninav.stages.plots.thumbnails import TourSnapshot, ViewThumbnails, joined
+from omninav.stages.plots.thumbnails import joined
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, HomingTarget, HomingVector, PathProgress, TrackedFeatures
 from omninav.stages.values.image import Image
@@ -142,19 +142,11 @@ def test_the_target_is_the_view_that_the_way_has_come_to():
     assert target_view(PathProgress(2, 0, 1, 0, True, False, False), None, None) == 0
 
 
-def test_thumbnails_are_of_the_maps_views_and_not_of_a_known_maps(monkeypatch):
-    monkeypatch.setattr("omninav.stages.plots.thumbnails.TOUR_COLUMNS", 32)
-    images = []
-    for shade in range(40):  # the map's views are every tenth picture of the tour
-        pixels = np.full((48, 64, 3), 6 * shade, np.uint8)
-        images.append(TourSnapshot().step(CTX, Image(pixels)).snapshots)
-    thumbnails = ViewThumbnails().step(CTX, images, MAP).thumbnails
-    assert [round(image_of(view, thumbnails).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
-    grown = ViewThumbnails().step(CTX, images, MAP, known=made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0})).thumbnails
-    assert [image_of(view, grown) is None for view in range(4)] == [True, True, False, False]
-    assert image_of(2, grown).mean() == pytest.approx(6 * (20 - 11), abs=2)
-    assert image_of(None, thumbnails) is None
-    assert image_of(9, joined([])) is None
+def test_a_view_has_an_image_where_there_is_a_thumbnail_of_it():
+    thumbnails = joined([b"", snapshots(STRIP)[0].jpeg])
+    assert (image_of(1, thumbnails) == thumbnails.image(1)).all()
+    assert [image_of(view, thumbnails) for view in (None, 0, 2)] == [None] * 3
+    assert image_of(1, None) is None
 
 
 def test_the_first_image_of_a_run_is_the_only_thumbnail():
