@@ -166,21 +166,14 @@ def test_particles_are_resampled_where_their_effective_size_is_below_its_share()
         assert (out.weights == pytest.approx(np.full(4, 0.25))) != kept
 
 
-@pytest.mark.parametrize("told", ["proposals", "anywhere"])
-def test_without_proposals_or_what_is_likely_anywhere_there_is_no_recovery(told: str) -> None:
-    more = {"proposals": THERE, "anywhere": 1.0}
-    stage = ImportanceResampling(number=20, kidnapping_probability=0.5)
-    out = fuse(stage, belief(20), np.ones(20), **{told: more[told]})
+@pytest.mark.parametrize(("share", "anywhere", "proposals"), [(0.1, None, THERE), (0.1, 1.0, None), (0.0, 1.0, THERE)])
+def test_without_what_is_likely_anywhere_proposals_or_recovery_particles_there_is_no_recovery(
+    share: float, anywhere: float | None, proposals: Particles | None
+) -> None:
+    stage = ImportanceResampling(number=20, recovery_share=share, kidnapping_probability=0.5)
+    out = fuse(stage, belief(20), np.ones(20), anywhere=anywhere, proposals=proposals)
     assert (len(out.poses), out.recovery_particles) == (20, 0)
     assert out.weights == pytest.approx(np.full(20, 0.05))
-
-
-def test_without_recovery_particles_nothing_is_proposed() -> None:
-    stage = ImportanceResampling(number=20, recovery_share=0.0, kidnapping_probability=0.5)
-    out = fuse(stage, belief(20), np.ones(20), anywhere=1.0, proposals=THERE)
-    assert len(out.poses) == 20
-    assert out.poses[:, 0].max() < 77.0
-    assert out.weights.sum() == pytest.approx(1.0)
 
 
 def test_the_kld_bound_is_fox_s() -> None:

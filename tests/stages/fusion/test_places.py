@@ -2,12 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from omninav.stages.geometry.appearance.place_graph import links_between
-from omninav.stages.motion.place_transitions import transitions
-from omninav.stages.sensor.place_likelihood import place_likelihoods
 from omninav.stages.values.belief import PlaceBelief
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
@@ -18,17 +14,6 @@ def test_links_are_counted_along_the_shortest_way_in_either_direction():
     assert apart[:4, :4].tolist() == [[0, 1, 2, 1], [1, 0, 1, 2], [2, 1, 0, 1], [1, 2, 1, 0]]
     assert np.isinf(apart[4, :4]).all()
     assert apart[4, 4] == 0
-
-
-@given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
-def test_a_step_of_bayes_leaves_a_belief_that_sums_to_one(places, seed, anywhere):
-    rng = np.random.default_rng(seed)
-    chances = transitions(links_between(rng.integers(0, places, (places, 2)), places), None, anywhere)
-    before = rng.dirichlet(np.ones(places))
-    after = (before @ chances) * place_likelihoods(rng.exponential(1.0, places), 1.0, 0.01, "gaussian")
-    assert (before @ chances).sum() == pytest.approx(1.0)
-    assert (after / after.sum()).sum() == pytest.approx(1.0)
-    assert (after > 0).sum() >= (before > 0).sum() * (anywhere < 1.0)
 
 
 def test_the_estimate_is_the_most_probable_place_turned_as_the_view_is():

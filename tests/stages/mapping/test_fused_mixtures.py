@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_beliefs import along_x
+from made_view_maps import view
 
 from omninav.pipeline import Context
 from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, FusedMixturesState, fuse, parts
@@ -14,18 +16,9 @@ SIGMA, LIMIT = 0.1, NoveltyThreshold(1.0)
 HELD = ("means", "covariances", "weights", "counts")
 
 
-def view(value: float, headings: int = 1) -> Coefficients:
-    # With 4 headings: four numbers around the robot, rolled by one for a quarter turn.
-    if headings == 1:
-        turned = np.array([[value, 0.0]], np.float32)
-    else:
-        turned = np.stack([np.roll(np.array([value, 0, 0, 0], np.float32), -n) for n in range(4)])
-    return Coefficients(turned[0], turned)
-
-
-def state(*places: float, weights: tuple[float, ...] = (1.0,), heading: float = 0.0) -> GaussianMixture:
-    means = np.array([[x, 0.0, heading] for x in places])
-    return GaussianMixture(means, np.repeat(np.eye(3)[None] * SIGMA**2, len(places), axis=0), np.array(weights))
+def facing(heading: float, state: GaussianMixture) -> GaussianMixture:
+    state.means[:, 2] = heading
+    return state
 
 
 def learn(
@@ -39,9 +32,9 @@ def learn(
 
 def test_a_view_that_resembles_none_becomes_a_map_point_with_the_state_it_was_seen_in() -> None:
     map = ViewMixtures.empty()
-    event = learn(map, view(0.0), state(1.0, 5.0, weights=(0.7, 0.3)))
+    event = learn(map, view(0.0), along_x(1.0, 5.0, weights=(0.7, 0.3)))
     assert event.inserted.tolist() == [0]
-    assert learn(map, view(3.0), state(2.0)).inserted.tolist() == [1]
+    assert learn(map, view(3.0), along_x(2.0)).inserted.tolist() == [1]
     assert len(map) == 2
     assert map.means[map.owner == 0][:, 0].tolist() == [1.0, 5.0]
     assert map.weights[map.owner == 0].tolist() == [0.7, 0.3]
@@ -51,9 +44,9 @@ def test_a_view_that_resembles_none_becomes_a_map_point_with_the_state_it_was_se
 def test_a_known_view_seen_at_the_same_place_is_averaged(average: Average, place: float) -> None:
     # 0, 0.2 at half the likeness (0.5 of the limit 1.0), 0.2 again: of 1 + 0.5 + 0.5 visits half are at 0.2.
     map, stage = ViewMixtures.empty(), FusedMixtures(spread=False, average=average)
-    learn(map, view(0.0), state(0.0), stage)
+    learn(map, view(0.0), along_x(0.0), stage)
     for _ in range(2):
-        event = learn(map, view(0.5), state(0.2), stage)
+        event = learn(map, view(0.5), along_x(0.2), stage)
         assert not len(event.inserted)
         assert event.changed.tolist() == [0]
     assert map.means[:, 0] == pytest.approx([place])
@@ -76,8 +69,8 @@ def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_firs
     for taught, corrected in ((first, again), (known, [])):
         map, stage, learned = ViewMixtures.empty(), FusedMixtures(average=average), FusedMixturesState()
         for updates in (
-            *([MapUpdate(view(views[n]), state(taught[n]), n)] for n in range(12)),
-            [MapUpdate(view(views[n]), state(then[n]), int(n)) for n in corrected],
+            *([MapUpdate(view(views[n]), along_x(taught[n]), n)] for n in range(12)),
+            [MapUpdate(view(views[n]), along_x(then[n]), int(n)) for n in corrected],
         ):
             stage.step(Context("mapping"), MapUpdates(tuple(updates), open_from=0), LIMIT, map, learned)
         maps.append(map)
@@ -108,10 +101,10 @@ def test_what_a_full_map_has_dropped_does_not_come_back_with_a_lesson_given_agai
 def test_a_wrong_place_loses_half_of_its_weight_each_time_and_is_gone_below_a_hundredth() -> None:
     # The paper's example: (y, x1) with weight 1 becomes (x1 0.5, x2 0.5); x1 goes on to 1/128 and is removed.
     map = ViewMixtures.empty()
-    learn(map, view(0.0), state(9.0))
+    learn(map, view(0.0), along_x(9.0))
     lived = []
     for _ in range(8):
-        learn(map, view(0.0), state(0.0))
+        learn(map, view(0.0), along_x(0.0))
         wrong = map.weights[map.means[:, 0] > 5.0]
         lived.append(float(wrong.sum()))
         assert map.weights.sum() == pytest.approx(1.0)
@@ -123,18 +116,19 @@ def test_a_wrong_place_loses_half_of_its_weight_each_time_and_is_gone_below_a_hu
 def test_all_views_within_the_limit_take_the_state_in_and_no_other() -> None:
     map = ViewMixtures.empty()
     for value in (0.0, 1.5, 4.0):
-        learn(map, view(value), state(value))
-    event = learn(map, view(0.75), state(9.0))
+        learn(map, view(value), along_x(value))
+    event = learn(map, view(0.75), along_x(9.0))
     assert event.changed.tolist() == [0, 1]
     assert np.bincount(map.owner).tolist() == [2, 2, 1]
 
 
 def test_headings_are_kept_as_those_of_a_robot_that_sees_the_view_unturned() -> None:
-    map = ViewMixtures.empty()
-    first = view(9.0, headings=4)
-    learn(map, first, state(0.0, heading=0.3))
-    turned = Coefficients(first.turned[1].copy(), np.roll(first.turned, -1, axis=0))  # the robot stands turned by 90°
-    learn(map, turned, state(0.0, heading=0.3 + np.pi / 2))
+    # Four numbers around the robot, rolled by one for a quarter turn.
+    map, ring = ViewMixtures.empty(), np.array([9.0, 0.0, 0.0, 0.0], np.float32)
+    rolled = np.stack([np.roll(ring, -n) for n in range(4)])
+    learn(map, Coefficients(rolled[0], rolled), facing(0.3, along_x(0.0)))
+    turned = Coefficients(rolled[1].copy(), np.roll(rolled, -1, axis=0))  # the robot stands turned by 90°
+    learn(map, turned, facing(0.3 + np.pi / 2, along_x(0.0)))
     assert map.means[:, 2] == pytest.approx([0.3])
 
 
@@ -144,15 +138,15 @@ def test_of_parts_that_are_all_weak_the_heaviest_stays(average: Average) -> None
     places = tuple(float(n) for n in range(0, 480, 4))
     weights = np.full(120, 1.0)
     weights[70] = 1.1
-    learn(map, view(0.0), state(*places, weights=tuple(weights / weights.sum())), stage)
+    learn(map, view(0.0), along_x(*places, weights=tuple(weights / weights.sum())), stage)
     assert map.means[:, 0].tolist() == [280.0]
     assert map.weights.tolist() == [1.0]
-    learn(map, view(9.0), state(*places, weights=(1 / 120,) * 120), stage)
+    learn(map, view(9.0), along_x(*places, weights=(1 / 120,) * 120), stage)
     assert map.weights[map.owner == 1].sum() == pytest.approx(1.0), "of equals none is better than the others"
 
 
 def test_a_state_is_kept_as_seen_from_the_view_s_own_heading() -> None:
-    means, covariances, weights, counts = parts(state(1.0, 2.0, weights=(0.75, 0.25), heading=3.0), -0.5, 0.4)
+    means, covariances, weights, counts = parts(facing(3.0, along_x(1.0, 2.0, weights=(0.75, 0.25))), -0.5, 0.4)
     assert means.tolist() == [[1.0, 0.0, pytest.approx(3.5 - 2 * np.pi)], [2.0, 0.0, pytest.approx(3.5 - 2 * np.pi)]]
     assert covariances[1] == pytest.approx(np.eye(3) * SIGMA**2)
     assert weights.tolist() == [0.75, 0.25]
@@ -161,7 +155,7 @@ def test_a_state_is_kept_as_seen_from_the_view_s_own_heading() -> None:
 
 def test_mixtures_side_by_side_are_merged_normalised_and_freed_of_what_is_light() -> None:
     # 0 and 0.2 merge (squared distance 2), 9 stays; of the sum 2: 0.98, 0.01 and 0.01. What weighs a hundredth stays.
-    one, other = state(0.0, 9.0, weights=(0.98, 0.02)), state(0.2, 20.0, weights=(0.98, 0.02))
+    one, other = along_x(0.0, 9.0, weights=(0.98, 0.02)), along_x(0.2, 20.0, weights=(0.98, 0.02))
     both = [parts(one, 0.0, 1.0), parts(other, 0.0, 0.5)]
     for average, place in (("halves", 0.1), ("visits", 0.2 / 3)):
         means, covariances, weights, counts = fuse(both, 2.5, True, 0.01, average)  # type: ignore[arg-type]
@@ -186,7 +180,7 @@ def step(
 ) -> tuple[ViewEvent | None, Context]:
     """Learn views (look, place, tick)."""
     ctx = Context("mapping")
-    items = tuple(MapUpdate(view(look), state(place), tick) for look, place, tick in updates)
+    items = tuple(MapUpdate(view(look), along_x(place), tick) for look, place, tick in updates)
     return stage.step(ctx, MapUpdates(items, **said), limit, map, pending).events, ctx  # type: ignore[arg-type]
 
 

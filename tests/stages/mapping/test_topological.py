@@ -144,23 +144,6 @@ def test_a_view_is_kept_small_and_can_still_be_matched(once: Mapped) -> None:
     assert isinstance(decode(encode(made)), TopologicalMap)
 
 
-def test_a_map_grows_from_a_second_tour(once: Mapped) -> None:
-    known = once.map
-    shortcut = along([(8.0, 8.0), (20.0, 8.0), (20.0, 32.0), (8.0, 32.0)], 1.2)
-    out = mapped(WORLD, [shortcut], known=known)
-    grown = out.map
-    assert len(grown) > len(known)
-    before = known.poses[known.places, :2]
-    after = grown.poses[grown.places, :2]
-    near = np.hypot(*(before[:, None] - after[None]).transpose(2, 0, 1)).min(axis=1)
-    assert near.max() < 5.0  # nothing is lost
-    middle = np.hypot(*(after - (20.0, 20.0)).T).min()
-    assert middle < 4.0
-    assert grown.frames.max() > known.frames.max()
-    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()  # a place is that wide
-    assert out.hypotheses.accepted.any()
-
-
 def test_accepted_places_can_stay_two_with_a_link(twice: Mapped) -> None:
     found = LoopClosure(accepted="link").step(Context("loops"), twice.views).hypotheses
     linked = TopologicalMapping().step(Context("mapping"), twice.views, found).map

@@ -31,7 +31,7 @@ def told(drive: Drive) -> dict:
 
 SEEN = [estimate(0.0, 2.0, 0.9), estimate(1.0, 0.5, 0.4), estimate(4.0, 0.5, 0.8), None]
 METRE_BY_METRE = [None, *[(1.0, 0.0, 0.0)] * 3]
-DRIVE = blind(SEEN, METRE_BY_METRE, matches=[BestMatch(0, 0.0, similarity=s) for s in (0.9, 0.8, 0.7)] + [None])
+DRIVE = blind(SEEN, METRE_BY_METRE, matches=[BestMatch(0, 0.0, similarity=s) for s in (0.9, 0.8, 0.5)] + [None])
 """Four frames a metre apart by odometry; the third estimate jumps by two metres, the fourth lacks."""
 
 
@@ -47,7 +47,7 @@ def test_figures_of_a_run_without_truth():
             "step_off_odometry_m": 1.0,  # of 0 and 2 m
             "turn_off_odometry_deg": 0.0,
             "similarity": 0.8,
-            "similarity_p10": 0.72,
+            "similarity_p10": 0.56,
         }
     )
 
@@ -78,13 +78,13 @@ def test_half_of_the_belief_within_a_metre_is_confident(weight: float, sigma: fl
 
 
 def test_the_last_log_counts_and_its_estimates_against_odometry_s_turns():
-    poses = [(9.0, 9.0, 1.0), (0.0, 0.0, 0.0), (0.0, 2.0, 0.5), (0.0, 3.0, 1.0), (1.0, 3.0, 3.0)]
+    poses = [(9.0, 9.0, 1.0), (0.0, 0.0, 0.0), (0.0, 2.0, 0.5), (0.0, 3.5, 1.0), (1.0, 3.5, 3.0)]
     estimates = [estimate(x, 0.1, 0.9, y, heading) for x, y, heading in poses]
     motion = [None, None, (0.0, 1.0, 0.3), AT_ORIGIN, (0.0, 0.0, 0.5)]
     run = blind(estimates, motion, logs=[0, 1, 1, 1, 1])
     values = told(dataclasses.replace(run, confidence=np.array([0.1, 0.5, 0.4, 0.6, 0.9])))
-    assert (values["path_m"], values["odometry_path_m"]) == pytest.approx((4.0, 1.0))
-    assert values["step_off_odometry_m"] == pytest.approx(1.0)  # 1, 1, 1
+    assert (values["path_m"], values["odometry_path_m"]) == pytest.approx((4.5, 1.0))
+    assert values["step_off_odometry_m"] == pytest.approx(1.0)  # 1, 1.5, 1
     assert values["turn_off_odometry_deg"] == pytest.approx(math.degrees(0.5))  # 0.2, 0.5, 1.5
     assert (values["probability"], values["doubtful_share"]) == pytest.approx((0.55, 0.25))
     assert (values["confident_share"], values["first_confident_frame"]) == (1.0, 0)
@@ -105,12 +105,3 @@ def test_where_one_frame_has_doubt_the_run_has_and_its_spread_is_told(sigma, wei
     values = told(blind([PoseEstimate(pose, covariance, share, pose) for covariance, share in frames]))
     assert values["weight"] == pytest.approx(median)
     assert ("spread_m" in values) == (sigma > 0.0)
-
-
-def test_ways_are_in_the_plane_and_medians_are_told():
-    estimates = [estimate(x, 0.1, 0.9, heading=x) for x in (0.0, 1.0, 2.0, 9.0)]
-    matches = [BestMatch(0, 0.0, similarity=similarity) for similarity in (0.1, 0.2, 0.4, 1.0)]
-    values = told(blind(estimates, [None, AT_ORIGIN, AT_ORIGIN, (3.0, 4.0, 1.0)], matches=matches))
-    assert (values["path_m"], values["odometry_path_m"]) == (9.0, 5.0)
-    assert values["step_off_odometry_m"] == 1.0
-    assert values["similarity"] == pytest.approx(0.3)

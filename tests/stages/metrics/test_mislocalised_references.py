@@ -1,15 +1,9 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
-import yaml
 from measured_drives import AT_ORIGIN, Row, figures, made_drive, on_x
 
-from omninav.pipeline.experiment.series import figure_at
 from omninav.stages.metrics.mislocalised_references import MislocalisedReferences
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
-
-KIDNAP = Path(__file__).resolve().parents[3] / "conf" / "experiment" / "particle_cml" / "kidnap.yaml"
 
 
 def event(inserted=(), removed=(), seen=None):
@@ -68,29 +62,6 @@ def test_a_map_without_wrong_places_says_only_that():
 def test_what_is_learned_late_is_held_against_where_it_was_seen():
     late = [event()] * 4 + [event([0], seen=[1]), event()]
     assert followed(WAY, late, [None] * 4 + [mixture((0, 1.0, 1.0)), None])["references"] == 0
-
-
-def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
-    """A lap of 40 frames, points seen in every second one: wrong for 3 laps, a lap longer after each so many points."""
-    events, mixtures = [event()] * (40 * laps), [None] * (40 * laps)
-    for point in range(points):
-        for lap in range(laps):
-            frame = 40 * lap + 10 + 2 * point
-            wrong = lap < 3 + point // later_by_a_lap_each
-            events[frame] = event([point], seen=[frame]) if lap == 0 else event()
-            mixtures[frame] = mixture((point, 50.0 if wrong else 2.0 * point, 1.0))
-    truth = made_drive(on_x(frame % 40 - 10 for frame in range(40 * laps)))
-    return figures(MislocalisedReferences(), truth, events, mixtures)
-
-
-def test_the_measure_of_the_order_of_correction_is_0_where_all_are_corrected_alike_and_positive_where_it_travels():
-    entries = yaml.safe_load(KIDNAP.read_text())["measures"]
-    order, kept = ((entries[name]["path"][0], entries[name].get("aggregate", "mean")) for name in ("order", "kept"))
-    assert figure_at(corrected(99), *order) == pytest.approx(0.0, abs=1e-9)
-    assert figure_at(corrected(4), *order) == pytest.approx(40 / 4, rel=0.15)
-    some_stay = corrected(2, laps=7)
-    assert figure_at(some_stay, *kept) == 4
-    assert figure_at(some_stay, *order) == pytest.approx(40 / 2, rel=0.15)
 
 
 def test_a_place_is_wrong_beyond_two_metres():

@@ -30,35 +30,47 @@ def both_ways(**lengths: float) -> np.ndarray:
     return rows
 
 
-def test_variance_in_falling_order_of_the_coefficients_leaves_nothing_to_gain() -> None:
-    profiles = both_ways(c1=4.0, c2=3.0, c3=2.0)
-    found = measured(profiles, profiles)
-    assert found["segments"] == 12
-    assert found["cosine"] == pytest.approx([16 / 29, 25 / 29, 1.0, 1.0, 1.0, 1.0])
-    assert found["principal"] == pytest.approx(found["cosine"])
-    assert found["least_ratio"] == pytest.approx(1.0)
-
-
-def test_components_put_the_largest_first_and_the_worst_number_counts() -> None:
-    profiles = both_ways(c1=3.0, c7=4.0)
-    found = measured(profiles, None, profiles)
-    assert found["cosine"] == pytest.approx([9 / 25] * 6)
-    assert found["principal"] == pytest.approx([16 / 25] + [1.0] * 5)
-    assert found["least_ratio"] == pytest.approx(9 / 25)
-
-
-def test_components_are_of_the_first_half_and_judged_on_the_second() -> None:
-    found = measured(both_ways(c1=1.0, c2=2.0), both_ways(c1=2.0, c2=1.0))
-    assert found["cosine"][0] == pytest.approx(0.8)
-    assert found["principal"][0] == pytest.approx(0.2)
-
-
-def test_the_mean_of_the_first_half_is_no_variance() -> None:
-    away = np.full(7, 5.0)
-    profiles = both_ways(c1=1.0, c2=2.0)
-    found = measured(profiles + away, profiles + away)
-    assert found["cosine"][0] == pytest.approx(0.2)
-    assert found["principal"][0] == pytest.approx(0.8)
+@pytest.mark.parametrize(
+    ("first", "second", "cosine", "principal"),
+    [
+        pytest.param(
+            {"c1": 4.0, "c2": 3.0, "c3": 2.0},
+            {"c1": 4.0, "c2": 3.0, "c3": 2.0},
+            [16 / 29, 25 / 29, 1, 1, 1, 1],
+            [16 / 29, 25 / 29, 1, 1, 1, 1],
+            id="in falling order",
+        ),
+        pytest.param(
+            {"c1": 3.0, "c7": 4.0},
+            {"c1": 3.0, "c7": 4.0},
+            [9 / 25] * 6,
+            [16 / 25, 1, 1, 1, 1, 1],
+            id="the largest comes first",
+        ),
+        pytest.param(
+            {"c1": 1.0, "c2": 2.0},
+            {"c1": 2.0, "c2": 1.0},
+            [0.8, 1, 1, 1, 1, 1],
+            [0.2, 1, 1, 1, 1, 1],
+            id="of the first half, judged on the second",
+        ),
+        pytest.param(
+            {"c1": 3.0, "c2": 2.0, "c3": 1.0},
+            {"c2": 1.0},
+            [0, 1, 1, 1, 1, 1],
+            [0, 1, 1, 1, 1, 1],
+            id="of which the first keeps nothing",
+        ),
+    ],
+)
+@pytest.mark.parametrize("away", [0.0, 5.0])  # the mean is no variance
+def test_shares_of_variance_and_their_least_ratio(first, second, cosine, principal, away: float) -> None:
+    found = measured(both_ways(**first) + away, None, both_ways(**second) + away)
+    assert found["segments"] == 2 * len(first) + 2 * len(second)
+    assert found["cosine"] == pytest.approx(cosine, abs=1e-6)
+    assert found["principal"] == pytest.approx(principal, abs=1e-6)
+    ratios = [one / other for one, other in zip(cosine, principal, strict=True) if other]
+    assert found["least_ratio"] == pytest.approx(min(ratios))
 
 
 def test_without_two_segments_in_each_half_nothing_is_measured() -> None:
@@ -70,12 +82,6 @@ def test_without_two_segments_in_each_half_nothing_is_measured() -> None:
 
 def test_profiles_that_are_all_alike_say_nothing() -> None:
     assert measured(np.ones((2, 7)), np.ones((2, 7))) is None
-
-
-def test_where_components_keep_nothing_coefficients_are_no_worse() -> None:
-    found = measured(both_ways(c1=3.0, c2=2.0, c3=1.0), both_ways(c2=1.0))
-    assert (found["cosine"][0], found["principal"][0]) == pytest.approx((0.0, 0.0))
-    assert found["least_ratio"] == pytest.approx(1.0)
 
 
 def test_shares_are_summed_from_the_first_column() -> None:
