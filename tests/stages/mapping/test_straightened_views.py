@@ -81,6 +81,11 @@ def test_a_closure_is_as_alike_as_two_that_follow_each_other_and_some_views_apar
     assert closures(looks) == 3  # views 14 to 16; 12 before 13 is a look of 1 for one of 3
 
 
+def test_ten_views_further_on_none_is_a_neighbour():
+    assert closures([*range(10), 0]) == 1
+    assert closures([*range(9), 0]) == 0
+
+
 def test_tours_that_look_elsewhere_are_not_moved_by_the_others(monkeypatch):
     monkeypatch.setattr(MIN_GAP, 2)
     first, second = [0, 1, 2, 3, 4, 5], [100, 101, 102, 103]
@@ -98,8 +103,9 @@ def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual(monk
 
 def test_poses_are_those_of_odometry_and_closures_in_units_of_the_way_between_views(monkeypatch):
     monkeypatch.setattr(MIN_GAP, 4)
-    # Round a square of eight views twice, 2 m from view to view, by odometry that turns too far.
-    around = chain(np.tile([2.0, 0.0, np.pi / 4 + 0.03], (16, 1)))[:16]
+    # Twice round eight views, 1.5, 2.5, 1.5, … and last 2 m from view to view, by odometry that turns too far.
+    ways = [1.5, 2.5] * 7 + [2.0]
+    around = chain(np.array([(0.0, 0.0, 0.0), *[(way, 0.0, np.pi / 4 + 0.03) for way in ways]]))
     made = made_views(between_looks(list(range(8)) * 2), poses=around)
     out, ctx = straightened(made)
     closures = Closures(np.array([(n, n + 8) for n in range(8)]), np.zeros(8))
