@@ -127,9 +127,9 @@ def test_what_landmarks_say_is_bayes_rule_over_the_poses_that_are_right_or_wrong
     # The fix is one standard deviation off in x, and one in heading, across the seam of the circle.
     west, wide = np.array([2.1, 3.0, -math.pi + 0.05]), np.diag([0.1, 0.1, 0.1]) ** 2
     fix = LandmarkFix(west[None], wide[None], np.array([60]), np.array([0.9]), 100)
-    out = updated(heaps(0.7, 0.3, at=(np.array([2.0, 3.0, math.pi - 0.05]), THERE)), fix)
+    out = updated(heaps(0.07, 0.93, at=(np.array([2.0, 3.0, math.pi - 0.05]), THERE)), fix)
     assert (len(out.poses), out.recovery_particles) == (50 + 200 + 200, 200)
-    parts = np.array([0.1 / 20, 0.7 * 0.9 * math.exp(-0.5 * 2.0), 1e-3 * 0.9])  # as before, on the spot, carried
+    parts = np.array([0.1 / 20, 0.07 * 0.9 * math.exp(-0.5 * 2.0), 1e-3 * 0.9])  # as before, on the spot, carried
     sums = [each.sum() for each in np.split(out.weights, [50, 250])]
     assert sums == pytest.approx(parts / parts.sum(), rel=1e-6)
 

@@ -1,5 +1,6 @@
 """Maps of views that are straightened by the places that their drives came back to, and learned again."""
 
+import made_view_maps
 import numpy as np
 import pytest
 from made_ticks import at_tick
@@ -126,6 +127,16 @@ def test_views_are_learned_with_a_spread():
     item = at_log(drive(None, TWICE))[0].updates.items[0]
     assert item.state.covariances[0] == pytest.approx(np.diag([0.1, 0.1, np.radians(3.0)]) ** 2)
     assert item.state.weights.tolist() == [1.0]
+
+
+@pytest.mark.parametrize(("look", "way", "closed"), [(5.9, 1.01, True), (6.1, 1.01, False), (5.9, 0.99, False)])
+def test_a_loop_closes_within_six_tenths_of_the_threshold_and_five_of_its_ways_further_on(look, way, closed):
+    sessions = Sessions.empty(made_view_maps.view(0.0))
+    for tick, (each, ahead) in enumerate(((0.0, 0.0), (50.0, way), (look, -way))):
+        sessions.move(np.array([ahead, 0.0, 0.0]))
+        sessions.keep(made_view_maps.view(each), np.zeros(3), not tick, tick)
+    out, _ = at_log(sessions, threshold=NoveltyThreshold(10.0, True, 0.4))
+    assert (out.updates is not None) == closed
 
 
 WAITING = MapUpdates((MapUpdate(view(TWICE[0]), GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1)), 3),), 2)
