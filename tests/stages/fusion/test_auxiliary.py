@@ -83,7 +83,7 @@ def test_the_selected_particles_move_with_noise_in_all_three_steps() -> None:
 
 
 def test_a_particle_by_itself_keeps_all_the_weight_however_badly_it_fits() -> None:
-    out = found(few(0.0), at(1.0, 0.3))
+    out = found(few(0.0), at(1.0, 0.03))
     assert out.poses[0, 0] != 1.0
     assert out.weights.tolist() == [1.0]
 
