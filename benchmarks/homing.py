@@ -117,9 +117,7 @@ def _absolute() -> list[Row]:
         }
     )
     return [
-        milliseconds(
-            "camera pose, 100 points, half of them wrong", taken["ours"], "poselib (pinhole)", taken["theirs"]
-        ),
+        milliseconds("camera pose, 100 points, half of them wrong", taken["ours"], "poselib (pinhole)", taken["theirs"])
     ]
 
 

@@ -48,10 +48,7 @@ def pose_at(seconds: float) -> tuple[float, float, float]:
 
 
 def pose_fields(x: float, y: float, heading: float) -> dict[str, Any]:
-    return {
-        "position": {"x": x, "y": y},
-        "orientation": {"z": math.sin(heading / 2), "w": math.cos(heading / 2)},
-    }
+    return {"position": {"x": x, "y": y}, "orientation": {"z": math.sin(heading / 2), "w": math.cos(heading / 2)}}
 
 
 def messages(change: Callable[[Made], list[Made]] = lambda made: [made]) -> Iterator[Made]:

@@ -28,12 +28,7 @@ FILES: dict[str, dict[str, str]] = {
     "ocamcalib": DISC
     | {"centre": "{x: 79.5, y: 59.5}", "ocamcalib": "{polynomial: [-40, 0, 0.008], c: 1, d: 0, e: 0, looks: down}"},
     "dual_fisheye": STRIP
-    | {
-        "focal_px": "24",
-        "ahead": "{x: 39.5, y: 39.5}",
-        "back": "{x: 119.5, y: 39.5}",
-        "mask": "{outer_radius_px: 39}",
-    },
+    | {"focal_px": "24", "ahead": "{x: 39.5, y: 39.5}", "back": "{x: 119.5, y: 39.5}", "mask": "{outer_radius_px: 39}"},
     "perspective": DISC,
 }
 """The keys of a camera.yaml of each projection, for images of one of two sizes."""

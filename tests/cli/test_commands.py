@@ -120,10 +120,7 @@ def test_check_says_who_reads_the_truth(omninav):
         (("check", "~nodes.length_scale"), "if the node was taken out, type '~wires.length_scale' too"),
         (("check", "~nodes.length_scale"), "type '~wires.sensor.length_scale' if it can do without"),
         (("--config-dir=nowhere",), "there is no folder nowhere"),
-        (
-            ("variant=wander", "log=d.mcap"),
-            "wander does not take it\n      leave log=… away; its `inputs` are: camera",
-        ),
+        (("variant=wander", "log=d.mcap"), "wander does not take it\n      leave log=… away; its `inputs` are: camera"),
         (("variant=topological_nav",), "goal: topological_nav needs it: where to go"),
         (("+artifacts.map.set={rout: tour}",), "did you mean 'route'?"),
         (("+artifacts.map.inheritd=[unwarp]",), "ArtifactSpecification has no parameter 'inheritd'"),

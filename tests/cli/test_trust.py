@@ -52,10 +52,7 @@ def quoted(word: str) -> str:
 
 def mine(hydra: dict[str, object]) -> None:
     """A folder of configurations `mine`, whose match=mine also sets something of Hydra's."""
-    content = {
-        "hydra": hydra,
-        "nodes": {"match": {"_target_": "omninav.stages.match.selective.SelectiveMatch"}},
-    }
+    content = {"hydra": hydra, "nodes": {"match": {"_target_": "omninav.stages.match.selective.SelectiveMatch"}}}
     (Path("mine") / "match").mkdir(parents=True)
     Path("mine/match/mine.yaml").write_text("# @package _global_\n" + yaml.safe_dump(content))
 

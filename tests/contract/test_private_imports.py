@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PRIVATE = {
-    "pipeline/cli/config_sources.py: omegaconf._utils.get_yaml_loader",  # which texts are numbers, for a faster reader
+    "pipeline/cli/config_sources.py: omegaconf._utils.get_yaml_loader"  # which texts are numbers, for a faster reader
 }
 METHODS = ("_get_node", "_set_value", "_apply_overrides_to_config", "_instantiate")
 

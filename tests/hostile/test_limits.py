@@ -46,10 +46,7 @@ def bomb(kind: str, levels: int) -> str:
 
 @pytest.mark.parametrize("kind", ["text", "list", "computed name", "decoded", "node", "long"])
 def test_interpolations_that_multiply_are_refused_in_one_problem(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    kind: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kind: str
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my/match").mkdir(parents=True)

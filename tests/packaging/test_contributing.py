@@ -42,13 +42,7 @@ def run(tree: Path, *words: str) -> None:
 def test_each_addition_touches_as_many_files_as_it_says() -> None:
     sections = dict(re.findall(r"^## (Add [\w ]+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
     counts = {title: len(re.findall(r"\(new file\)", text)) for title, text in sections.items()}
-    assert counts == {
-        "Add a stage": 2,
-        "Add a variant": 1,
-        "Add a metric": 2,
-        "Add a camera": 2,
-        "Add a log format": 2,
-    }
+    assert counts == {"Add a stage": 2, "Add a variant": 1, "Add a metric": 2, "Add a camera": 2, "Add a log format": 2}
     assert not any(name.startswith("pipeline/") for name in FILES)
 
 

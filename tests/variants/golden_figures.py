@@ -65,12 +65,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "topological_localisation": (TOUR, DRIVE, EVERY_SECOND),
     "topological_localisation_as_printed": (TOUR, DRIVE, EVERY_SECOND),
     "topological_nav": ("world=home_store_demo", *SMALL_CAMERA, "goal=3", "nodes.source.seconds=3"),
-    "topological_nav_as_printed": (
-        "world=home_store_demo",
-        *SMALL_CAMERA,
-        "goal=3",
-        "nodes.source.seconds=3",
-    ),
+    "topological_nav_as_printed": ("world=home_store_demo", *SMALL_CAMERA, "goal=3", "nodes.source.seconds=3"),
     "topological_nav_map": (MAPPED, EVERY_SECOND),
     "topological_nav_as_printed_map": (MAPPED, EVERY_SECOND),
     "two_views": (),

@@ -106,10 +106,7 @@ PRINTED: dict[str, Stages] = {
 PRINTED_MAP: Stages = {
     "features": ("SiftAndVerticalSegments", {}),
     "views": ("ViewComparison", {"patch_distance": "mahalanobis"}),
-    "loops": (
-        "LoopClosure",
-        {"between": "medoids", "similarity": "ratio", "min_share": 0.0, "accepted": "merge"},
-    ),
+    "loops": ("LoopClosure", {"between": "medoids", "similarity": "ratio", "min_share": 0.0, "accepted": "merge"}),
     "mapping": ("TopologicalMapping", {"min_path_matches": 0, "spread": "all_views"}),
 }
 """Stages of a map of Goedemé et al., which keeps prototypes alone."""

@@ -165,10 +165,7 @@ def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, bat
             ({**second, "motion": (1e300, 0, 0)}, "expected three finite numbers"),
             ({**second, "odometry": None, "motion": (1e4, 0, 0)}, "10000 m since the image before"),
             ({**second, "motion": (0.0, 0.0, 0.0)}, "motion=… and odometry=… are both given"),
-            (
-                {**second, "odometry": np.array([1 + 2j, 0, 0])},
-                "expected three finite numbers .*, not complex",
-            ),
+            ({**second, "odometry": np.array([1 + 2j, 0, 0])}, "expected three finite numbers .*, not complex"),
             ({**second, "odometry": [np.complex64(1), 0, 0]}, "not complex"),
             ({**second, "odometry": masked}, "odometry has masked values, expected an array without a mask"),
             ({**second, "image": np.ma.masked_greater(second["image"], 100)}, "image has masked values"),

@@ -278,11 +278,7 @@ def test_a_claim_has_a_case_for_each_condition_that_it_leaves_open():
     others = swept({"of": {"day": "1"}, "below": {"method": "b"}}, GRID)
     assert [(case.where, case.against) for case in others] == [("a, 1", "method b"), ("c, 1", "method b")]
     ratios = swept({"of": {"day": "1"}, "ratio_to": {"method": "b", "day": "2"}, "below": 2.0}, GRID)
-    assert [case.where for case in ratios] == [
-        "a, 1 / method b, day 2",
-        "b, 1 / day 2",
-        "c, 1 / method b, day 2",
-    ]
+    assert [case.where for case in ratios] == ["a, 1 / method b, day 2", "b, 1 / day 2", "c, 1 / method b, day 2"]
 
 
 def test_the_lowest_is_so_among_conditions_that_differ_in_the_claim_s_factors_or_in_those_it_names():

@@ -281,8 +281,7 @@ def test_what_is_no_wire_says_why(wire: object, where: str, message: str):
 
 
 @pytest.mark.parametrize(
-    "target",
-    ["toys.NotAStage", "os.system", "toys.Scale.step", "nowhere.Thing", "toys.Scael", "plain", "toys:Scael"],
+    "target", ["toys.NotAStage", "os.system", "toys.Scale.step", "nowhere.Thing", "toys.Scael", "plain", "toys:Scael"]
 )
 def test_a_target_that_is_no_stage_is_refused_and_never_called(target: str):
     with pytest.raises(ProblemsFound) as found:

@@ -54,10 +54,7 @@ def two_of_one_graph(tmp_path: Path) -> dict[str, Any]:
     graph = graph_of_toys({"source": "Count", "twice": "Scale", "kept": "Collected", "also": "Collected"}, wires)
     made = {"variant": "toy", "graph": graph}
     together = {"required": False, "together_with": "map", "for_plots": True}
-    artifacts = {
-        "map": {**made, "output": "twice.number"},
-        "album": {**made, "output": "source.number", **together},
-    }
+    artifacts = {"map": {**made, "output": "twice.number"}, "album": {**made, "output": "source.number", **together}}
     folders = {name: str(tmp_path / name) for name in ("cache", "runs")}
     wires = {"reader": {"number": "artifacts.map", "other": "artifacts.album"}}
     return graph_of_toys(NODES, wires, variant="toys", artifacts=artifacts, **folders)
