@@ -1,6 +1,8 @@
-"""The framework knows no robot, neither in names nor in prose."""
+"""The framework knows no robot, neither in names nor in prose, and runs a graph of other stages without ours."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 PIPELINE = Path(__file__).parents[2] / "pipeline"
@@ -35,3 +37,16 @@ def test_no_file_of_the_framework_has_a_word_of_robots():
         if words(line) & WORDS
     ]
     assert not found, "\n".join(found)
+
+
+def test_a_run_of_other_stages_imports_none_of_a_robots(tmp_path: Path):
+    program = (
+        "import sys, pathlib, toy_runs\n"
+        "toy_runs.ended(toy_runs.noisy_sum(pathlib.Path('runs')))\n"
+        "print([name for name in sys.modules if name.startswith('omninav.stages')])\n"
+    )
+    environment = {"PYTHONPATH": f"{PIPELINE.parent}:{PIPELINE.parent / 'tests'}", "PATH": "/usr/bin:/bin"}
+    command = [sys.executable, "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, cwd=tmp_path)
+    assert ended.stdout == "[]\n", ended.stderr
+    assert (tmp_path / "runs" / "latest" / "report.html").is_file()

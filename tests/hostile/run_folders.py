@@ -10,7 +10,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import toys
+from toy_runs import Stop, noisy_sum
+
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.resume import resume
@@ -19,27 +20,10 @@ from omninav.pipeline.run.run_folder import start
 from .harness import Format, Wrong
 from .mutations import BINARY, TEXT, Files, on
 
-NODES = {"source": "Count", "noise": "Noise", "sum": "Add", "all": "Collected"}
-WIRES: dict[str, Any] = {
-    "noise": {"number": "source.number"},
-    "sum": {"number": "noise.number", "other": {"from": "sum.number", "delay": 1, "initial": None}},
-    "all": {"numbers": {"from": "sum.number", "collect": True}},
-}
-
 
 def planned(cache: Path | None = None) -> Plan:
     """A small graph with state, random numbers and a sequence."""
-    nodes = {name: {"_target_": f"{toys.__name__}.{stage}"} for name, stage in NODES.items()}
-    config = {"variant": "toy", "checkpoint_s": 0.0, "runs": "runs", "nodes": nodes, "wires": WIRES}
-    return plan({**config, "cache": str(cache)} if cache else config)
-
-
-class _Stop:
-    """Stops a run after some ticks, as Ctrl-C does."""
-
-    def update(self, name: str, done: int, total: int | None = None) -> None:
-        if done == 7:
-            raise KeyboardInterrupt
+    return plan(noisy_sum(Path("runs"), **({"cache": str(cache)} if cache else {})))
 
     def say(self, words: str) -> None:
         pass
@@ -72,7 +56,7 @@ def stopped() -> Sequence[Files]:
     with tempfile.TemporaryDirectory() as scratch, inside(Path(scratch)):
         run = start(planned(), ["omninav", "variant=toy"], Path("run"))
         try:
-            execute(run, planned(), _Stop())
+            execute(run, planned(), Stop())
         except KeyboardInterrupt:
             return [_files(Path("run"))]
     raise AssertionError("it was not stopped")

@@ -11,7 +11,7 @@ from conftest import DATA, needs_data
 from made_values import with_few_landmarks
 from small_run import reference_graph
 
-from hostile.map_files import MAP, entries_of, fields_of, sealed, with_fields
+from hostile.map_files import MAP, entries_of, fields_of, with_fields
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.artifact import artifact_bytes, read_artifact
 from omninav.stages.recordings.opening import open_recording
@@ -26,17 +26,6 @@ def poses_like(poses: np.ndarray) -> bytes:
     map = reference_graph(6)
     map.put(poses=poses)
     return artifact_bytes(map)
-
-
-def without(name: str) -> bytes:
-    """A map without one of its files."""
-    entries = entries_of(artifact_bytes(reference_graph(6)))
-    return sealed({other: content for other, content in entries.items() if other != name})
-
-
-def replaced(name: str, content: bytes) -> bytes:
-    """A map with another content for one of its files."""
-    return sealed(entries_of(artifact_bytes(reference_graph(6))) | {name: content})
 
 
 def landmarks_like(**fields: Any) -> bytes:
@@ -55,10 +44,6 @@ assert FEW is not None
         (poses_like(np.zeros(6)), "'poses' has the shape (6,), expected (R, 3)"),
         (poses_like(np.full((6, 3), np.nan)), "'poses' holds nan, expected finite numbers"),
         (poses_like(np.zeros((5, 3))), "'features' has the shape (6, 10, 20), expected (R, segments, bins), R = 5"),
-        (without("header.json"), "not a valid artifact"),
-        (replaced("header.json", b"[1]"), "written in format None"),
-        (replaced("edges.npy", b""), "not a valid artifact"),
-        (replaced("rest.npy", bytes(10**9)), "would unpack"),
         (landmarks_like(points=np.full_like(FEW.points, np.nan)), "'landmarks': 'points' holds nan, expected finite"),
         (landmarks_like(descriptors=FEW.descriptors[:, :4].copy()), "'words' are of descriptors of 8 numbers"),
         (landmarks_like(words=replace(FEW.words, words=FEW.words.words - np.int32(1))), "'words': 'words' names a row"),

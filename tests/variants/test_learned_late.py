@@ -39,12 +39,8 @@ def told(request):
     rng = np.random.default_rng(0)
     waves, phases = rng.normal(0.0, 1.0, (2, 60)), rng.uniform(0.0, 2 * math.pi, 60)
     step, radius = 2 * math.pi / LAP, ROUND_M / (2 * math.pi)
-    limit, first, changes, map = (
-        CalibratedThreshold(),
-        CalibratedThresholdState(),
-        ChangedMixtures(),
-        ViewMixtures.empty(),
-    )
+    limit, first = CalibratedThreshold(), CalibratedThresholdState()
+    changes, map = ChangedMixtures(), ViewMixtures.empty()
     lessons, waiting, mapping, learned = WAYS[request.param]()
     ctx = Context("late")
     ticks, truth, motions, events, mixtures = [], [], [], [], []

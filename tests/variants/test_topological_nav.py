@@ -8,13 +8,11 @@ from pathlib import Path
 
 import pytest
 from background_runs import assert_same_bytes, whole_and_resumed
-from conftest import DATA, needs_data
 from golden_figures import SMALL_CAMERA
 
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.stages.values.topological_map import TopologicalMap
 
-HOUSE = DATA / "photoreal-house"
 WORDS = ("variant=topological_nav", "world=home_store_demo", *SMALL_CAMERA)
 
 
@@ -79,15 +77,3 @@ def test_what_nothing_reads_is_refused(omninav):
     assert ended.returncode != 0
     for key in ("tour", "goal"):
         assert f"{key}: homing does not take it" in ended.stderr
-
-
-@needs_data
-def test_a_drive_through_a_house_is_known_by_its_places(omninav, tmp_path: Path):
-    logs = (f"tour={HOUSE / 'tour.mcap'}", f"log={HOUSE / 'drive.mcap'}")
-    words = ("variant=topological_localisation", *logs, "nodes.source.stride=3")
-    omninav(*words, check=True)
-    found = metrics_of(tmp_path)["localisation"]
-    assert found["images"] == 44
-    assert found["adjacent_accuracy"] > 0.7
-    assert found["place_distance_m"] < 1.0
-    assert (tmp_path / "runs" / "latest" / "trajectory.tum").exists()

@@ -16,6 +16,7 @@ from omninav.stages.values.visual_words import VisualWords
 
 FOUND = ("candidates=words", f"log={DRIVE}", "nodes.candidates.compare_all_up_to=0", "plots=none")
 MADE = ("variant=omniview_mcl", *FOUND, f"tour={TOUR}", "nodes.source.stop=12")
+MAPPING = "+artifacts.map.nodes.mapping"
 DISTANCES = {
     "omninav": "distance_m",
     "omniview_mcl": "distance_m",
@@ -49,7 +50,7 @@ def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("variant", DISTANCES)
 def test_what_is_typed_for_a_map_is_of_its_words_too(variant: str) -> None:
-    typed = f"+artifacts.map.nodes.mapping.{DISTANCES[variant]}=0.7"
+    typed = f"{MAPPING}.{DISTANCES[variant]}=0.7"
     with composed([f"variant={variant}", "candidates=words", typed]) as config:
         made = {artifact.name: artifact.graph for artifact in plan(complete(config)).artifacts}
     for name in ("map", "words"):
@@ -60,11 +61,8 @@ def test_what_is_typed_for_a_map_is_of_its_words_too(variant: str) -> None:
 
 def test_words_are_of_the_map_that_is_used(tmp_path: Path, shared_cache: Path) -> None:
     overrides = {
-        "its own parameter": ("+artifacts.map.nodes.mapping.distance_m=0.6",),
-        "another stage's": (
-            "artifacts.map.choices.mapping=image_database",
-            "+artifacts.map.nodes.mapping.min_distance_m=0.3",
-        ),
+        "its own parameter": (f"{MAPPING}.distance_m=0.6",),
+        "another stage's": ("artifacts.map.choices.mapping=image_database", f"{MAPPING}.min_distance_m=0.3"),
         "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
     }
     sizes = set()

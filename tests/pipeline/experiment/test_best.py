@@ -27,19 +27,18 @@ def best(**figures: list[tuple[float, float | None]]) -> tuple[str, str] | None:
 
 
 @pytest.mark.parametrize(
-    ("figures", "label"),
+    ("figures", "found"),
     [
-        ({"v1": [(0.0, 30.0)] * 2, "v2": [(1.0, 5.0)] * 2, "v3": [(0.5, 9.0)] * 2}, "1"),
-        ({"v1": [(0.0, 30.0)] * 2, "v2": [(0.0, 5.0), (0.0, 7.0)], "v3": [(1.0, 1.0)] * 2}, "2"),
-        ({"v1": [(0.0, None), (0.0, 1.0)], "v2": [(0.0, 50.0)] * 2}, "2"),
+        ({"v1": [(0.0, 30.0)] * 2, "v2": [(1.0, 5.0)] * 2, "v3": [(0.5, 9.0)] * 2}, ("1", 0.0, 30.0)),
+        ({"v1": [(0.0, 30.0)] * 2, "v2": [(0.0, 5.0), (0.0, 7.0)], "v3": [(1.0, 1.0)] * 2}, ("2", 0.0, 6.0)),
+        ({"v1": [(0.0, None), (0.0, 1.0)], "v2": [(0.0, 50.0)] * 2}, ("2", 0.0, 50.0)),
+        ({"v2": [(0.0, 5.0), (2.0, 7.0)]}, ("2", 1.0, 6.0)),
     ],
 )
-def test_the_best_is_lost_least_and_among_equals_errs_least(figures: dict[str, list[tuple[float, float]]], label: str):
-    found = best(**figures)
-    assert found is not None
-    assert found[0] == label
+def test_the_best_is_lost_least_and_among_equals_errs_least_and_is_named_with_its_figures(figures: dict, found: tuple):
+    label, lost, error = found
+    assert best(**figures) == (label, f"Lost (%) {lost}, Error (cm) {error}")
 
 
-def test_it_is_named_with_its_figures_and_nothing_is_where_nothing_ran():
-    assert best(v2=[(0.0, 5.0), (2.0, 7.0)]) == ("2", "Lost (%) 1.0, Error (cm) 6.0")
+def test_of_what_has_not_run_nothing_is_best():
     assert best() is None

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import re
 import zlib
 from collections.abc import Sequence
 from importlib import import_module
@@ -35,11 +36,12 @@ def compose(words: Sequence[str]) -> dict[str, Any]:
         {"_target_": "Drive", "length_": int(given["frames"])},
         {"_target_": "Fail", "at": int(given["fails"])},
     )
+    noisy = {"from": "noise.number", "collect": True}
     wires = {
         "sum": {"number": "source.number", "other": "artifacts.more"},
         "fail": {"number": "sum.number"},
         "noise": {"number": "fail.number"},
-        "all": {"numbers": {"from": "noise.number", "collect": True}},
+        "all": {"numbers": noisy, "present": noisy},
     }
     more = {"graph": toys.graph_of_toys({"more": {"_target_": "Constant", "value": float(given["more"])}})}
     return toys.graph_of_toys(
@@ -85,11 +87,14 @@ def test_every_seed_runs_in_every_scenario_and_what_does_not_depend_on_it_once_i
     assert [name.rpartition(" ")[0] for name in ran[:4]] == ["a drive of 2", "a drive of 4", "more", "more"]
     assert ran[4:] == [f"more_{m}_{s}" for m in ("one", "ten") for s in ("short_0", "short_2", "long_3", "long_5")]
     assert (well, result.missing, result.failures, sums) == (True, 0, {}, 2 * 2 * (2 + 4))
-    assert list(result.recordings.values()) == ["length 2 m", "length 4 m"]
     assert result.repeated.startswith("6 repetitions of each condition with seeds 0 to 5, 3 in each of 2 scenarios (sh")
     assert result.common_overrides == ("variant=none", "seed=0")
     row = result.conditions[1]
     assert (row.name, row.done, row.overrides) == ("more one, scenario long", "3/3", "more=1 frames=4")
+    page = (tmp_path / "runs/test_full/test.md").read_text()
+    recordings = re.findall(r"^\* Recording `(.*) \w{12}`: (.*)\.$", page, re.MULTILINE)
+    assert recordings == [("a drive of 2", "length 2 m"), ("a drive of 4", "length 4 m")]
+    assert "\n| condition | repetitions | Present |\n|---|---|---|\n| more one, scenario short | 3/3 | 2 |\n" in page
     for cell, more in zip(result.cells["mean"], (1.0, 10.0), strict=True):
         noises = [np.random.default_rng([seed, zlib.crc32(b"noise")]).normal(size=4) for seed in range(6)]
         means = [*(more + 0.5 + each[:2].mean() for each in noises[:3]), *(more + 1.5 + n.mean() for n in noises[3:])]
@@ -103,11 +108,8 @@ def test_every_seed_runs_in_every_scenario_and_what_does_not_depend_on_it_once_i
 def test_a_condition_that_fails_is_named_and_runs_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep = {"more": {"one": "more=1", "none": "more=1 fails=1"}}
     well, result, *_ = run(tmp_path / "runs", monkeypatch, sweep=sweep)
-    assert (well, list(result.failures), result.missing) == (
-        False,
-        [f"more none, scenario {s}" for s in ("short", "long")],
-        0,
-    )
+    failed = ["more none, scenario short", "more none, scenario long"]
+    assert (well, list(result.failures), result.missing) == (False, failed, 0)
     assert [(cell.found, cell.ran) for cell in result.cells["mean"]] == [(6, 6), (0, 6)]
     assert [row.done for row in result.conditions] == ["3/3", "3/3", "0/3", "0/3"]
     assert json.loads((tmp_path / "runs/test_full/experiment.json").read_text())["status"] == "failed"

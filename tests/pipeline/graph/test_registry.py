@@ -81,12 +81,11 @@ def test_a_plugin_of_the_name_of_a_built_in_stage_is_a_problem(stage_file: Path,
     assert "'match.l2' is of omninav itself" in next(entry for entry in plugins() if entry.name == "match.l2").problem
 
 
-def test_an_environment_entry_that_is_not_understood_says_what_to_write(monkeypatch: pytest.MonkeyPatch):
+def test_an_entry_that_is_not_understood_says_what_to_write_and_a_missing_file_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+):
     monkeypatch.setenv("OMNINAV_STAGES", "my_stage.py")
     (entry,) = plugins()
     assert "write role.name=package.module:Class" in entry.problem
-
-
-def test_a_missing_file_is_named(tmp_path: Path):
     with pytest.raises(UnknownStage, match=r"there is no file .*nothing\.py"):
-        resolve(f"{tmp_path}/nothing.py:Twice")
+        resolve("nothing.py:Twice")

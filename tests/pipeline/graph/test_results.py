@@ -26,9 +26,7 @@ def test_numbers_of_numpy_are_merged_as_json_holds_them():
 
 
 def test_what_a_run_was_for_is_said_first():
-    driven, reached = (
-        Metrics({"m": 1}, headlines=("m",)),
-        Metrics({"reached": 1}, headlines=("reached",), foremost=True),
-    )
+    driven = Metrics({"m": 1}, headlines=("m",))
+    reached = Metrics({"reached": 1}, headlines=("reached",), foremost=True)
     assert merged([driven, reached]).headlines == ("reached", "m")
     assert merged([reached, driven]).headlines == ("reached", "m")

@@ -46,11 +46,8 @@ def test_without_a_file_the_port_stays_empty_and_with_one_it_is_wired(known: Pat
 
 
 def two_of_one_graph(tmp_path: Path) -> dict[str, Any]:
-    wires = {
-        "twice": {"number": "source.number"},
-        "kept": {"numbers": {"from": "source.number", "collect": True}},
-        "also": {"numbers": {"from": "twice.number", "collect": True}},
-    }
+    kept, also = ({"numbers": {"from": f"{node}.number", "collect": True}} for node in ("source", "twice"))
+    wires = {"twice": {"number": "source.number"}, "kept": kept, "also": also}
     graph = graph_of_toys({"source": "Count", "twice": "Scale", "kept": "Collected", "also": "Collected"}, wires)
     made = {"variant": "toy", "graph": graph}
     together = {"required": False, "together_with": "map", "for_plots": True}
@@ -131,44 +128,27 @@ def test_a_specification_that_is_wrong_says_where_and_what_is_near(spec: Any, wh
     assert words in str(problem)
 
 
-def test_a_block_of_artifacts_that_is_no_mapping_is_a_problem() -> None:
-    with pytest.raises(ProblemsFound, match="expected a mapping from names"):
-        read_specifications({"artifacts": ["map"]})
-
-
 def said_of(config: dict[str, Any]) -> str:
     with pytest.raises(ProblemsFound) as found:
         plan(config)
     return str(found.value)
 
 
-def test_a_port_that_needs_the_artifact_is_a_problem_without_it() -> None:
-    assert "wires.reader.number" in said_of(of_file(None) | {"wires": {"reader": {"number": "artifacts.map"}}})
-
-
-def test_an_artifact_that_is_neither_given_nor_made_says_what_to_give() -> None:
-    said = said_of(configuration(variant="toy", made_from=["tour"]))
-    assert "this variant needs a map, and none is given" in said
-    assert "type tour=… to make one, or map=FILE.omap to load one" in said
-
-
-def test_what_an_artifact_is_made_from_given_in_its_place_says_what_to_type(tmp_path: Path) -> None:
-    file = tmp_path / "drive.mcap"
-    file.write_bytes(b"\x89MCAP0\r\n")
-    said = said_of(configuration(variant="toy", made_from=["tour"], file=str(file)))
-    assert f"if it is what a map is made from, type tour={file}" in said
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    assert "nowhere.omap: there is no such file" in said_of(of_file(tmp_path / "nowhere.omap"))
-
-
-def test_an_output_that_the_graph_does_not_have_names_the_nearest(tmp_path: Path) -> None:
-    config = two_of_one_graph(tmp_path)
-    config["artifacts"]["map"]["output"] = "twize.number"
-    said = said_of(config)
-    assert "artifacts.map.output: there is no output 'twize.number'" in said
-    assert "did you mean 'twice.number'?" in said
+def test_what_an_artifact_lacks_is_named_with_what_to_type(tmp_path: Path) -> None:
+    log, other_output = tmp_path / "drive.mcap", two_of_one_graph(tmp_path)
+    log.write_bytes(b"\x89MCAP0\r\n")
+    other_output["artifacts"]["map"]["output"] = "twize.number"
+    tour = {"variant": "toy", "made_from": ["tour"]}
+    for config, *words in (
+        ({"artifacts": ["map"]}, "expected a mapping from names"),
+        (of_file(None) | {"wires": {"reader": {"number": "artifacts.map"}}}, "wires.reader.number"),
+        (configuration(**tour), "this variant needs a map, and none is given", "type tour=… to make one, or map=FILE"),
+        (configuration(**tour, file=str(log)), f"if it is what a map is made from, type tour={log}"),
+        (of_file(tmp_path / "nowhere.omap"), "nowhere.omap: there is no such file"),
+        (other_output, "artifacts.map.output: there is no output 'twize.number'", "did you mean 'twice.number'?"),
+    ):
+        said = said_of(config)
+        assert [each for each in words if each not in said] == [], said
 
 
 @pytest.mark.parametrize(

@@ -44,17 +44,10 @@ def begun(cache: Cache | None, content: str = "a", seed: int = 0, noise: bool = 
     return engine.values["table.table"].rows, bool(len(engine.calls["table"].times))
 
 
-def test_it_is_made_once_for_each_content(tmp_path: Path) -> None:
+def test_it_is_made_once_for_each_content_and_every_time_without_a_cache(tmp_path: Path) -> None:
     cache = Cache(tmp_path)
-    first, again, other = begun(cache), begun(cache), begun(cache, "b")
-    assert [first[1], again[1], other[1]] == [True, False, True]
-    assert first[0] == again[0] == [97.0]
-    assert other[0] == [98.0]
-
-
-def test_without_a_cache_it_is_made_every_time() -> None:
-    assert begun(None)[1]
-    assert begun(None)[1]
+    assert [begun(cache), begun(cache), begun(cache, "b")] == [([97.0], True), ([97.0], False), ([98.0], True)]
+    assert [begun(None), begun(None)] == [([97.0], True)] * 2
 
 
 def test_where_chance_took_part_it_is_kept_for_its_seed(tmp_path: Path) -> None:
@@ -64,18 +57,13 @@ def test_where_chance_took_part_it_is_kept_for_its_seed(tmp_path: Path) -> None:
     assert one[0] == same[0] != other[0]
 
 
-@pytest.mark.parametrize("damage", ["cut", "flipped", "other file"])
+@pytest.mark.parametrize("content", [b"", b"faiss"])
 def test_a_damaged_one_is_thrown_away_and_made_again(
-    tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+    tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]
 ) -> None:
     cache = Cache(tmp_path)
-    expected, _ = begun(cache)
+    begun(cache)
     (file,) = tmp_path.glob("*.value")
-    content = file.read_bytes()
-    flipped = content[:-5] + bytes([content[-5] ^ 1]) + content[-4:]
-    file.write_bytes({"cut": content[:100], "flipped": flipped, "other file": b"faiss"}[damage])
-    healed, made = begun(cache)
-    assert made
-    assert healed == expected
-    assert "made again" in capsys.readouterr().err + caplog.text
-    assert not begun(cache)[1]
+    file.write_bytes(content)
+    assert [begun(cache), begun(cache)] == [([97.0], True), ([97.0], False)]
+    assert "made again" in capfd.readouterr().err

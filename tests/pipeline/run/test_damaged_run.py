@@ -8,10 +8,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
 
 import pytest
-from toy_runs import begun, ended
+from toy_runs import Stop, begun, ended, noisy_sum
 
 from omninav.pipeline.engine import damage
 from omninav.pipeline.files import read_json
@@ -20,26 +19,6 @@ from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import RunFolder
-from toys import graph_of_toys
-
-NODES = {"source": "Count", "noise": "Noise", "sum": "Add", "all": "Collected"}
-WIRES = {
-    "noise": {"number": "source.number"},
-    "sum": {"number": "noise.number", "other": {"from": "sum.number", "delay": 1, "initial": None}},
-    "all": {"numbers": {"from": "sum.number", "collect": True}},
-}
-
-
-def config(place: Path) -> dict[str, Any]:
-    return graph_of_toys(NODES, WIRES, variant="toy", checkpoint_s=0.0, runs=str(place))
-
-
-class Stop:
-    """Stops a run after some ticks, as Ctrl-C does."""
-
-    def update(self, name: str, done: int, total: int | None = None) -> None:
-        if done == 7:
-            raise KeyboardInterrupt
 
     def say(self, words: str) -> None:
         pass
@@ -54,7 +33,7 @@ def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def complete(tmp_path: Path) -> RunFolder:
     """A run that was never stopped."""
-    return ended(config(tmp_path / "whole"))
+    return ended(noisy_sum(tmp_path / "whole"))
 
 
 @pytest.fixture
@@ -65,7 +44,7 @@ def whole(complete: RunFolder) -> bytes:
 
 @pytest.fixture
 def stopped(tmp_path: Path) -> RunFolder:
-    stopping = config(tmp_path / "stopped")
+    stopping = noisy_sum(tmp_path / "stopped")
     run = begun(stopping)
     with pytest.raises(KeyboardInterrupt):
         execute(run, plan(stopping), Stop())

@@ -1,5 +1,3 @@
-import json
-
 import pytest
 
 from omninav.pipeline import BadInput, Metrics, Quantity
@@ -18,14 +16,11 @@ def test_metrics_are_read_back_with_their_descriptions(tmp_path):
     assert read.quantities["error_m"].absent == "never"
 
 
-def test_metrics_of_a_run_without_descriptions_are_read_undescribed(tmp_path):
-    (tmp_path / "metrics.json").write_text(json.dumps({"error_m": 1.0}))
-    assert read_metrics(tmp_path).quantities == {}
-
-
-def test_a_folder_without_metrics_is_refused(tmp_path):
+def test_metrics_without_descriptions_are_read_undescribed_and_a_folder_without_metrics_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no metrics"):
         read_metrics(tmp_path)
+    (tmp_path / "metrics.json").write_text('{"error_m": 1.0}')
+    assert (read_metrics(tmp_path).values, read_metrics(tmp_path).quantities) == ({"error_m": 1.0}, {})
 
 
 @pytest.mark.parametrize(
