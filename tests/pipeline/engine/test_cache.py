@@ -48,21 +48,18 @@ def test_a_flipped_bit_is_found_thrown_away_and_said_once(
     assert cache.find(ONE, ".result") is not None
 
 
-def test_the_result_of_another_key_under_this_name_is_no_result(cache: Cache):
+def test_half_a_result_or_that_of_another_key_under_this_name_is_none(cache: Cache):
     one, other = kept(cache, ONE, b"one"), cache.path(OTHER, ".result")
     for suffix in (".result", ".result.entry"):
         one.with_suffix(suffix).rename(other.with_suffix(suffix))
     assert cache.find(OTHER, ".result") is None
+    kept(cache, ONE, b"one").with_suffix(".result.entry").unlink()
+    assert cache.find(ONE, ".result") is None
 
 
 @pytest.mark.parametrize("content", [b"", seal(b""), seal(encode([])), seal(encode({"key": ONE}))])
 def test_an_entry_that_states_nothing_is_no_entry(cache: Cache, content: bytes):
     write_whole(kept(cache, ONE, b"one").with_suffix(".result.entry"), content)
-    assert cache.find(ONE, ".result") is None
-
-
-def test_half_a_result_is_none(cache: Cache):
-    kept(cache, ONE, b"one").with_suffix(".result.entry").unlink()
     assert cache.find(ONE, ".result") is None
 
 

@@ -55,12 +55,7 @@ def test_things_that_are_written_together_come_back_each(things: list[object]):
 
 
 def test_arrays_of_one_form_are_written_together_and_come_back_apart():
-    for array in (
-        np.float32(1.5) * np.ones((2, 3), np.float32),
-        np.array(2.0),
-        np.zeros((0, 3)),
-        np.asfortranarray(np.eye(3)),
-    ):
+    for array in (np.full((2, 3), 1.5, np.float32), np.array(2.0), np.zeros((0, 3)), np.asfortranarray(np.eye(3))):
         first, second = decode_all(encode_all([array, array + 1]), 2)
         np.testing.assert_array_equal(second, array + 1)
         assert (first.dtype, first.shape, type(first)) == (array.dtype, array.shape, np.ndarray)

@@ -93,21 +93,17 @@ def flipped(path: Path, at: int, bit: int = 0) -> Path:
     return path
 
 
-def test_messages_come_back_in_the_order_of_their_header_stamps(tmp_path: Path) -> None:
+def test_messages_come_back_in_the_order_of_their_stamps_which_without_a_header_are_log_times(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     with LogWriter(path) as log:
         for log_time, stamp in ((1, 30), (2, 10), (3, 20)):
             log.write("/pose", POSE, stamp, {"header": {"frame_id": "map"}}, log_time=log_time)
-    found = list(LogReader(path).messages())
-    assert [(m.stamp, m.log_time) for m in found] == [(10, 2), (20, 3), (30, 1)]
-    assert found[0].content.header.frame_id == "map"
-
-
-def test_a_message_without_a_header_has_its_log_time_as_stamp(tmp_path: Path) -> None:
-    with LogWriter(tmp_path / "log.mcap") as log:
         log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"})
-    (message,) = LogReader(tmp_path / "log.mcap").messages()
-    assert (message.stamp, message.content.data) == (7, "seven")
+    text, *found = LogReader(path).messages()
+    assert (text.stamp, text.content.data) == (7, "seven")
+    assert [(m.stamp, m.log_time, m.content.header.frame_id) for m in found] == [
+        (10, 2, "map"), (20, 3, "map"), (30, 1, "map"),
+    ]  # fmt: skip
 
 
 def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -164,26 +160,19 @@ def test_a_log_cut_behind_its_messages_loses_nothing(path: Path, whole: list) ->
     assert reader.attachments == {"note.txt": b"in the middle"}
 
 
-@pytest.mark.parametrize("which", [0, 2, -1])
-def test_a_bad_chunk_costs_only_itself_and_is_counted_once(path: Path, whole: list, which: int) -> None:
+@pytest.mark.parametrize(("which", "where"), [(0, "content"), (2, "content"), (-1, "content"), (1, "length")])
+def test_a_bad_chunk_costs_only_itself_and_is_counted_once(path: Path, whole: list, which: int, where: str) -> None:
     chunks = chunk_places(path)
     start, length = chunks[which]
-    reader = LogReader(flipped(path, start + length // 2))
+    at = start + length // 2 if where == "content" else start - 8 + 5  # a high byte of the record's length
+    reader = LogReader(flipped(path, at))
     found = keys(reader)
     assert set(found) < set(whole)
+    assert found == [key for key in whole if key in set(found)]
     assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
     assert keys(reader) == found  # a second scan
     assert reader.dropped == {"bad_chunk": 1, "missing_message": len(whole) - len(found)}
     assert str(path) in reader.details["bad_chunk"]
-
-
-def test_a_chunk_whose_length_is_damaged_costs_only_itself(path: Path, whole: list) -> None:
-    chunks = chunk_places(path)
-    reader = LogReader(flipped(path, chunks[1][0] - 8 + 5))  # a high byte of the record's length
-    found = keys(reader)
-    assert found == [key for key in whole if key in set(found)]
-    assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
-    assert reader.dropped == {"bad_chunk": 1, "missing_message": len(whole) - len(found)}
 
 
 def test_a_flipped_bit_anywhere_is_never_delivered_as_data(tmp_path: Path) -> None:

@@ -56,21 +56,12 @@ def boxes(text: str) -> dict[str, tuple[float, float, float, float]]:
     return found
 
 
-def test_wires_of_a_tick_lead_from_left_to_right():
+def test_wires_of_a_tick_lead_from_left_to_right_and_what_runs_after_the_loop_stands_below_it():
     placed = boxes(svg(loop()))
     assert set(placed) == {"source", "start", "see", "move", "fuse", "score", "artifacts"}
-    for start, end in (
-        ("source", "see"),
-        ("see", "fuse"),
-        ("move", "fuse"),
-        ("source", "start"),
-        ("artifacts", "source"),
-    ):
-        assert placed[start][0] + placed[start][2] < placed[end][0], (start, end)
-
-
-def test_what_runs_after_the_loop_stands_below_it():
-    placed = boxes(svg(loop()))
+    for pair in ("source see", "see fuse", "move fuse", "source start", "artifacts source"):
+        start, end = (placed[name] for name in pair.split())
+        assert start[0] + start[2] < end[0], pair
     lowest = max(y + height for name, (_, y, _, height) in placed.items() if name != "score")
     assert placed["score"][1] > lowest
 
@@ -86,10 +77,8 @@ def test_boxes_never_overlap_and_lie_inside_the_drawing(views):
     placed = list(boxes(text).values())
     width, height = (float(ET.fromstring(text).get(key)) for key in ("width", "height"))
     for number, (x, y, w, h) in enumerate(placed):
-        assert x >= 0
-        assert y >= 0
-        assert x + w <= width
-        assert y + h <= height
+        assert 0 <= x <= width - w
+        assert 0 <= y <= height - h
         for ox, oy, ow, oh in placed[:number]:
             assert x + w <= ox or ox + ow <= x or y + h <= oy or oy + oh <= y
 
@@ -102,17 +91,13 @@ def test_a_delayed_wire_is_dashed_and_labelled_with_its_delay():
     assert "fuse.belief → move.belief, one tick later, first value: start.belief" in dashed[0]
 
 
-def test_readers_of_ground_truth_are_red():
+def test_readers_of_ground_truth_are_red_and_hovering_shows_class_summary_and_parameters_escaped():
     text = svg(loop())
+    assert "see: robot.stages.See\nMakes &lt;see&gt; &amp; more.\ngain = 2.5" in text
     red = re.findall(r'<text[^>]*fill="#b3261e"[^>]*>([^<]*)</text>', text)
     assert "truth" in red
     assert "truth ← source.truth" in red
     assert "class n_score,n_start truth" in mermaid(loop())
-
-
-def test_hovering_shows_class_summary_and_parameters_escaped():
-    text = svg(loop())
-    assert "see: robot.stages.See\nMakes &lt;see&gt; &amp; more.\ngain = 2.5" in text
 
 
 def test_a_graph_is_always_drawn_alike_and_fetches_nothing():

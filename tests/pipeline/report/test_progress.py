@@ -17,32 +17,35 @@ class Terminal(io.StringIO):
         return True
 
 
-def drive(stream, frames, step_s, total=None, name="localise"):
+def drive(stream, frames, step_s, total):
     clock = Clock()
     with Progress(stream, clock) as progress:
         for frame in range(1, frames + 1):
             clock.now += step_s
-            progress.update(name, frame, total)
+            progress.update("localise", frame, total)
     return stream.getvalue()
 
 
+def lines_of(stream):
+    return [json.loads(line) for line in stream.getvalue().splitlines()]
+
+
 def test_no_rate_is_stated_of_a_frame_that_took_no_time():
-    last = json.loads(drive(io.StringIO(), 1, 1e-6, total=1).splitlines()[-1])
+    last = json.loads(drive(io.StringIO(), 1, 1e-6, 1).splitlines()[-1])
     assert (last["frames"], last["frames_per_second"]) == (1, None)
 
 
 def test_elsewhere_than_in_a_terminal_there_is_a_json_line_every_two_seconds_and_one_at_the_end():
-    lines = [json.loads(line) for line in drive(io.StringIO(), 67, 0.125, total=67).splitlines()]
-    assert [line["frames"] for line in lines] == [17, 33, 49, 65, 67]
-    assert lines[0]["graph"] == "localise"
-    assert lines[0]["of"] == 67
-    assert lines[1]["frames_per_second"] == round(33 / 4, 1)  # 33 frames in the 32 steps of 1/8 s since the first
-    assert lines[1]["seconds_left"] == round((67 - 33) / (33 / 4), 1)
-    assert lines[-1]["seconds_left"] == 0
+    first, second, *others, last = map(json.loads, drive(io.StringIO(), 67, 0.125, 67).splitlines())
+    assert [line["frames"] for line in (first, second, *others, last)] == [17, 33, 49, 65, 67]
+    assert (first["graph"], first["of"]) == ("localise", 67)
+    rate = 33 / 4  # 33 frames in the 32 steps of 1/8 s since the first
+    assert (second["frames_per_second"], second["seconds_left"]) == (round(rate, 1), round((67 - 33) / rate, 1))
+    assert last["seconds_left"] == 0
 
 
 def test_a_terminals_line_changes_at_most_ten_times_a_second():
-    text = drive(Terminal(), 2000, 0.001, total=2000)
+    text = drive(Terminal(), 2000, 0.001, 2000)
     assert 15 <= text.count("\r") <= 22
     assert text.endswith("\n")
     assert text.count("\n") == 1
@@ -55,8 +58,7 @@ def test_the_first_line_knows_its_rate_when_a_run_is_resumed():
         for frame in range(501, 540):
             progress.update("localise", frame, 1000)
             clock.now += 0.1
-    rates = [json.loads(line)["frames_per_second"] for line in stream.getvalue().splitlines()]
-    assert all(rate < 12 for rate in rates)
+    assert all(line["frames_per_second"] < 12 for line in lines_of(stream))
 
 
 def test_each_graph_ends_with_its_own_line():
@@ -66,8 +68,7 @@ def test_each_graph_ends_with_its_own_line():
             for frame in (1, 2, 3):
                 clock.now += 0.1
                 progress.update(name, frame, 3)
-    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
-    assert [(line["graph"], line["frames"]) for line in lines] == [("map", 3), ("localise", 3)]
+    assert [(line["graph"], line["frames"]) for line in lines_of(stream)] == [("map", 3), ("localise", 3)]
 
 
 def test_nothing_is_said_of_a_run_without_frames():
@@ -78,10 +79,12 @@ def test_nothing_is_said_of_a_run_without_frames():
 
 
 def test_the_live_line_tells_name_frames_rate_and_time_left():
-    assert (
-        live_line("map", 50, 100, 25.0, 62.0) == f"map  {'━' * 12}{'─' * 12}  50/100 frames  25.0 frames/s  1:02 left"
-    )
+    half, none = "━" * 12 + "─" * 12, "─" * 24
+    assert live_line("map", 50, 100, 25.0, 62.0) == f"map  {half}  50/100 frames  25.0 frames/s  1:02 left"
     assert live_line("map", 50, None, 25.0, None) == "map  50 frames  25.0 frames/s"
+    assert live_line("drive", 1, None, None, None) == "drive  1 frame"
+    assert live_line("t", 1, 200, 0.02, 9950.0, "maps") == f"t  {none}  1/200 maps  50.0 s each  2:45:50 left"
+    assert live_line("t", 0, 200, None, None, "maps", "1 running") == f"t  {none}  0/200 maps  1 running"
 
 
 def test_what_has_no_frames_yet_is_said_at_once_and_gives_way_to_the_first_frame():
@@ -109,9 +112,8 @@ def test_only_what_this_attempt_did_counts_for_the_rate():
         for done in (401, 402, 403, 404):
             clock.now += 50.0
             progress.update("table", done, 404)
-    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
-    assert [line["repetitions_per_second"] for line in lines] == [0.02] * 4
-    assert [line["seconds_left"] for line in lines] == [150.0, 100.0, 50.0, 0.0]
+    assert [line["repetitions_per_second"] for line in lines_of(stream)] == [0.02] * 4
+    assert [line["seconds_left"] for line in lines_of(stream)] == [150.0, 100.0, 50.0, 0.0]
 
 
 def test_what_was_finished_before_has_no_rate():
@@ -120,20 +122,8 @@ def test_what_was_finished_before_has_no_rate():
         progress.begin("table", 404, 404)
         clock.now += 1e-6
         progress.update("table", 404, 404)
-    (line,) = stream.getvalue().splitlines()
-    assert json.loads(line) == {
-        "graph": "table",
-        "repetitions": 404,
-        "of": 404,
-        "repetitions_per_second": None,
-        "seconds_left": None,
-    }
-
-
-def test_what_takes_longer_than_a_second_is_told_in_seconds_and_long_waits_in_hours():
-    bar = "─" * 24
-    assert live_line("t", 1, 200, 0.02, 9950.0, "maps") == f"t  {bar}  1/200 maps  50.0 s each  2:45:50 left"
-    assert live_line("t", 0, 200, None, None, "maps", "1 running") == f"t  {bar}  0/200 maps  1 running"
+    unknown = {"repetitions_per_second": None, "seconds_left": None}
+    assert lines_of(stream) == [{"graph": "table", "repetitions": 404, "of": 404, **unknown}]
 
 
 def test_what_a_stage_says_stands_beside_the_frames_for_a_moment():
@@ -146,7 +136,7 @@ def test_what_a_stage_says_stands_beside_the_frames_for_a_moment():
         progress.say("9.5 Hz")
         clock.now += 5.0
         progress.update("live", 2, None)
-    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
+    lines = lines_of(stream)
     assert [line["doing"] for line in lines[:3]] == [f"nothing on /odom for {second} s" for second in (0, 2, 4)]
     assert [(line["frames"], line.get("note")) for line in lines[3:]] == [(1, "9.5 Hz"), (2, None)]
 
@@ -158,8 +148,3 @@ def test_a_line_that_takes_several_rows_of_the_terminal_is_painted_over(monkeypa
         progress.say("x" * 30)
         progress.say("y")
     assert stream.getvalue() == f"\r\x1b[J{'x' * 30} …\r\x1b[1A\x1b[Jy …\r\x1b[J"
-
-
-def test_one_of_a_thing_is_not_said_in_the_plural():
-    assert live_line("drive", 1, None, None, None) == "drive  1 frame"
-    assert live_line("drive", 2, None, None, None) == "drive  2 frames"

@@ -17,17 +17,16 @@ from omninav.pipeline.report.quantities import digits, numbers, title, unit
         (0.00012, "0.00012"),
         (3.3e-14, "0"),
         (-2e-9, "0"),
-    ],
+    ],  # fmt: skip
 )
 def test_numbers_have_the_digits_they_carry(number, text):
     assert digits(number) == text
 
 
 def test_titles_and_units_follow_from_the_ends_of_names():
-    assert (title("position_error_m"), unit("position_error_m")) == ("Position error", "m")
-    assert (title("heading_error_deg"), unit("heading_error_deg")) == ("Heading error", "°")
-    assert (title("loss_rate"), unit("loss_rate")) == ("Loss rate", "%")
-    assert (title("frames"), unit("frames")) == ("Frames", "")
+    names = ("position_error_m", "heading_error_deg", "loss_rate", "frames")
+    titles, units = ("Position error", "Heading error", "Loss rate", "Frames"), ("m", "°", "%", "")
+    assert (tuple(map(title, names)), tuple(map(unit, names))) == (titles, units)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Annotated
 
 import numpy as np
+import pytest
 from sample_metrics import VALUES, measured
 
 from omninav.pipeline import Bounds, Context, Figure, Metrics, Quantity, Stage, Table
@@ -112,25 +113,25 @@ def test_tables_of_stages_are_shown(tmp_path):
     assert "&lt;b&gt;" in page
 
 
-def test_a_run_that_never_converged_says_never(tmp_path):
-    metrics = measured(converged_after_frames=None, after_convergence=None)
-    assert "Converged never" in text_of(report(tmp_path, metrics=metrics))
+GOAL = {"goal.reached": Quantity(title="Goal reached"), "goal.time_s": Quantity(title="Time to the goal")}
 
 
-def test_several_logs_have_a_line_each(tmp_path):
-    said = text_of(report(tmp_path, metrics=measured(logs=[VALUES, {"frames": 7}])))
-    assert "Per log" in said
-    assert "1 7 – –" in said
-
-
-def test_tiles_are_the_headlines_in_the_order_of_their_stages(tmp_path):
-    described = {"goal.reached": Quantity(title="Goal reached"), "goal.time_s": Quantity(title="Time to the goal")}
-    metrics = Metrics({"goal": {"time_s": 3.2, "reached": "yes"}}, described, ("goal.reached", "goal.time_s"))
-    assert text_of(report(tmp_path, metrics=metrics)).index("yes Goal reached 3.20 s Time to the goal") > 0
-
-
-def test_a_run_in_which_nothing_is_measured_says_so(tmp_path):
-    assert "No stage of this graph measures anything" in text_of(report(tmp_path, metrics=Metrics({})))
+@pytest.mark.parametrize(
+    ("metrics", "said"),
+    [
+        (measured(converged_after_frames=None, after_convergence=None), "Converged never"),
+        (
+            measured(logs=[VALUES, {"frames": 7}]),
+            "Per log log Frames Position error, median, after convergence (m) Loss",
+        ),
+        (measured(logs=[VALUES, {"frames": 7}]), "Converged after (frames) 0 300 0.050 12.5 12 1 7 – – – "),
+        (Metrics({"goal": {"time_s": 3.2, "reached": "yes"}}, GOAL, tuple(GOAL)), "yes Goal reached 3.20 s Time to"),
+        (Metrics({}), "No stage of this graph measures anything"),
+    ],
+    ids=["never", "several logs", "a log without figures", "tiles of headlines in their order", "nothing"],
+)
+def test_what_a_page_says_of_figures(tmp_path, metrics: Metrics, said: str):
+    assert said in text_of(report(tmp_path, metrics=metrics))
 
 
 def chart() -> Chart:
@@ -147,9 +148,8 @@ def test_a_chart_stands_in_the_page_in_the_colours_of_the_page(tmp_path):
 
 
 def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
-    slides = tuple(
-        Slide(f"frame {n} </script>", "<circle/>", (("seen", b"JPEG"),), (("error", "1 m"),)) for n in (0, 1)
-    )
+    frame = ("<circle/>", (("seen", b"JPEG"),), (("error", "1 m"),))
+    slides = tuple(Slide(f"frame {n} </script>", *frame) for n in (0, 1))
     figure = Figure("frames", "Frames", "One by one.", chart().svg(), "image/svg+xml", slides=slides)
     page = report(tmp_path, figures=(figure,))
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page, flags=re.S)[1])

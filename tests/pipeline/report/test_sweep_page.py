@@ -32,10 +32,8 @@ def test_what_is_the_same_in_all_jobs_is_said_once_and_the_best_is_marked(tmp_pa
 
 
 def test_a_sweeps_page_shows_what_varies_in_columns_of_its_own(tmp_path):
-    rows = [
-        sweep_row(n, measured(loss_rate=3.3e-14 * n), overrides=f"variant=a ++nodes.x.gain={n} seed=3")
-        for n in range(2)
-    ]
+    typed = "variant=a ++nodes.x.gain={} seed=3"
+    rows = [sweep_row(n, measured(loss_rate=3.3e-14 * n), overrides=typed.format(n)) for n in range(2)]
     page = write_sweep_page(tmp_path, rows).read_text()
     assert '<th class="text">nodes.x.gain</th>' in page
     assert '<td class="text"><code>1</code></td>' in page

@@ -43,11 +43,8 @@ def test_each_figure_of_a_run_is_one_line_with_what_is_off_in_colour():
 
 
 def test_no_two_rows_of_the_results_have_one_name_and_none_is_empty():
-    described = {
-        "error_m": Quantity(title="Error"),
-        "found_again": Quantity(),
-        "smoothed.loss_rate": Quantity(title="Lost, smoothed"),
-    }
+    described = {"error_m": Quantity(title="Error"), "found_again": Quantity()}
+    described |= {"smoothed.loss_rate": Quantity(title="Lost, smoothed")}
     spread = {"mean": 0.2, "max": 3.0}
     values = {"error_m": spread, "loss_rate": 0.1, "found_again": None}
     values |= {"smoothed": {"error_m": spread, "loss_rate": 0.2}, "rotation": {"error_deg": spread}}
