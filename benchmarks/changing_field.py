@@ -17,6 +17,17 @@ from omninav.stages.values.views import Coefficients, Spectrum, WholeView
 Array = npt.NDArray[np.float64]
 Kind = Literal["spectrum", "coefficients"]
 SEGMENTS, CHANNELS, FREQUENCIES, COEFFICIENTS = 36, 24, 8, 128
+KEPT = """
+    source novelty_threshold match sensor prior motion fusion particle_clustering map_update mapping fixed_lag_smoother
+    initial_map estimate
+"""
+"""Nodes of a variant's graph from the views on."""
+MADE_UP = {
+    "features.view": "source.view",
+    "visual_turn.motion": "source.motion",
+    "straightened.updates": "map_update.updates",
+}
+"""What is read of nodes that see images or look back over whole drives, and what is read in its place."""
 CELL, PATCH, REACH = 1.0, 2.0, 2.0
 """Metres: of the field's texture, of what changes at once, and how far from the robot it sees the texture."""
 
@@ -122,38 +133,20 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
 
     `limit`: a given limit between views, instead of a measured one. `words`: what else would be typed.
     """
-    from hydra import compose, initialize_config_module
-
-    from omninav.pipeline.cli.composition import complete
+    from omninav.pipeline.cli.composition import complete, composed
     from omninav.pipeline.run.plan import plan
 
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = complete(compose("config", overrides=[f"variant={variant}", *words]))
+    with composed([f"variant={variant}", *words]) as composition:
+        config = complete(composition)
     nodes, wires = config["nodes"], config["wires"]
     nodes["source"] = {"_target_": "benchmarks.changing_field.ChangingField", **source}
     if limit is not None:
-        nodes["novelty_threshold"], wires["novelty_threshold"] = (
-            {"_target_": "omninav.stages.mapping.fixed_threshold.FixedThreshold"},
-            {},
-        )
-        nodes["novelty_threshold"]["distance"] = limit
-    kept = {
-        "source",
-        "novelty_threshold",
-        "match",
-        "sensor",
-        "prior",
-        "motion",
-        "fusion",
-        "particle_clustering",
-        "map_update",
-        "mapping",
-        "fixed_lag_smoother",
-    }
-    kept = {name for name in kept | {"initial_map", "estimate"} if nodes.get(name)}
+        target = "omninav.stages.mapping.fixed_threshold.FixedThreshold"
+        nodes["novelty_threshold"], wires["novelty_threshold"] = {"_target_": target, "distance": limit}, {}
+    kept = {name for name in KEPT.split() if nodes.get(name)}
     config["nodes"] = {name: nodes[name] for name in nodes if name in kept}
     config["wires"] = {
-        name: {port: "source.view" if wire == "features.view" else wire for port, wire in ports.items()}
+        name: {port: MADE_UP.get(wire, wire) if isinstance(wire, str) else wire for port, wire in ports.items()}
         for name, ports in wires.items()
         if name in kept
     }
