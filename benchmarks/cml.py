@@ -29,18 +29,9 @@ def rows() -> list[Row]:
     found = []
     for variant in KINDS:
         taken = {references: step_ms(variant, references) for references in (2000, 4000)}
+        what, peer = f"{variant}: a step with 4000 references", "with 2000 references"
         found.append(Row(f"{variant}: a step with 2000 references", taken[2000], "ms", limit=20.0))
-        found.append(
-            Row(
-                f"{variant}: a step with 4000 references",
-                taken[4000],
-                "ms",
-                "with 2000 references",
-                taken[2000],
-                limit=2.0,
-                of_peer=True,
-            )
-        )
+        found.append(Row(what, taken[4000], "ms", peer, taken[2000], limit=2.0, of_peer=True))
     return found
 
 

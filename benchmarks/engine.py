@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections.abc import Callable
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
 from omninav.pipeline.engine.engine import Engine
@@ -68,16 +69,8 @@ def rows() -> list[Row]:
     taken = medians({"engine": engine, "plain": plain}, rounds=7)
     per = 1e6 / (TICKS * STAGES)
     overhead = (taken["engine"] - taken["plain"]) * per
-    found = [
-        Row(
-            "engine overhead per stage and tick",
-            overhead,
-            "us",
-            "plain call of a stage",
-            taken["plain"] * per,
-            limit=20.0,
-        )
-    ]
+    what, peer = "engine overhead per stage and tick", "plain call of a stage"
+    found = [Row(what, overhead, "us", peer, taken["plain"] * per, limit=20.0)]
     for name, measured in (("sf-hamilton", _hamilton()), ("haystack-ai", _haystack())):
         if measured is not None:
             what, peer = "engine, whole, per stage and tick", f"{name}, same graph"
@@ -93,25 +86,14 @@ def _hamilton() -> float | None:
         return None
 
     def make(i: int):
-        if i == 0:
-
-            def first(number: float) -> float:
-                return number + 1.0
-
-            first.__name__ = "s0"
-            return first
         namespace: dict = {}
-        exec(f"def s{i}(s{i - 1}: float) -> float:\n    return s{i - 1} + 1.0", namespace)
+        before = f"s{i - 1}" if i else "number"
+        exec(f"def s{i}({before}: float) -> float:\n    return {before} + 1.0", namespace)
         return namespace[f"s{i}"]
 
     module = ad_hoc_utils.create_temporary_module(*(make(i) for i in range(STAGES)), module_name="chain")
     chain = driver.Builder().with_modules(module).build()
-    chain.execute([f"s{STAGES - 1}"], inputs={"number": 0.0})
-    ticks = 60
-    start = time.perf_counter()
-    for tick in range(ticks):
-        chain.execute([f"s{STAGES - 1}"], inputs={"number": float(tick)})
-    return (time.perf_counter() - start) * 1e6 / (ticks * STAGES)
+    return _microseconds(lambda number: chain.execute([f"s{STAGES - 1}"], inputs={"number": number}))
 
 
 def _haystack() -> float | None:
@@ -133,9 +115,13 @@ def _haystack() -> float | None:
         chain.add_component(f"s{i}", OneMore())
         if i:
             chain.connect(f"s{i - 1}.number", f"s{i}.number")
-    chain.run({"s0": {"number": 0.0}})
-    ticks = 60
+    return _microseconds(lambda number: chain.run({"s0": {"number": number}}))
+
+
+def _microseconds(run: Callable[[float], object], ticks: int = 60) -> float:
+    """What a chain takes per stage and tick, once it has run."""
+    run(0.0)
     start = time.perf_counter()
     for tick in range(ticks):
-        chain.run({"s0": {"number": float(tick)}})
+        run(float(tick))
     return (time.perf_counter() - start) * 1e6 / (ticks * STAGES)

@@ -52,20 +52,12 @@ def _step() -> list[Row]:
         proposed = proposals.step(ctx, weighted.field, whole, length_scale).proposals
         fusion.step(ctx, predicted, weighted.likelihood, proposed)
 
-    functions = {"ours": ours}
     peer = _library()
+    taken = medians({"ours": ours} | ({} if peer is None else {"particles": peer}), rounds=40)
+    found = [milliseconds(f"filter step, {NUMBER} particles: motion, weights, resampling", taken["ours"], limit=1.0)]
     if peer is not None:
-        functions["particles"] = peer
-    taken = medians(functions, rounds=40)
-    limit = {"limit": 1.0, "of_peer": False}
-    found = [milliseconds(f"filter step, {NUMBER} particles: motion, weights, resampling", taken["ours"], **limit)]
-    if peer is not None:
-        theirs = taken["particles"] / STEPS
-        found.append(
-            milliseconds(
-                "the same, beside", taken["ours"], "particles.SMC, 10 range landmarks", theirs, limit=1.0, of_peer=True
-            )
-        )
+        what, theirs = "particles.SMC, 10 range landmarks", taken["particles"] / STEPS
+        found.append(milliseconds("the same, beside", taken["ours"], what, theirs, limit=1.0, of_peer=True))
     return found
 
 

@@ -239,9 +239,7 @@ def driven(path: Array) -> Array:
 def write(level: Level, poses: Array, path: Path, gamma: float, rng: np.random.Generator) -> None:
     """Render a drive and write it."""
     top = math.atan(TANGENT)
-    camera = Cylindrical(
-        width=720, height_px=HEIGHT, column_of_forward=360.0, elevation_top=top, elevation_bottom=-top, height=1.28
-    )
+    camera = Cylindrical(720, HEIGHT, 360.0, elevation_top=top, elevation_bottom=-top, height=1.28)
     shown: dict[int, Any] = {}
     for number in range(0, len(poses), STEPS_PER_IMAGE):
         shown[number], poses[number] = level.panorama(poses[number], gamma)

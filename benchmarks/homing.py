@@ -68,34 +68,14 @@ def _relative() -> list[Row]:
         },
         inner=50,
     )
-    what = "relative pose, 100 bearings, half of them wrong"
+    what, peer = "relative pose, 100 bearings, half of them wrong", "by five points (poselib's)"
+    ours, theirs = (np.median(errors_of, axis=0).tolist() for errors_of in (two, five))
+    within = 100.0 * float((two.max(axis=1) < 3).mean())
     return [
         milliseconds(f"{what}: two points", taken["planar"], limit=5.0),
-        Row(
-            "… runs within 3 degrees",
-            100.0 * float((two.max(axis=1) < 3).mean()),
-            "%",
-            limit=100.0,
-            higher_is_better=True,
-        ),
-        Row(
-            "… median error of the direction",
-            float(np.median(two[:, 1])),
-            "deg",
-            "by five points (poselib's)",
-            float(np.median(five[:, 1])),
-            limit=1.0,
-            of_peer=True,
-        ),
-        Row(
-            "… median error of the rotation",
-            float(np.median(two[:, 0])),
-            "deg",
-            "by five points (poselib's)",
-            float(np.median(five[:, 0])),
-            limit=1.0,
-            of_peer=True,
-        ),
+        Row("… runs within 3 degrees", within, "%", limit=100.0, higher_is_better=True),
+        Row("… median error of the direction", ours[1], "deg", peer, theirs[1], limit=1.0, of_peer=True),
+        Row("… median error of the rotation", ours[0], "deg", peer, theirs[0], limit=1.0, of_peer=True),
         milliseconds(f"{what}: five points", taken["five_point"]),
         milliseconds(f"{what}: eight points", eight["eight"]),
         Row("one sample of two points", inner["ours"] * 1e6, "us", "poselib upright_planar_2pt", inner["theirs"] * 1e6),
@@ -110,15 +90,12 @@ def _absolute() -> list[Row]:
     flat = bearings[:, :2] / bearings[:, 2:]
     camera = {"model": "PINHOLE", "width": 2, "height": 2, "params": [1.0, 1.0, 0.0, 0.0]}
     options = {"max_reproj_error": math.tan(math.radians(0.5)), "success_prob": 0.9999}
-    taken = medians(
-        {
-            "ours": lambda: three_point_pose(bearings, points, np.random.default_rng(0)),
-            "theirs": lambda: poselib.estimate_absolute_pose(flat, points, camera, options, {}),
-        }
-    )
-    return [
-        milliseconds("camera pose, 100 points, half of them wrong", taken["ours"], "poselib (pinhole)", taken["theirs"])
-    ]
+    functions = {
+        "ours": lambda: three_point_pose(bearings, points, np.random.default_rng(0)),
+        "theirs": lambda: poselib.estimate_absolute_pose(flat, points, camera, options, {}),
+    }
+    taken, what = medians(functions), "camera pose, 100 points, half of them wrong"
+    return [milliseconds(what, taken["ours"], "poselib (pinhole)", taken["theirs"])]
 
 
 def _homing() -> list[Row]:

@@ -12,7 +12,7 @@ from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.image import Image
+from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.maps import ReferenceGraph
 
 from .table import Row, medians, milliseconds
@@ -43,23 +43,12 @@ def _unwarp() -> list[Row]:
         "ours": lambda: stage.step(ctx, image, CAMERA),
         "remap": lambda: cv2.remap(picture, *fixed, cv2.INTER_LINEAR),
     }
-    taken = medians(functions, rounds=200)
-    return [
-        milliseconds(
-            "unwarp 640x480 -> 360x80",
-            taken["ours"],
-            "cv2.remap alone, fixed point",
-            taken["remap"],
-            limit=1.3,
-            of_peer=True,
-        )
-    ]
+    taken, what, peer = medians(functions, rounds=200), "unwarp 640x480 -> 360x80", "cv2.remap alone, fixed point"
+    return [milliseconds(what, taken["ours"], peer, taken["remap"], limit=1.3, of_peer=True)]
 
 
 def _features() -> Row:
     ctx = Context("features")
-    from omninav.stages.values.image import Panorama
-
     pixels = cv2.GaussianBlur(np.random.default_rng(1).integers(0, 255, (80, 360, 3), dtype=np.uint8), (5, 5), 2)
     stage, panorama = HsvHistogram(segments=10), Panorama(pixels)
     edges = np.linspace(0, 360, 11).astype(int)

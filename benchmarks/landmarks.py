@@ -54,13 +54,8 @@ class Hall:
         shelves = int(aisle[-1]) + 2
         count = round(shelves * LENGTH_M * POINTS_PER_M)
         shelf = self.rng.integers(0, shelves, count)
-        self.points = np.column_stack(
-            [
-                self.rng.uniform(0.0, LENGTH_M, count),
-                (shelf - 0.5) * AISLE_M + self.rng.uniform(-0.5, 0.5, count),
-                self.rng.uniform(-0.8, 1.2, count),
-            ]
-        )
+        along, across, up = (self.rng.uniform(*ends, count) for ends in ((0.0, LENGTH_M), (-0.5, 0.5), (-0.8, 1.2)))
+        self.points = np.column_stack([along, (shelf - 0.5) * AISLE_M + across, up])
         self.points = self.points[np.lexsort((self.points[:, 0], shelf))]
         self.shelf = np.sort(shelf)
         self.looks = np.minimum(self.rng.gamma(0.6, 40.0, (count, 128)), 255).astype(np.uint8)
@@ -103,9 +98,8 @@ def made(hall: Hall) -> ReferenceGraph:
     features = [hall.seen(pose) for pose in hall.poses]
     events = [ReferenceEvent(n, "far") for n in range(len(features))]
     number = len(features)
-    map = ReferenceGraph(
-        hall.poses, np.zeros((number, 36, 20), np.float32), "histograms", np.empty((0, 2), np.int64), "truth"
-    )
+    nothing = np.zeros((number, 36, 20), np.float32)
+    map = ReferenceGraph(hall.poses, nothing, "histograms", np.empty((0, 2), np.int64), "truth")
     before = megabytes()
     learned, of_words = timed(LearnVisualWords().step, Context("words"), features, events)
     out, of_landmarks = timed(LearnLandmarks().step, Context("landmarks"), features, events, map, learned.words)
@@ -150,16 +144,11 @@ def _matched(image: LocalFeatures, landmarks: Landmarks, rows: Any) -> Any:
 
 
 def main() -> None:
-    """Each number of references."""
+    """Each number of references that was typed, or the usual ones."""
     made(Hall(40))  # compiled
-    for number in map_sizes():
+    for number in [int(word) for word in sys.argv[1:]] or [300, 3800, 10_000]:
         hall = Hall(number)
         pose_times(hall, made(hall))
-
-
-def map_sizes() -> list[int]:
-    """The numbers that were typed, or the usual ones."""
-    return [int(word) for word in sys.argv[1:]] or [300, 3800, 10_000]
 
 
 if __name__ == "__main__":

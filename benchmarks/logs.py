@@ -19,10 +19,9 @@ def rows() -> list[Row]:
         odometry, pictures = Path(place) / "odometry.mcap", Path(place) / "pictures.mcap"
         with LogWriter(odometry) as log:
             for number in range(MESSAGES):
-                pose = {"pose": {"pose": {"position": {"x": number * 0.01}, "orientation": {"w": 1.0}}}}
-                log.write(
-                    "/odom", "nav_msgs/msg/Odometry", number * 50_000_000, {"header": {"frame_id": "odom"}, **pose}
-                )
+                pose = {"pose": {"position": {"x": number * 0.01}, "orientation": {"w": 1.0}}}
+                odometry_of = {"header": {"frame_id": "odom"}, "pose": pose}
+                log.write("/odom", "nav_msgs/msg/Odometry", number * 50_000_000, odometry_of)
         rng = np.random.default_rng(0)
         with LogWriter(pictures) as log:
             for number in range(300):

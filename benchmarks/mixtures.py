@@ -82,17 +82,11 @@ def _step() -> list[Row]:
         rounds=15,
     )
     sizes = f"{BELIEVED} x {len(hypothesis)}"
+    alone = f"covariance intersection {sizes}, pairs alone"
     return [
         milliseconds(f"mixture step: motion, superposition, intersection; {VIEWS} views", taken["step"], limit=5.0),
         milliseconds(f"covariance intersection {sizes}, merged", taken["intersection"], limit=5.0),
-        milliseconds(
-            f"covariance intersection {sizes}, pairs alone",
-            taken["pairs"],
-            "numpy, pair by pair",
-            taken["plainly"],
-            limit=0.1,
-            of_peer=True,
-        ),
+        milliseconds(alone, taken["pairs"], "numpy, pair by pair", taken["plainly"], limit=0.1, of_peer=True),
         milliseconds(f"merging {len(crowded[2])} Gaussians, the closest pair first", taken["merging"]),
     ]
 

@@ -54,14 +54,8 @@ def _integral() -> Row:
 
     assert np.allclose(ours(), looped(pixels), atol=1e-4)
     taken = medians({"ours": ours, "peer": lambda: looped(pixels)}, rounds=15)
-    return milliseconds(
-        "Haar integral, 320x240x3, one kernel, 36 angles",
-        taken["ours"],
-        "a loop of cv2.warpAffine",
-        taken["peer"],
-        limit=1.0,
-        of_peer=True,
-    )
+    what, peer = "Haar integral, 320x240x3, one kernel, 36 angles", "a loop of cv2.warpAffine"
+    return milliseconds(what, taken["ours"], peer, taken["peer"], limit=1.0, of_peer=True)
 
 
 def _query() -> list[Row]:
@@ -72,11 +66,9 @@ def _query() -> list[Row]:
     sampled = HaarIntegral(integration="monte_carlo")
     maps = {}
     for name, picture in (("window", window), ("panorama", panorama)):
-        segments, bins = stage.step(ctx, picture).features.values.shape
-        features = histograms(rng, IMAGES, segments, bins)
-        maps[name] = ReferenceGraph(
-            rng.uniform(0, 30, (IMAGES, 3)), features, "histograms", np.zeros((0, 2), np.int64), "truth"
-        )
+        features = histograms(rng, IMAGES, *stage.step(ctx, picture).features.values.shape)
+        edges = np.zeros((0, 2), np.int64)
+        maps[name] = ReferenceGraph(rng.uniform(0, 30, (IMAGES, 3)), features, "histograms", edges, "truth")
     dense = SegmentHistograms(histograms(rng, 8, 125))
     taken = medians(
         {

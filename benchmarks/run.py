@@ -6,22 +6,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-PARTS = (
-    "engine",
-    "images",
-    "retrieval",
-    "renderer",
-    "filter",
-    "visibility",
-    "cml",
-    "mixtures",
-    "topological",
-    "homing",
-    "logs",
-    "command_line",
-    "session",
-    "jobs",
-)
+PARTS = """
+    engine images retrieval renderer filter visibility cml mixtures topological homing logs command_line session jobs
+"""
 
 
 def main() -> int:
@@ -32,7 +19,7 @@ def main() -> int:
 
     cv2.setNumThreads(1)  # so that ratios hold on any machine
     rows: list[Row] = []
-    for part in sys.argv[1:] or PARTS:
+    for part in sys.argv[1:] or PARTS.split():
         print(f"measuring {part} …", file=sys.stderr)
         rows += importlib.import_module(f"benchmarks.{part}").rows()
     print(printed(rows))

@@ -60,11 +60,8 @@ def printed(rows: list[Row]) -> str:
     for row in rows:
         peer = f"{row.peer_value:10.4g}" if row.peer_value is not None else " " * 10
         ratio = f"{row.ratio:7.3g}" if row.ratio is not None else " " * 7
-        limit = (
-            ""
-            if row.limit is None
-            else f"{'>=' if row.higher_is_better else '<='}{row.limit:g}{'x' if row.of_peer else ''}"
-        )
+        sign, of_peer = ">=" if row.higher_is_better else "<=", "x" if row.of_peer else ""
+        limit = "" if row.limit is None else f"{sign}{row.limit:g}{of_peer}"
         mark = {True: "kept", False: "MISSED", None: ""}[row.reached]
         lines.append(f"{row.what:58} {row.value:10.4g} {row.unit:6} {row.peer:32} {peer} {ratio} {limit:>9} {mark}")
     return "\n".join(lines)

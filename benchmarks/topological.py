@@ -73,14 +73,9 @@ def _pair() -> list[Row]:
         return sum(a.distance < 0.8 * b.distance for a, b in brute.knnMatch(*found, k=2))
 
     taken = medians({"both": both, "patches": patches, "plain": plain}, rounds=11)
+    what, peer = "patches and vertical segments of two views of 320x240, matched", "cv2.SIFT, cv2.BFMatcher of both"
     return [
-        milliseconds(
-            "patches and vertical segments of two views of 320x240, matched",
-            taken["both"],
-            "cv2.SIFT, cv2.BFMatcher of both",
-            taken["plain"],
-            limit=40.0,
-        ),
+        milliseconds(what, taken["both"], peer, taken["plain"], limit=40.0),
         milliseconds("patches of both alone, with bearings and colours", taken["patches"]),
     ]
 
@@ -110,9 +105,8 @@ def map_of(
     views: list[LocalFeatures], poses: list[Pose], ticks: list[Tick], comparison: ViewComparison, closure: LoopClosure
 ) -> TopologicalMap:
     """The map of a tour."""
-    compared = comparison.step(
-        Context("views"), ticks=ticks, features=views, descriptor=[GREY] * len(views), truth=poses
-    ).views
+    given = {"ticks": ticks, "features": views, "descriptor": [GREY] * len(views), "truth": poses}
+    compared = comparison.step(Context("views"), **given).views
     found = closure.step(Context("loops"), compared).hypotheses
     return TopologicalMapping().step(Context("mapping"), compared, found).map
 
@@ -124,13 +118,8 @@ def _map() -> list[Row]:
     made = map_of(views, poses, ticks, ViewComparison(), LoopClosure())
     taken = time.process_time() - start
     size = len(encode(made)) / len(made.views) * PLACES / 1e6
-    few = map_of(
-        views[:PLACES],
-        poses[:PLACES],
-        ticks[:PLACES],
-        ViewComparison(every_s=0.0),
-        LoopClosure(place_size=1e-6, min_support=1.0),
-    )
+    first, apart = (views[:PLACES], poses[:PLACES], ticks[:PLACES]), LoopClosure(place_size=1e-6, min_support=1.0)
+    few = map_of(*first, ViewComparison(every_s=0.0), apart)
     assert len(few) == PLACES
     match, context = VisualDistance(), Context("match")
     match.setup(context)

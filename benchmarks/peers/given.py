@@ -44,9 +44,8 @@ def between(a: Any, b: Any) -> Any:
     """The motion from one pose to another, in the frame of the first: x forward, y left, turn."""
     away, turn = (b - a)[:2], (b - a)[2]
     cos, sin = np.cos(a[2]), np.sin(a[2])
-    return np.array(
-        [cos * away[0] + sin * away[1], cos * away[1] - sin * away[0], (turn + np.pi) % (2 * np.pi) - np.pi]
-    )
+    forward, left = cos * away[0] + sin * away[1], cos * away[1] - sin * away[0]
+    return np.array([forward, left, (turn + np.pi) % (2 * np.pi) - np.pi])
 
 
 def small_panoramas(columns: int, rows: int) -> Callable[[Path], Any]:

@@ -38,9 +38,8 @@ def pose_of(file, motion):
     column = np.round((poses[near, 2] - particles[:, 2]) / (2 * np.pi) * found.shape[1]).astype(int) % found.shape[1]
     weights = np.exp(SHARPNESS * (found[near, column] - found.max()) - 0.5 * away / REACH_M**2)
     weights /= weights.sum()
-    particles = particles[
-        np.searchsorted(weights.cumsum(), (rng.random() + np.arange(NUMBER)) / NUMBER).clip(0, NUMBER - 1)
-    ]
+    places = (rng.random() + np.arange(NUMBER)) / NUMBER
+    particles = particles[np.searchsorted(weights.cumsum(), places).clip(0, NUMBER - 1)]
     rng.shuffle(particles)
     close = ((particles[:50, None, :2] - particles[None, :, :2]) ** 2).sum(axis=2) < MODE_M**2
     mode = particles[close[close.sum(axis=1).argmax()]]

@@ -17,7 +17,7 @@ from omninav.pipeline.report.quantities import digits, numbers, title, unit
         (0.00012, "0.00012"),
         (3.3e-14, "0"),
         (-2e-9, "0"),
-    ],  # fmt: skip
+    ],
 )
 def test_numbers_have_the_digits_they_carry(number, text):
     assert digits(number) == text
