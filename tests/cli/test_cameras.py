@@ -70,10 +70,15 @@ def words(tmp_path: Path, request: pytest.FixtureRequest) -> list[str]:
 
 
 @pytest.mark.parametrize("words", CAMERAS, indirect=True)
-def test_every_camera_is_looked_through(words: list[str], tmp_path: Path) -> None:
+def test_every_camera_is_looked_through(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
+) -> None:
     out = tmp_path / "look.png"
-    assert main(["camera", "look", *words, f"out={out}"]) == 0
+    assert main(["camera", "look", *words, f"out={out}", "frame=1"]) == 0
+    name = request.node.callspec.params["words"].removesuffix(".yaml")
+    assert f"image 1, {name} camera" in capsys.readouterr().out
     assert np.ptp(cv2.imread(str(out))) > 200
+    assert not list(tmp_path.glob("runs*"))
 
 
 @pytest.mark.parametrize(("words", "variant"), USES, indirect=["words"])

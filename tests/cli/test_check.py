@@ -51,10 +51,8 @@ def test_an_objective_that_no_stage_measures_is_refused_before_the_run(tmp_path:
     words = ["variant=omniview_cml", f"log={DRIVE}"]
     for first in (["check"], []):
         assert main([*first, *words, "objective=position_eror_m.median"]) == 2
-        assert (
-            "no stage of this graph measures 'position_eror_m'; did you mean 'position_error_m'?"
-            in capsys.readouterr().err
-        )
+        said = "no stage of this graph measures 'position_eror_m'; did you mean 'position_error_m'?"
+        assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
     for named in ("position_error_m.median", "after_convergence.loss_rate"):
         assert main(["check", *words, f"objective={named}"]) == 0

@@ -59,12 +59,9 @@ def test_a_folder_of_runs_in_the_config_dir_is_said_to_be_in_the_way(toy, tmp_pa
     assert "a folder runs in the --config-dir makes a group of this setting" in refused.stderr
 
 
-def test_a_run_that_is_refused_leaves_no_folder(toy, tmp_path: Path):
-    assert toy("--config-dir=mine", "hydra.run.dir=out", "nodes.sum._target_=toys.Nothing").returncode == 2
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_run_of_its_own_name_has_hydras_files_too_and_only_settings_that_are_read(toy, tmp_path: Path):
+    assert toy("--config-dir=mine", "hydra.run.dir=out", "nodes.sum._target_=toys.Nothing").returncode == 2
+    assert not (tmp_path / "out").exists()  # nor where it is refused
     toy("--config-dir=mine", check=True)
     folder = tmp_path / "runs" / "latest"
     assert (folder / ".hydra" / "overrides.yaml").exists()
@@ -93,12 +90,10 @@ def test_the_jobs_of_a_sweep_that_an_engine_runs_leave_the_same_and_name_what_fa
     assert ended.stdout.splitlines()[-1] == "sweep: there/sweep.html"
     toy(*words, "hydra.sweep.dir=here")
     for number in range(4):
-        here, there = (
-            json.loads((tmp_path / place / f"{number}/manifest.json").read_text()) for place in ("here", "there")
-        )
-        assert {name: here.get(name) for name in SAME} == {name: there.get(name) for name in SAME}
-    metrics = [(tmp_path / place / "0" / "metrics.json").read_bytes() for place in ("here", "there")]
-    assert metrics[0] == metrics[1]
+        here, there = (tmp_path / place / str(number) for place in ("here", "there"))
+        stated = [json.loads((job / "manifest.json").read_text()) for job in (here, there)]
+        assert {name: stated[0].get(name) for name in SAME} == {name: stated[1].get(name) for name in SAME}
+    assert (tmp_path / "here/0/metrics.json").read_bytes() == (tmp_path / "there/0/metrics.json").read_bytes()
 
 
 @pytest.mark.parametrize("engine", [(), ("engine.workers=1",)])

@@ -149,10 +149,8 @@ def test_a_third_partys_variant_has_its_map(omninav, tmp_path: Path) -> None:
     config = yaml.safe_load((tmp_path / "runs" / "latest" / "config.yaml").read_text())
     assert config["variant"] == "mine_map"
     assert config["nodes"]["mapping"]["distance_m"] == 0.7
-    assert config["nodes"]["features"] == {
-        "_target_": "omninav.stages.features.haar_integral.HaarIntegral",
-        "segments": 24,
-    }
+    target = "omninav.stages.features.haar_integral.HaarIntegral"
+    assert config["nodes"]["features"] == {"_target_": target, "segments": 24}
     assert (tmp_path / "runs" / "latest" / "map.omap").is_file()
 
 

@@ -18,17 +18,6 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.projection import Projection
 
 
-def test_a_camera_is_looked_through(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for number in range(2):
-        pixels = np.random.default_rng(number).integers(0, 256, (32, 64, 3), dtype=np.uint8)
-        cv2.imwrite(str(tmp_path / f"{number}.png"), pixels)
-    out = tmp_path / "look.png"
-    assert main(["camera", "look", f"log={tmp_path}", f"out={out}", "frame=1"]) == 0
-    assert "image 1, equirectangular camera" in capsys.readouterr().out
-    assert cv2.imread(str(out)) is not None
-    assert not list(tmp_path.glob("runs*"))
-
-
 def test_a_variant_that_runs_over_a_log_is_no_such_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["homing", "field", "log=L"]) == 2
     assert main(["camera", "lok"]) == 2
@@ -49,6 +38,11 @@ def test_check_finds_what_images_alone_do_not_serve(tmp_path: Path, capsys: pyte
     assert main(["check", "variant=topological_localisation", *words]) == 0
 
 
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 def map_of(file: Path, count: int, **fields: object) -> Path:
     map = reference_graph(count)
     map.put(**fields)
@@ -56,10 +50,7 @@ def map_of(file: Path, count: int, **fields: object) -> Path:
     return file
 
 
-def test_maps_are_joined_thinned_cut_and_shown(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_maps_are_joined_thinned_cut_and_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     map_of(tmp_path / "it's a map.omap", 40)
     map_of(tmp_path / "b.omap", 30)
     assert main(["map", "join", "it's a map.omap", "b.omap", "out=c.omap"]) == 0
@@ -89,10 +80,7 @@ def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.Captur
     assert (with_landmarks < 200).sum() > 1.3 * (without < 200).sum()
 
 
-def test_a_joined_map_says_what_became_of_landmarks(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_joined_map_says_what_became_of_landmarks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     map = mapped_room()
     write_artifact(tmp_path / "a.omap", map)
     write_artifact(tmp_path / "b.omap", replace(map, landmarks=None))
@@ -108,10 +96,7 @@ def test_a_joined_map_says_what_became_of_landmarks(
         assert said in capsys.readouterr().out
 
 
-def test_maps_that_do_not_join_are_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     map_of(tmp_path / "a.omap", 5)
     map_of(tmp_path / "drift.omap", 5, pose_source="odometry")
     map_of(tmp_path / "other.omap", 5)
@@ -171,11 +156,8 @@ def test_a_tool_is_called_from_python(tmp_path: Path) -> None:
         omninav.tool("map cot", str(whole))
 
 
-def test_a_drive_is_localised_in_a_joined_and_in_a_thinned_map(
-    demo: Path, shared_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drive_is_localised_in_a_joined_and_in_a_thinned_map(demo: Path, shared_cache: Path, tmp_path: Path) -> None:
     whole = demo / "map.omap"
-    monkeypatch.chdir(tmp_path)
     for side, area in (("left", "[-99,-99,5,99]"), ("right", "[5,-99,99,99]")):
         assert main(["map", "cut", str(whole), f"area={area}", f"out={side}.omap"]) == 0
     assert main(["map", "join", "left.omap", "right.omap", "out=both.omap"]) == 0

@@ -52,11 +52,13 @@ def test_what_is_proposed_is_drawn_anew_at_each_image():
 
 
 def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
-    with composed(["variant=retrieval_mcl", "cuts=[[3,6]]"]) as config:
+    with composed(["variant=retrieval_mcl", "cuts=[[3,6]]", "kidnappings=[{at: 30.0, turn: 1.5}]"]) as config:
         config = complete(config)
-    assert config["nodes"]["source"]["cuts"] == [[3, 6]]
+    drive = config["nodes"]["source"]
+    assert (drive["cuts"], drive["kidnappings"]) == ([[3, 6]], [{"at": 30.0, "turn": 1.5}])
     for name in ("map", "thumbnails"):
-        assert config["artifacts"][name]["graph"]["nodes"]["source"]["cuts"] == []
+        tour = config["artifacts"][name]["graph"]["nodes"]["source"]
+        assert (tour["cuts"], tour["kidnappings"]) == ([], [])
 
 
 def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav, tmp_path: Path):

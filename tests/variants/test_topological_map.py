@@ -1,4 +1,4 @@
-"""The map of topological_nav as a user learns it, and how it grows from a second drive."""
+"""The map of topological_nav as a user learns it, and a second drive in it."""
 
 import json
 from pathlib import Path
@@ -19,5 +19,3 @@ def test_a_drive_on_another_day_is_recognised_in_the_map_of_a_tour(omninav, tmp_
     assert again["loops"]["wrong"] == 0
     assert again["loops"]["accepted"] > 5
     assert again["loops"]["recall"] > 0.8
-    assert again["map"]["places"] >= metrics["map"]["places"]
-    assert again["map"]["links"] > metrics["map"]["links"]
