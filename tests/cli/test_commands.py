@@ -136,26 +136,6 @@ def test_a_parameter_that_the_configuration_does_not_list_is_set_like_any_other(
     assert "did you mean 'nodes.features.segments=18'?" in ended.stderr
 
 
-def test_a_missing_log_is_one_line_that_names_it(omninav, tmp_path: Path):
-    ended = omninav("map", "variant=omniview_mcl", "log=nowhere.mcap")
-    assert ended.returncode == 2
-    assert "nowhere.mcap" in ended.stderr
-    assert len(ended.stderr.strip().split("\n")) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_damaged_map_is_refused_by_name(omninav, demo: Path, tmp_path: Path):
-    content = bytearray((demo / "map.omap").read_bytes())
-    content[len(content) // 2] ^= 4
-    (tmp_path / "flipped.omap").write_bytes(content)
-    (tmp_path / "cut.omap").write_bytes(content[: len(content) // 3])
-    for name in ("flipped.omap", "cut.omap"):
-        ended = omninav(f"map={name}")
-        assert ended.returncode == 2
-        assert name in ended.stderr
-        assert "Traceback" not in ended.stderr
-
-
 @pytest.mark.parametrize(
     ("words", "what", "type_"),
     [

@@ -8,7 +8,11 @@ from omninav.pipeline.cli.hydra_session import hydra_started
 def test_an_interpolation_is_of_the_condition_and_not_of_the_line_that_asks_for_the_experiment() -> None:
     words = ["+experiment=topological_nav/comparison", "profile=quick"]
     with hydra_started():
-        planned = planned_experiment(compose(words), words)
+        config = compose(words)
+        assert "other_day" not in config.get("nodes", {})
+        config.experiment.about = "${nodes.other_day.world.name}"
+        planned = planned_experiment(config, words)
+    assert planned.experiment.about == "${nodes.other_day.world.name}"  # which only the conditions have
     worlds = {
         (run.config["world"]["name"], run.config["nodes"]["other_day"]["world"]["name"])
         for run in planned.conditions
@@ -17,13 +21,3 @@ def test_an_interpolation_is_of_the_condition_and_not_of_the_line_that_asks_for_
     assert worlds
     assert all(world == other for world, other in worlds)
     assert "home_store_demo" not in {world for world, _ in worlds}  # the world of a line that names none
-
-
-def test_an_interpolation_may_name_what_only_the_conditions_have() -> None:
-    words = ["+experiment=topological_nav/comparison", "profile=quick"]
-    with hydra_started():
-        config = compose(words)
-        assert "other_day" not in config.get("nodes", {})
-        config.experiment.about = "${nodes.other_day.world.name}"
-        planned = planned_experiment(config, words)
-    assert planned.experiment.about == "${nodes.other_day.world.name}"
