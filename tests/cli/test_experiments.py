@@ -178,9 +178,9 @@ ONCE = 2 * (20 + 30)
 def with_files(place: Path) -> Path:
     (place / "mine/variant").mkdir(parents=True)
     (place / "mine/experiment").mkdir()
-    files = {"variant/dice": VARIANT, "experiment/dice": EXPERIMENT, "experiment/laps": LAPS}
-    for name, content in {"my_stages.py": STAGES} | {f"mine/{name}.yaml": text for name, text in files.items()}.items():
-        (place / name).write_text(content)
+    (place / "my_stages.py").write_text(STAGES)
+    for name, text in {"variant/dice": VARIANT, "experiment/dice": EXPERIMENT, "experiment/laps": LAPS}.items():
+        (place / f"mine/{name}.yaml").write_text(text)
     return place
 
 

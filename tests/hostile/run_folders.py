@@ -95,5 +95,5 @@ def run_with_cache(folder: Path, files: Files) -> Any:
         raise Wrong("it ended at other bytes")
 
 
-RUN = Format("run folder", stopped, [on(BINARY), on(TEXT, ".json", ".yaml")], resumed, cases=40)
+RUN = Format("run folder", stopped, [on(BINARY), on(TEXT, ".json", ".yaml")], resumed, cases=15)
 CACHE = Format("cache", cached, [on(BINARY)], run_with_cache, cases=40)
