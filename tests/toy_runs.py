@@ -29,6 +29,9 @@ class Stop:
         if done == 7:
             raise KeyboardInterrupt
 
+    def say(self, words: str) -> None:
+        pass
+
 
 def begun(config: Mapping[str, Any]) -> RunFolder:
     """A run that has been started and has done nothing yet."""

@@ -114,11 +114,11 @@ def test_fast_dds_reads_no_profiles_of_the_folder(tmp_path: Path) -> None:
 def test_where_numba_came_first_its_settings_there_move_no_cache_of_ours(tmp_path: Path, name: str) -> None:
     (tmp_path / ".numba_config.yaml").write_bytes((DATA / "hostile/new" / name / ".numba_config.yaml").read_bytes())
     kept = (
-        "import omninav; from omninav.stages.geometry.plane.nearest_cells import {0} as f; print(f._cache.cache_path)"
+        "import omninav; from omninav.stages.geometry.probability.particles import {0} as f; print(f._cache.cache_path)"
     )
-    from omninav.stages.geometry.plane import nearest_cells
+    from omninav.stages.geometry.probability import particles
 
-    function = next(key for key, value in vars(nearest_cells).items() if hasattr(value, "_cache"))
+    function = next(key for key, value in vars(particles).items() if hasattr(value, "_cache"))
     words = [f"import numba; {kept.format(function)}"] if name == "folder_with_numba_config" else []
     for program in [*words, kept.format(function)]:
         folder = python(tmp_path, "-c", program).strip()

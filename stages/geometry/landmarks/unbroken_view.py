@@ -54,7 +54,7 @@ def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array
     pairs = mutual_nearest_units(root_descriptors(before[1]), root_descriptors(now[1]), RATIO)
     first = np.ascontiguousarray(before[0][pairs.first])
     second = np.ascontiguousarray(now[0][pairs.second])
-    fitting = _most_fitting(first, second, motion, TOLERANCE)
+    fitting = _fitting_at_best(first, second, motion, TOLERANCE)
     if _fits(fitting, len(first)):
         return Carried(0.0, False)
     if len(first) < SAME_SURROUNDINGS and fitting < MAX_FITTING:
@@ -69,14 +69,14 @@ def of_one_place(one: tuple[Array, Bytes], other: tuple[Array, Bytes], turn: flo
     """Tells whether two images were taken within a decimetre or two, the other one turned by `turn` (rad)."""
     pairs = mutual_nearest_units(root_descriptors(one[1]), root_descriptors(other[1]), RATIO)
     first, second = np.ascontiguousarray(one[0][pairs.first]), np.ascontiguousarray(other[0][pairs.second])
-    return _fits(_most_fitting(first, second, np.array([0.0, 0.0, turn]), SAME_PLACE_TOLERANCE), len(first))
+    return _fits(_fitting_at_best(first, second, np.array([0.0, 0.0, turn]), SAME_PLACE_TOLERANCE), len(first))
 
 
 def _fits(fitting: int, matches: int) -> bool:
     return fitting >= max(MIN_FITTING, MIN_SHARE * matches)
 
 
-def _most_fitting(first: Array, second: Array, motion: Array, tolerance: float) -> int:
+def _fitting_at_best(first: Array, second: Array, motion: Array, tolerance: float) -> int:
     """Number of pairs of bearings (M, 3) that fit a motion (3,), but for an error of its turn."""
     return max(_fitting(first, second, motion + np.array([0.0, 0.0, by]), tolerance) for by in TURNS)
 

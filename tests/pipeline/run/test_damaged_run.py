@@ -20,9 +20,6 @@ from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import RunFolder
 
-    def say(self, words: str) -> None:
-        pass
-
 
 @pytest.fixture(autouse=True)
 def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
