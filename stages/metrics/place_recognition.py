@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Table, Value
 from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
@@ -95,10 +96,8 @@ def quantities(distance_m: float) -> dict[str, Quantity]:
 
 def recalls(positions: Array, ranked: Sequence[Ints], references: Array, distance_m: float) -> dict[str, Any]:
     """Recall of ranked references for queries at positions (N, 2), by where references (R, 2) were taken (m)."""
-    from scipy.spatial import KDTree  # slow to import: not before a run
-
-    tree: Any = KDTree(references)
-    counts = np.isfinite(tree.query(positions, distance_upper_bound=np.nextafter(distance_m, np.inf))[0])
+    cells = sort_into_cells(references, distance_m)
+    counts = have_a_point_within(cells, positions, float(np.nextafter(distance_m, np.inf)))
     hits = []
     for position, best in zip(positions[counts], itertools.compress(ranked, counts), strict=True):
         near = np.hypot(*(references[best[: max(RANKS)]] - position).T) <= distance_m

@@ -63,6 +63,30 @@ def within(cells: PointCells, places: Array, radius: float) -> Ints:
     return np.sort(near[found])
 
 
+def have_a_point_within(cells: PointCells, places: Array, radius: float) -> Bools:
+    """Which places (M, >= 2) lie less than `radius` metres, at most the width of a cell, from any point: (M,)."""
+    own = _numbers(places, cells.width)
+    xy = np.ascontiguousarray(cells.points[cells.order, :2])
+    found: Bools = _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)
+    return found
+
+
+@compiled(nogil=True)
+def _near_point(places: Array, own: Ints, points: Array, numbers: Ints, starts: Ints, radius: float) -> Bools:
+    found = np.zeros(len(places), np.bool_)
+    for n in range(len(places)):
+        for aside in range(-1, 2):  # the three cells of a column follow each other
+            first = np.searchsorted(numbers, own[n] + aside * ROWS - 1)
+            while first < len(numbers) and numbers[first] <= own[n] + aside * ROWS + 1 and not found[n]:
+                for k in range(starts[first], starts[first + 1]):
+                    x, y = places[n, 0] - points[k, 0], places[n, 1] - points[k, 1]
+                    if x * x + y * y < radius * radius:
+                        found[n] = True
+                        break
+                first += 1
+    return found
+
+
 def _numbers(points: Array, width: float) -> Ints:
     at = np.floor(points[:, :2] / width).astype(np.int64)
     numbers: Ints = at[:, 0] * ROWS + at[:, 1]

@@ -2,14 +2,13 @@
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Ints
-from omninav.stages.geometry.plane.point_cells import distinct
+from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
 
 NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 """Steps to a cell itself and its 26 neighbours: (3, 27)."""
@@ -226,10 +225,24 @@ def systematic(weights: Array, number: int, offset: float) -> Ints:
     `offset` in [0, 1) places the comb. Particle i is drawn floor or ceil of number w_i times; unbiased for a uniform
     offset.
     """
-    upto = np.cumsum(weights)
-    teeth = (np.arange(number) + offset) * (upto[-1] / number)
-    last = np.flatnonzero(weights > 0.0).max(initial=0)  # rounding must not end on a particle without weight
-    return np.asarray(np.minimum(np.searchsorted(upto, teeth, side="right"), last), np.int64)
+    drawn = np.empty(number, np.int64)
+    _comb(weights, offset, drawn)
+    return drawn
+
+
+@compiled(nogil=True)
+def _comb(weights: Array, offset: float, out: Ints) -> None:
+    number = len(out)
+    step = weights.sum() / number
+    at, reached, last = 0, weights[0], len(weights) - 1
+    while weights[last] <= 0.0 and last > 0:  # rounding must not end on a particle without weight
+        last -= 1
+    for n in range(number):
+        tooth = (n + offset) * step
+        while reached <= tooth and at < last:
+            at += 1
+            reached += weights[at]
+        out[n] = at
 
 
 def occupied_cells(poses: Array, cell: float, angle: float) -> int:
@@ -243,10 +256,8 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
     """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), any heading."""
-    from scipy.spatial import KDTree  # slow to import: not before a run
-
     reach = radius + radius / 2 * np.sqrt(0.5)
-    tree: Any = KDTree(centres[:, :2])
+    cells = sort_into_cells(centres, reach)
     low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
     cell = radius / 2
     columns, rows = (int(n) for n in np.ceil((high - low) / cell))
@@ -257,9 +268,9 @@ def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Ge
     at = distinct(at[:, None] + steps * rows)
     at = at[(at >= 0) & (at < columns * rows)]
     corners = low + cell * np.column_stack(np.divmod(at, rows))
-    corners = corners[np.isfinite(tree.query(corners + cell / 2, distance_upper_bound=reach)[0])]
+    corners = corners[have_a_point_within(cells, corners + cell / 2, reach)]
     xy = np.empty((0, 2))
     while len(xy) < number:
         drawn = corners[rng.integers(len(corners), size=number)] + cell * rng.random((number, 2))
-        xy = np.concatenate([xy, drawn[np.isfinite(tree.query(drawn, distance_upper_bound=radius)[0])]])
+        xy = np.concatenate([xy, drawn[have_a_point_within(cells, drawn, radius)]])
     return np.column_stack([xy[:number], rng.uniform(-np.pi, np.pi, number)])

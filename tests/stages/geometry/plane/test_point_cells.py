@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.plane.point_cells import distinct, sort_into_cells, within
+from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells, within
 
 
 def gaps(points: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -18,6 +18,7 @@ def test_points_and_places_near_each_other_are_found(seed: int, radius: float) -
     near = within(cells, places, radius)
     assert set(np.flatnonzero((gap <= radius).any(axis=0))) <= set(near)
     assert gap.min(axis=0)[near].max(initial=0.0) <= 1.36 * radius
+    assert np.array_equal(have_a_point_within(cells, places, radius), (gap < radius).any(axis=1))
 
 
 @pytest.mark.parametrize("numbers", [[], [3], [5, -2, 5, 5, 0, -2]])
