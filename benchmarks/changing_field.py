@@ -27,7 +27,7 @@ MADE_UP = {
     "visual_turn.motion": "source.motion",
     "straightened.updates": "map_update.updates",
 }
-"""What is read of nodes that see images or look back over whole drives, and what is read in its place."""
+"""Inputs from nodes that see images or look back over whole drives, and the inputs that replace them."""
 CELL, PATCH, REACH = 1.0, 2.0, 2.0
 """Metres: of the field's texture, of what changes at once, and how far from the robot it sees the texture."""
 

@@ -119,7 +119,7 @@ def _haystack() -> float | None:
 
 
 def _microseconds(run: Callable[[float], object], ticks: int = 60) -> float:
-    """What a chain takes per stage and tick, once it has run."""
+    """Measure the time of a chain per stage and tick, once it has run."""
     run(0.0)
     start = time.perf_counter()
     for tick in range(ticks):

@@ -98,7 +98,7 @@ class Graph:
         return port is not None and bool(getattr(port.type, mark, False))
 
     def is_truth(self, origin: str) -> bool:
-        """Whether an output is ground truth (see `Truth`)."""
+        """Tells whether an output is ground truth (see `Truth`)."""
         port = self.port(origin)
         return port is not None and port.truth
 

@@ -94,7 +94,7 @@ def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
 
 
 def by_path(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """What mappings within each other hold, each with its keys joined by points."""
+    """Yields the values of nested mappings, each with its keys joined by points."""
     for key, value in values.items():
         if isinstance(value, Mapping) and value:
             yield from by_path(value, f"{before}{key}.")

@@ -41,7 +41,7 @@ class MessageQueue:
 
     def __init__(self) -> None:
         self.overtaken: Counter[str] = Counter()
-        """How many messages of each topic were overtaken by later ones before they were taken."""
+        """Number of messages of each topic that later ones overtook before they were taken."""
         self._changed = threading.Condition()
         self._arrivals: dict[str, deque[Arrival]] = {}
 
