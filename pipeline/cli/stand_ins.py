@@ -33,10 +33,15 @@ def exchanged(config: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 def contradictions(config: Any) -> Iterator[Problem]:
     """A problem for each setting that is given beside an option which does not read it, and the other one would."""
     for group, _, rule in stand_ins():
-        setting, target = rule["where_null"], _node(config, group).get("_target_")
-        if target == _stand_in(group, rule)["_target_"] and config.get(setting):
-            typed = f"{group}={rule['take']}"
+        setting, typed = rule["where_null"], f"{group}={rule['take']}"
+        if _node(config, group).get("_target_") != _stand_in(group, rule)["_target_"]:
+            continue
+        if config.get(setting):
             yield Problem(setting, f"{typed} does not read it", f"leave {typed} or {setting}=… away")
+            continue
+        for name, hint in rule["alone"].items():
+            if config.get(name) is not None:
+                yield Problem(name, f"without {setting}=… nothing reads it", hint)
 
 
 def decisive_settings() -> set[str]:
