@@ -12,10 +12,15 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.landmarks.adjustment import Lens
 
 from .model import Camera
+from .rays import leaning
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
 """The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor shows it best."""
+
+
+TILT_SIGMA = math.radians(3.0)
+"""Standard deviation of a camera's roll and pitch (rad) that nothing says: of what is screwed on by eye."""
 
 
 def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:
@@ -49,6 +54,16 @@ def corrected(camera: Model, sigmas: Mapping[str, float], corrections: Array) ->
         name: getattr(camera, name) + float(by) for name, by in zip(sigmas, corrections, strict=True)
     }
     return replace(camera, **changed)
+
+
+def with_tilt(lens: Lens) -> Lens:
+    """The lens of a camera that may lean: its roll and pitch (rad), as in `leaning`, are two more parameters."""
+
+    def bearings(corrections: Array) -> Array:
+        roll, pitch = corrections[-2:]
+        return leaning(lens.bearings(corrections[:-2]), roll, pitch)
+
+    return Lens(bearings, np.append(lens.sigmas, [TILT_SIGMA, TILT_SIGMA]))
 
 
 def observed(camera: Camera, poses_given: bool) -> dict[str, float]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from omninav.pipeline import Context, Quantity
 from omninav.stages.camera.model import Camera
-from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed
+from omninav.stages.camera.rays import leaning
+from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed, with_tilt
 from omninav.stages.camera.strip_elevations import with_elevations_found
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
@@ -19,19 +20,25 @@ from omninav.stages.values.local_features import LocalFeatures
 
 CAMERA_QUANTITIES = {
     "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),
+    "camera.tilt_deg": Quantity(title="Camera's tilt", unit="deg", context=True),
     "camera.yaw_beside_deg": Quantity(title="Camera turned against its description", unit="deg", context=True),
 }
 MAX_AXIS = math.radians(0.2)
 """Angle by which an axis that lies beside moves a bearing, the median, above which it is said (rad)."""
 MAX_YAW = math.radians(1.0)
 """Angle by which the camera is turned, above which it is said (rad): one of true headings alone would be as large."""
+MAX_TILT = math.radians(1.0)
+"""Angle by which the camera leans, above which it is said (rad)."""
 SAME_RAY = 1e-6
 """Difference of unit vectors up to which a bearing is that of its pixel."""
 
 
 class CameraCheck(NamedTuple):
-    """A camera whose fields are adjusted with a map. `camera`: None where nothing of it can be, as of bearings that are
-    not those of its pixels (images that were unwarped before, logs of several cameras)."""
+    """A camera whose `fields`, then roll and pitch, are adjusted with a map.
+
+    `camera`: None where nothing of it can be, as of bearings that are not those of its pixels (images that were
+    unwarped before, logs of several cameras) and of one that does not see the full circle.
+    """
 
     camera: Camera | None
     fields: dict[str, float]
@@ -45,7 +52,8 @@ class CameraCheck(NamedTuple):
         """The check of a map's features with these bearings (F, 3) of all references in order."""
         pixels = np.concatenate([np.empty((0, 2)), *(each.points for each in found if each is not None)])
         names = {} if camera is None else observed(camera, poses_given)
-        if camera is None or not names or not len(pixels):
+        whole = camera is not None and camera.elevations_known and camera.elevations is not None
+        if camera is None or not whole or not len(pixels):
             return cls(None, {}, pixels, bearings)
         rays = adjustable(camera, pixels, names).bearings(np.zeros(len(names)))
         same = np.abs(rays - bearings).max() < SAME_RAY
@@ -56,26 +64,36 @@ class CameraCheck(NamedTuple):
         if self.camera is None:
             bearings = self.bearings[features]
             return Lens(lambda _: bearings, np.empty(0))
-        return adjustable(self.camera, self.pixels[features], self.fields)
+        return with_tilt(adjustable(self.camera, self.pixels[features], self.fields))
+
+    def levelled(self, views: LocalViews, corrections: Array) -> LocalViews:
+        """The views of the camera as it is described, but for its tilt."""
+        if self.camera is None or not len(corrections):
+            return views
+        return views.looking_along(leaning(views.bearings, *corrections[-2:]))
 
     def metrics(self, corrections: Array) -> dict[str, Any]:
         """Deviations of the camera from its description."""
         if self.camera is None or not len(corrections):
             return {}
-        by = dict(zip(self.fields, corrections.tolist(), strict=True))
-        values = {"axis_beside_px": math.hypot(by["centre_x"], by["centre_y"])}
+        by = dict(zip(self.fields, corrections[:-2].tolist(), strict=True))
+        values = {"tilt_deg": math.degrees(math.hypot(*corrections[-2:]))}
+        if AXIS.keys() <= by.keys():
+            values["axis_beside_px"] = math.hypot(by["centre_x"], by["centre_y"])
         if "yaw" in by:
             values["yaw_beside_deg"] = abs(math.degrees(by["yaw"]))
         return {"camera": values}
 
     def told(self, ctx: Context, corrections: Array) -> str:
-        """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is."""
+        """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is.
+
+        Nothing in a camera.yaml says that a camera leans.
+        """
         if self.camera is None or not len(corrections):
             return ""
-        by = dict(zip(self.fields, corrections.tolist(), strict=True))
-        right = self.camera
-        parts = []
-        moved = corrected(right, AXIS, np.array([by[name] for name in AXIS]))
+        by, right, parts = dict(zip(self.fields, corrections[:-2].tolist(), strict=True)), self.camera, []
+        _say_tilt(ctx, *np.degrees(corrections[-2:]).tolist())
+        moved = corrected(right, AXIS, np.array([by[name] for name in AXIS])) if AXIS.keys() <= by.keys() else right
         if self._turned(moved) > MAX_AXIS:
             right = moved
             beside = math.hypot(by["centre_x"], by["centre_y"])
@@ -108,6 +126,17 @@ class CameraCheck(NamedTuple):
         rays, looks = other.unproject(self.pixels)
         cos = np.einsum("ij,ij->i", rays[looks], self.bearings[looks])
         return float(np.median(np.arccos(np.clip(cos, -1.0, 1.0)))) if looks.any() else 0.0
+
+
+def _say_tilt(ctx: Context, roll: float, pitch: float) -> None:
+    if math.radians(math.hypot(roll, pitch)) > MAX_TILT:
+        along = f"{abs(pitch):.1f} degrees {'forward' if pitch > 0.0 else 'backward'}"
+        found = f"{along} and {abs(roll):.1f} to the {'right' if roll > 0.0 else 'left'}"
+        ctx.fact("camera_leans", found)
+        ctx.warn(
+            f"the tour's images show that the camera leans by {found}. Landmarks allow for it, colours are compared "
+            "less exactly: level the camera"
+        )
 
 
 def _told(ctx: Context, found: str, right: Camera) -> str:

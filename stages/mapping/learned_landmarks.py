@@ -50,10 +50,11 @@ class LearnLandmarks(Stage):
 
     Neighbouring references that share visual words are matched by their local features; matches that fit the motion
     between both join to tracks, and tracks become points with a mean descriptor (RootSIFT). Poses, points and, with
-    `camera` wired, the camera's axis are adjusted together: given poses may be exact or off by decimetres and degrees;
-    those of odometry alone are straightened first by the places that the tour came back to, and scaled by the camera's
-    height over the floor, which then replaces what was straightened by appearance. Where too little is seen the poses
-    stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and kept with the landmarks.
+    `camera` wired, the camera's axis and tilt are adjusted together: given poses may be exact or off by decimetres and
+    degrees; those of odometry alone are straightened first by the places that the tour came back to, and scaled by the
+    camera's height over the floor, which then replaces what was straightened by appearance. Where too little is seen
+    the poses stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and kept with the
+    landmarks; points are those of a level camera.
     There are none where images are too small for local features, and the map is used without them.
     """
 
@@ -92,6 +93,7 @@ class LearnLandmarks(Stage):
             )
             poses = map.poses if adjusted.problem else adjusted.poses
             matches = pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
+        views = check.levelled(views, adjusted.camera)
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
         sightings = widely_seen(views, triangulated(views, tracks, poses))
         starts, seen = sightings_by_reference(views, sightings)

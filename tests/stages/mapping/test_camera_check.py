@@ -10,6 +10,7 @@ from omninav.pipeline import Context
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.self_calibration import adjustable
 from omninav.stages.geometry.landmarks.adjustment import adjusted
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
@@ -17,6 +18,7 @@ from omninav.stages.mapping.camera_check import CameraCheck
 from omninav.stages.recordings.camera_yaml import parse_camera
 
 TRUE = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
+SPHERE = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_bottom=-math.pi / 2)
 BESIDE = replace(TRUE, centre_x=321.8, centre_y=237.6)  # by 3 pixels
 
 
@@ -66,12 +68,30 @@ def test_of_a_camera_as_it_is_described_nothing_is_said(seen):
     assert not ctx.warnings
 
 
-def test_bearings_of_other_pixels_and_cameras_without_an_axis_are_not_checked(seen):
+@pytest.mark.parametrize("camera", [TRUE, SPHERE], ids=["mirror", "sphere"])
+def test_a_camera_that_leans_is_said(camera):
+    world = house(np.random.default_rng(0))
+    roll, pitch = math.radians(-3.0), math.radians(0.5)
+    about_x = [[1.0, 0.0, 0.0], [0.0, math.cos(roll), -math.sin(roll)], [0.0, math.sin(roll), math.cos(roll)]]
+    about_y = [[math.cos(pitch), 0.0, math.sin(pitch)], [0.0, 1.0, 0.0], [-math.sin(pitch), 0.0, math.cos(pitch)]]
+    mounted = np.array(about_y) @ about_x  # its upper end to the left, y, and a little forward
+    pixels, shown = camera.project(world.bearings @ mounted)
+    ctx, check = Context("landmarks"), check_of(camera, pixels)
+    found = corrections(check, world)
+    assert check.told(ctx, found) == ""
+    assert "leans by 0.5 degrees forward and 3.0 to the left" in ctx.warnings[0]
+    assert check.metrics(found)["camera"]["tilt_deg"] == pytest.approx(3.04, abs=0.02)
+    views = LocalViews(np.array([0, len(world.bearings)]), check.bearings, np.empty((0, 128), np.uint8))
+    level = check.levelled(views, found).bearings
+    np.testing.assert_allclose(level[shown], world.bearings[shown], atol=0.003)
+
+
+def test_bearings_of_other_pixels_and_cameras_of_a_part_of_the_circle_are_not_checked(seen):
     pixels, _ = seen
     check = check_of(TRUE, pixels)
     other = CameraCheck.of(BESIDE, [None], check.bearings, poses_given=True)
-    sphere = check_of(Equirectangular(1024, 512, 512.0), np.full((5, 2), 100.0))
-    for each in (other, sphere, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
+    ahead = check_of(Perspective(640, 480, 400.0, 400.0, 319.5, 239.5), np.full((5, 2), 100.0))
+    for each in (other, ahead, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
         assert each.camera is None
         assert each.metrics(np.empty(0)) == {}
         assert each.seen(np.arange(0)).sigmas.shape == (0,)
