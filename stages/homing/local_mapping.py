@@ -12,8 +12,10 @@ from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
 from omninav.stages.geometry.two_views.epipolar import yaw_of
+from omninav.stages.geometry.two_views.ransac import AgreedPose
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
 from omninav.stages.geometry.two_views.triangulation import parallax, triangulate
+from omninav.stages.geometry.two_views.vertical import levelling, seen_leaning, vertical_of
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import LOST, MATCHED, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
@@ -62,6 +64,11 @@ MAX_REFUTED_M = 3.0
 """Way after which features that led to another place may make a map again, metres."""
 MAX_HEADING_DIFFERENCE_DEG = 5.0
 """Largest difference of the target's headings by both, degrees."""
+LEANING_GAIN, LEVEL_SHARE = 1.5, 0.5
+"""Factor by which more matches must agree with a pose of a camera that leans than with one of an upright camera, and
+the share of all matches that may agree with the latter: from there on nothing is asked."""
+SAME_VERTICAL_DEG, MAX_VERTICALS = 1.0, 20
+"""Largest angle between two verticals that bear each other out, degrees, and how many are remembered."""
 
 
 class Matches(NamedTuple):
@@ -90,6 +97,7 @@ class LocalMappingState(State):
     (rad) in the robot's frame by a relative pose that enough features agreed with. None: there was none. `since` (3,):
     odometry since the witness (m, m, rad); `unseen_m`: way since the witness on which the target was not found.
     `refuted`: rows of its features that led to another place; `refuted_m`: way since the last time they did.
+    `vertical` (3,): of the camera's frame, once two images show that it leans; `leaning` (V, 3): what images showed.
     """
 
     map: LocalMap | None = None
@@ -101,6 +109,8 @@ class LocalMappingState(State):
     unseen_m: float = 0.0
     refuted: Ints = field(default_factory=lambda: NO_ROWS)
     refuted_m: float = 0.0
+    vertical: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    leaning: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 class LocalMapping(Stage):
@@ -121,6 +131,8 @@ class LocalMapping(Stage):
     `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or more, and
     both give the target the same heading. Of doubtful maps the one with the most inliers is kept for a short way. A
     target that was borne out needs one such image to be found again a short way on.
+
+    Where far more matches agree with a pose of a camera that leans, in two images, the planar solver works upright.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
     metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
@@ -194,7 +206,7 @@ class LocalMapping(Stage):
         if not len(local_map):
             return replace(local_map, why="")
         fresh = matches if self.matching == "every_image" else NO_MATCHES
-        local_map = self._resection(ctx, local_map, tracks, fresh)
+        local_map = self._resection(ctx, state, local_map, tracks, fresh)
         if local_map.state != "tracking":
             return replace(local_map, why=f"{local_map.why}; ")
         # Closer to the target more is matched with it; at the target the baseline is too short.
@@ -237,7 +249,12 @@ class LocalMapping(Stage):
         return lost, known
 
     def _resection(
-        self, ctx: Context, local_map: LocalMap, tracks: TrackedFeatures | None, matches: Matches
+        self,
+        ctx: Context,
+        state: LocalMappingState,
+        local_map: LocalMap,
+        tracks: TrackedFeatures | None,
+        matches: Matches,
     ) -> LocalMap:
         kinds, points = np.full(len(local_map), LOST), np.full((len(local_map), 2), np.nan)
         tracked, bearings, places = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))
@@ -253,10 +270,16 @@ class LocalMapping(Stage):
         bearings = np.concatenate([bearings, matches.first[matched]])
         places = np.concatenate([places, local_map.places[owners]])
         usable = np.isfinite(bearings).all(axis=1)
-        threshold = math.radians(MAX_RESECTION_ERROR_DEG)
+        threshold, level = math.radians(MAX_RESECTION_ERROR_DEG), levelling(state.vertical)
         found = three_point_pose(
-            bearings[usable], places[usable], ctx.rng, threshold, refine=self.refine, planar=self.solver == "planar"
+            bearings[usable] @ level.T,
+            places[usable] @ level.T,
+            ctx.rng,
+            threshold,
+            refine=self.refine,
+            planar=self.solver == "planar",
         )
+        found = found and seen_leaning(found, level)
         agrees = np.zeros(len(bearings), np.bool_)
         if found is not None:
             agrees[usable] = found.inliers
@@ -320,7 +343,7 @@ class LocalMapping(Stage):
         good &= ~np.isin(matches.rows, state.refuted)
         first, points, second = matches.first[good], matches.points[good], matches.second[good]
         threshold = math.radians(MAX_EPIPOLAR_ERROR_DEG)
-        found = relative_pose(first, second, ctx.rng, self.solver, threshold, refine=self.refine)
+        found = self._pose(ctx, state, first, second)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         agree = f"{inliers} of {len(first)} matches with the target view agree"
         if found is None or inliers < max(MIN_INLIERS, min_inliers):
@@ -354,6 +377,24 @@ class LocalMapping(Stage):
             metres=metres,
         )
         return new, ""
+
+    def _pose(self, ctx: Context, state: LocalMappingState, first: Array, second: Array) -> AgreedPose | None:
+        # The pose of the target view, and what the matches say of the camera's vertical.
+        level, threshold = levelling(state.vertical), math.radians(MAX_EPIPOLAR_ERROR_DEG)
+        found = relative_pose(first @ level.T, second @ level.T, ctx.rng, self.solver, threshold, refine=self.refine)
+        if found is None:
+            return None
+        agree = int(np.count_nonzero(found.inliers))
+        if self.solver == "planar" and agree < LEVEL_SHARE * len(first) and state.vertical[2] == 1.0:
+            enough = max(MIN_VERIFIED_INLIERS, math.ceil(LEANING_GAIN * agree))
+            vertical = vertical_of(first, second, ctx.rng, threshold, enough)
+            if vertical is not None:
+                same = state.leaning @ vertical > math.cos(math.radians(SAME_VERTICAL_DEG))
+                if same.any():
+                    mean = vertical + state.leaning[same].sum(axis=0)
+                    state.vertical = mean / np.linalg.norm(mean)
+                state.leaning = np.vstack([state.leaning, vertical])[-MAX_VERTICALS:]
+        return seen_leaning(found, level)
 
 
 def shown_sectors(target: Array, same: Array, here: Array) -> float:

@@ -17,6 +17,8 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
+from omninav.stages.geometry.two_views.relative_pose_ransac import Solver
+from omninav.stages.geometry.two_views.vertical import levelling
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
@@ -25,6 +27,7 @@ from omninav.stages.homing.local_mapping import (
     LocalMapping,
     LocalMappingState,
     Matches,
+    matches_with,
     shown_sectors,
 )
 from omninav.stages.homing.working_image import working_image
@@ -35,6 +38,8 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 
 TARGET = (5.0, 5.0, 0.4)
+UP = np.array([0.06, -0.03, math.sqrt(1.0 - 0.06**2 - 0.03**2)])
+"""The vertical in the frame of a camera that leans by 4 degrees."""
 
 
 @functools.cache
@@ -448,3 +453,24 @@ def test_missing_wires_are_reported() -> None:
     alien = Correspondences(np.array([9999]), np.array([0]), np.zeros(1))
     with pytest.raises(BadInput, match="correspondences that are not those of the present features"):
         homing.mapping.step(homing.ctx, homing.mapped, features, homing.target, alien)
+
+
+def leaning(features: LocalFeatures) -> LocalFeatures:
+    """The features as a camera sees them that leans."""
+    return replace(features, bearings=features.bearings @ levelling(UP))
+
+
+@pytest.mark.parametrize("solver", ["planar", "eight_point"])
+def test_a_camera_that_leans_is_levelled_once_two_images_show_it(solver: Solver) -> None:
+    ctx, state = Context("local_map", np.random.default_rng(0)), LocalMappingState()
+    target, mapping, inliers = HomingTarget(3, leaning(described("mirror", TARGET))), LocalMapping(solver=solver), []
+    for pose in drive(5, (4.2, 4.6, -1.2), (4.6, 4.8, -0.8)):
+        features = leaning(described("mirror", pose))
+        matches = matches_with(target, features, matched(features, target.features))
+        made, _ = mapping._made(ctx, state, LocalMap(-1, 3, "lost"), matches, 6)
+        inliers.append(0 if made is None else made.inliers)
+    if solver == "planar":
+        assert state.vertical @ UP > math.cos(math.radians(0.5))
+        assert min(inliers[-2:]) > 1.5 * inliers[0]
+    else:
+        assert state.vertical[2] == 1.0
