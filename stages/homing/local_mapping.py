@@ -393,6 +393,8 @@ class LocalMapping(Stage):
                 if same.any():
                     mean = vertical + state.leaning[same].sum(axis=0)
                     state.vertical = mean / np.linalg.norm(mean)
+                    tilt = math.degrees(math.acos(min(1.0, state.vertical[2])))
+                    ctx.warn(f"two images show that the camera leans by {tilt:.1f} degrees, for which homing allows")
                 state.leaning = np.vstack([state.leaning, vertical])[-MAX_VERTICALS:]
         return seen_leaning(found, level)
 
