@@ -22,7 +22,7 @@ CHANGED = {
     "omniview_mcl_as_printed": ("nodes.features.bins=joint",),
     "particle_cml_baseline": ("nodes.unwarp.columns=180",),
     "plain_matching": ("features=haar_integral",),
-    "retrieval_mcl": ("nodes.features.root=false", "camera=equirectangular"),
+    "retrieval_mcl": ("nodes.features.root=false", "rate=2"),
     "retrieval_mcl_as_printed": ("features=haar_integral",),
     "topological_localisation": ("nodes.features.contrast=0.03",),
     "topological_localisation_as_printed": ("features=rotation_reduced_sift",),
