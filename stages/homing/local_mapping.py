@@ -112,6 +112,18 @@ class LocalMappingState(State):
     vertical: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     leaning: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
+    def level(self, ctx: Context, vertical: Array | None) -> None:
+        """Take a vertical (3,) that two images show for the camera's, once another two have shown the same."""
+        if vertical is None:
+            return
+        same = self.leaning @ vertical > math.cos(math.radians(SAME_VERTICAL_DEG))
+        if same.any():
+            mean = vertical + self.leaning[same].sum(axis=0)
+            self.vertical = mean / np.linalg.norm(mean)
+            tilt = math.degrees(math.acos(min(1.0, self.vertical[2])))
+            ctx.warn(f"two images show that the camera leans by {tilt:.1f} degrees, for which homing allows")
+        self.leaning = np.vstack([self.leaning, vertical])[-MAX_VERTICALS:]
+
 
 class LocalMapping(Stage):
     """Places the robot and the target view among the features that both views have in common.
@@ -206,7 +218,7 @@ class LocalMapping(Stage):
         if not len(local_map):
             return replace(local_map, why="")
         fresh = matches if self.matching == "every_image" else NO_MATCHES
-        local_map = self._resection(ctx, state, local_map, tracks, fresh)
+        local_map = self._resection(ctx, local_map, tracks, fresh, levelling(state.vertical))
         if local_map.state != "tracking":
             return replace(local_map, why=f"{local_map.why}; ")
         # Closer to the target more is matched with it; at the target the baseline is too short.
@@ -249,12 +261,7 @@ class LocalMapping(Stage):
         return lost, known
 
     def _resection(
-        self,
-        ctx: Context,
-        state: LocalMappingState,
-        local_map: LocalMap,
-        tracks: TrackedFeatures | None,
-        matches: Matches,
+        self, ctx: Context, local_map: LocalMap, tracks: TrackedFeatures | None, matches: Matches, level: Array
     ) -> LocalMap:
         kinds, points = np.full(len(local_map), LOST), np.full((len(local_map), 2), np.nan)
         tracked, bearings, places = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))
@@ -270,7 +277,7 @@ class LocalMapping(Stage):
         bearings = np.concatenate([bearings, matches.first[matched]])
         places = np.concatenate([places, local_map.places[owners]])
         usable = np.isfinite(bearings).all(axis=1)
-        threshold, level = math.radians(MAX_RESECTION_ERROR_DEG), levelling(state.vertical)
+        threshold = math.radians(MAX_RESECTION_ERROR_DEG)
         found = three_point_pose(
             bearings[usable] @ level.T,
             places[usable] @ level.T,
@@ -343,7 +350,7 @@ class LocalMapping(Stage):
         good &= ~np.isin(matches.rows, state.refuted)
         first, points, second = matches.first[good], matches.points[good], matches.second[good]
         threshold = math.radians(MAX_EPIPOLAR_ERROR_DEG)
-        found = self._pose(ctx, state, first, second)
+        found = self._pose(ctx, state, first, second, threshold)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         agree = f"{inliers} of {len(first)} matches with the target view agree"
         if found is None or inliers < max(MIN_INLIERS, min_inliers):
@@ -378,24 +385,18 @@ class LocalMapping(Stage):
         )
         return new, ""
 
-    def _pose(self, ctx: Context, state: LocalMappingState, first: Array, second: Array) -> AgreedPose | None:
+    def _pose(
+        self, ctx: Context, state: LocalMappingState, first: Array, second: Array, threshold: float
+    ) -> AgreedPose | None:
         # The pose of the target view, and what the matches say of the camera's vertical.
-        level, threshold = levelling(state.vertical), math.radians(MAX_EPIPOLAR_ERROR_DEG)
+        level = levelling(state.vertical)
         found = relative_pose(first @ level.T, second @ level.T, ctx.rng, self.solver, threshold, refine=self.refine)
         if found is None:
             return None
         agree = int(np.count_nonzero(found.inliers))
         if self.solver == "planar" and agree < LEVEL_SHARE * len(first) and state.vertical[2] == 1.0:
             enough = max(MIN_VERIFIED_INLIERS, math.ceil(LEANING_GAIN * agree))
-            vertical = vertical_of(first, second, ctx.rng, threshold, enough)
-            if vertical is not None:
-                same = state.leaning @ vertical > math.cos(math.radians(SAME_VERTICAL_DEG))
-                if same.any():
-                    mean = vertical + state.leaning[same].sum(axis=0)
-                    state.vertical = mean / np.linalg.norm(mean)
-                    tilt = math.degrees(math.acos(min(1.0, state.vertical[2])))
-                    ctx.warn(f"two images show that the camera leans by {tilt:.1f} degrees, for which homing allows")
-                state.leaning = np.vstack([state.leaning, vertical])[-MAX_VERTICALS:]
+            state.level(ctx, vertical_of(first, second, ctx.rng, threshold, enough))
         return seen_leaning(found, level)
 
 
