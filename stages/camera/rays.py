@@ -27,16 +27,6 @@ def turned(rays: Array, yaw: float) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y, rays[..., 2]], axis=-1)
 
 
-def leaning(rays: Array, roll: float, pitch: float) -> Array:
-    """Rays (N, 3) of a camera that leans, in the frame of the level robot: turned about x, then about y (rad)."""
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(roll), -math.sin(roll)], [0.0, math.sin(roll), math.cos(roll)]])
-    about_y = np.array(
-        [[math.cos(pitch), 0.0, math.sin(pitch)], [0.0, 1.0, 0.0], [-math.sin(pitch), 0.0, math.cos(pitch)]]
-    )
-    out: Array = rays @ (about_y @ about_x).T
-    return out
-
-
 def normalised(rays: Array) -> Array:
     """Rays (..., 3) of unit length; NaN where they are NaN or zero."""
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,16 +9,17 @@ import numpy as np
 
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.geometry.landmarks.adjustment import Lens, rotations_about
 
 from .model import Camera
-from .rays import leaning
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
 """The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor shows it best."""
 
 
+TILT = ("roll", "pitch")
+"""Parameters of a camera that leans (rad): it is turned about x by the roll, then about y by the pitch."""
 TILT_SIGMA = math.radians(3.0)
 """Standard deviation of a camera's roll and pitch (rad) that nothing says: of what is screwed on by eye."""
 
@@ -57,13 +58,19 @@ def corrected(camera: Model, sigmas: Mapping[str, float], corrections: Array) ->
 
 
 def with_tilt(lens: Lens) -> Lens:
-    """The lens of a camera that may lean: its roll and pitch (rad), as in `leaning`, are two more parameters."""
+    """The lens of a camera that may lean, with the parameters of its `TILT` at the end."""
 
     def bearings(corrections: Array) -> Array:
-        roll, pitch = corrections[-2:]
-        return leaning(lens.bearings(corrections[:-2]), roll, pitch)
+        return leaning(lens.bearings(corrections[: -len(TILT)]), *corrections[-len(TILT) :])
 
-    return Lens(bearings, np.append(lens.sigmas, [TILT_SIGMA, TILT_SIGMA]))
+    return Lens(bearings, np.append(lens.sigmas, [TILT_SIGMA] * len(TILT)))
+
+
+def leaning(rays: Array, roll: float, pitch: float) -> Array:
+    """Rays (N, 3) of a camera that leans (rad), in the frame of the level robot."""
+    (mounted,) = rotations_about(np.array([pitch]), 1) @ rotations_about(np.array([roll]), 0)
+    out: Array = rays @ mounted.T
+    return out
 
 
 def observed(camera: Camera, poses_given: bool) -> dict[str, float]:

@@ -9,8 +9,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Quantity
 from omninav.stages.camera.model import Camera
-from omninav.stages.camera.rays import leaning
-from omninav.stages.camera.self_calibration import AXIS, adjustable, corrected, observed, with_tilt
+from omninav.stages.camera.self_calibration import AXIS, TILT, adjustable, corrected, leaning, observed, with_tilt
 from omninav.stages.camera.strip_elevations import with_elevations_found
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
@@ -51,10 +50,9 @@ class CameraCheck(NamedTuple):
     ) -> "CameraCheck":
         """The check of a map's features with these bearings (F, 3) of all references in order."""
         pixels = np.concatenate([np.empty((0, 2)), *(each.points for each in found if each is not None)])
-        names = {} if camera is None else observed(camera, poses_given)
-        whole = camera is not None and camera.elevations_known and camera.elevations is not None
-        if camera is None or not whole or not len(pixels):
+        if camera is None or not camera.elevations_known or camera.elevations is None or not len(pixels):
             return cls(None, {}, pixels, bearings)
+        names = observed(camera, poses_given)
         rays = adjustable(camera, pixels, names).bearings(np.zeros(len(names)))
         same = np.abs(rays - bearings).max() < SAME_RAY
         return cls(camera if same else None, names if same else {}, pixels, bearings)
@@ -70,14 +68,15 @@ class CameraCheck(NamedTuple):
         """The views of the camera as it is described, but for its tilt."""
         if self.camera is None or not len(corrections):
             return views
-        return views.looking_along(leaning(views.bearings, *corrections[-2:]))
+        by = self._named(corrections)
+        return views.looking_along(leaning(views.bearings, by["roll"], by["pitch"]))
 
     def metrics(self, corrections: Array) -> dict[str, Any]:
         """Deviations of the camera from its description."""
         if self.camera is None or not len(corrections):
             return {}
-        by = dict(zip(self.fields, corrections[:-2].tolist(), strict=True))
-        values = {"tilt_deg": math.degrees(math.hypot(*corrections[-2:]))}
+        by = self._named(corrections)
+        values = {"tilt_deg": math.degrees(math.hypot(by["roll"], by["pitch"]))}
         if AXIS.keys() <= by.keys():
             values["axis_beside_px"] = math.hypot(by["centre_x"], by["centre_y"])
         if "yaw" in by:
@@ -91,8 +90,8 @@ class CameraCheck(NamedTuple):
         """
         if self.camera is None or not len(corrections):
             return ""
-        by, right, parts = dict(zip(self.fields, corrections[:-2].tolist(), strict=True)), self.camera, []
-        _say_tilt(ctx, *np.degrees(corrections[-2:]).tolist())
+        by, right, parts = self._named(corrections), self.camera, []
+        _say_tilt(ctx, math.degrees(by["roll"]), math.degrees(by["pitch"]))
         moved = corrected(right, AXIS, np.array([by[name] for name in AXIS])) if AXIS.keys() <= by.keys() else right
         if self._turned(moved) > MAX_AXIS:
             right = moved
@@ -121,6 +120,9 @@ class CameraCheck(NamedTuple):
         top, bottom = (math.degrees(each) for each in right.elevations)
         found = f"its rows go from {top:.1f} to {bottom:.1f} degrees above the horizon, which camera.yaml does not say"
         return _told(ctx, found, right)
+
+    def _named(self, corrections: Array) -> dict[str, float]:
+        return dict(zip((*self.fields, *TILT), corrections.tolist(), strict=True))
 
     def _turned(self, other: Camera) -> float:
         rays, looks = other.unproject(self.pixels)

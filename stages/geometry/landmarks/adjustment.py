@@ -230,17 +230,17 @@ class _Problem:
 
 
 def _frames(poses: Array) -> Frames:
-    turns = _turns(poses[:, 2], 2)
+    turns = rotations_about(poses[:, 2], 2)
     axes = [turns[:, :, 2]]
     if poses.shape[1] == 5:
-        tilted = turns @ _turns(poses[:, 4], 1)
+        tilted = turns @ rotations_about(poses[:, 4], 1)
         axes += [tilted[:, :, 0], turns[:, :, 1]]
-        turns = tilted @ _turns(poses[:, 3], 0)
+        turns = tilted @ rotations_about(poses[:, 3], 0)
     return Frames(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
 
 
-def _turns(angles: Array, axis: int) -> Array:
-    """Rotations (N, 3, 3) by angles (N,) about the x, y or z axis."""
+def rotations_about(angles: Array, axis: int) -> Array:
+    """Rotations (N, 3, 3) by angles (N,), rad, about the x, y or z axis: 0, 1 or 2."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     out = np.zeros((len(angles), 3, 3))
     out[:, axis, axis] = 1.0
