@@ -148,7 +148,7 @@ class RobotDriver(Stage):
         self._offset = time.time_ns() - tick.stamp
         size = {"width": camera.width, "height": camera.height_px}
         self._info = {"header": {"frame_id": CAMERA}, **size, **camera.camera_info()}
-        fixed = transform(tick.stamp + self._offset, BASE, CAMERA, np.array([0.0, 0.0, camera.yaw]))
+        fixed = transform(tick.stamp + self._offset, BASE, CAMERA, camera.mount)
         fixed["transform"]["translation"]["z"] = camera.height or 0.0
         self._send("/tf_static", "tf2_msgs/msg/TFMessage", {"transforms": [fixed]}, latched=True)
 

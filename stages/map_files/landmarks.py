@@ -50,6 +50,8 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         _joined_words([each.words for each in parts]) or _words_of_landmarks(given, descriptors, ends, seen),
         min(each.found_rate for each in given),
         variance_factor=max(each.variance_factor for each in given),
+        described=given[0].described,
+        mount=given[0].mount,
     )
 
 

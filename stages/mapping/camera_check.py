@@ -9,6 +9,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Quantity
 from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import turned
 from omninav.stages.camera.self_calibration import AXIS, TILT, adjustable, corrected, leaning, observed, with_tilt
 from omninav.stages.camera.strip_elevations import with_elevations_found
 from omninav.stages.geometry.arrays import Array, Ints
@@ -21,6 +22,9 @@ CAMERA_QUANTITIES = {
     "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),
     "camera.tilt_deg": Quantity(title="Camera's tilt", unit="deg", context=True),
     "camera.yaw_beside_deg": Quantity(title="Camera turned against its description", unit="deg", context=True),
+    "camera.position_beside_m": Quantity(
+        title="Camera's position on the robot beside its description", unit="m", context=True
+    ),
 }
 MAX_AXIS = math.radians(0.2)
 """Angle by which an axis that lies beside moves a bearing, the median, above which it is said (rad)."""
@@ -68,42 +72,58 @@ class CameraCheck(NamedTuple):
         """The views of the camera as it is described, but for its tilt."""
         if self.camera is None or not len(corrections):
             return views
-        by = self._named(corrections)
-        return views.looking_along(leaning(views.bearings, by["roll"], by["pitch"]))
+        by, yaw = self._named(corrections), self.yaw_beside(corrections)
+        return views.looking_along(turned(leaning(turned(views.bearings, yaw), by["roll"], by["pitch"]), -yaw))
 
-    def metrics(self, corrections: Array) -> dict[str, Any]:
-        """Deviations of the camera from its description."""
+    def yaw_beside(self, corrections: Array) -> float:
+        """Angle (rad) by which the camera is turned against its description, 0 where it is small."""
+        yaw = self._named(corrections).get("yaw", 0.0) if self.camera is not None and len(corrections) else 0.0
+        return yaw if abs(yaw) > MAX_YAW else 0.0
+
+    def metrics(self, corrections: Array, mount: Array) -> dict[str, Any]:
+        """Deviations of the camera from its description; `mount` (3,): of where it sits on the robot (m, m, rad)."""
+        values = {"position_beside_m": math.hypot(mount[0], mount[1])} if mount[:2].any() else {}
+        if mount[2]:
+            values["yaw_beside_deg"] = abs(math.degrees(mount[2]))
         if self.camera is None or not len(corrections):
-            return {}
+            return {"camera": values} if values else {}
         by = self._named(corrections)
-        values = {"tilt_deg": math.degrees(math.hypot(by["roll"], by["pitch"]))}
+        values["tilt_deg"] = math.degrees(math.hypot(by["roll"], by["pitch"]))
         if AXIS.keys() <= by.keys():
             values["axis_beside_px"] = math.hypot(by["centre_x"], by["centre_y"])
         if "yaw" in by:
             values["yaw_beside_deg"] = abs(math.degrees(by["yaw"]))
         return {"camera": values}
 
-    def told(self, ctx: Context, corrections: Array) -> str:
+    def told(self, ctx: Context, camera: Camera | None, corrections: Array, mount: Array) -> str:
         """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is.
 
-        Nothing in a camera.yaml says that a camera leans.
+        `mount` (3,): how the camera sits on the robot otherwise than described (m, m, rad). Nothing in a camera.yaml
+        says that a camera leans.
         """
-        if self.camera is None or not len(corrections):
+        if camera is None:
             return ""
-        by, right, parts = self._named(corrections), self.camera, []
-        _say_tilt(ctx, math.degrees(by["roll"]), math.degrees(by["pitch"]))
-        moved = corrected(right, AXIS, np.array([by[name] for name in AXIS])) if AXIS.keys() <= by.keys() else right
-        if self._turned(moved) > MAX_AXIS:
-            right = moved
-            beside = math.hypot(by["centre_x"], by["centre_y"])
-            at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
-            parts.append(f"its axis lies {beside:.1f} px beside, at {at}")
-        if abs(by.get("yaw", 0.0)) > MAX_YAW:
-            right = replace(right, yaw=right.yaw + by["yaw"])
-            parts.append(f"it is turned by {math.degrees(by['yaw']):.1f} degrees more, yaw {right.yaw:.3f}")
+        right, parts = camera, []
+        if self.camera is not None and len(corrections):
+            by = self._named(corrections)
+            _say_tilt(ctx, math.degrees(by["roll"]), math.degrees(by["pitch"]))
+            moved = corrected(right, AXIS, np.array([by[name] for name in AXIS])) if AXIS.keys() <= by.keys() else right
+            if self._turned(moved) > MAX_AXIS:
+                right = moved
+                beside = math.hypot(by["centre_x"], by["centre_y"])
+                at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
+                parts.append(f"its axis lies {beside:.1f} px beside, at {at}")
+        harm = "The map is less exact by it" if parts else "Landmarks allow for it, colours are compared less exactly"
+        if mount[2]:
+            right = replace(right, yaw=right.yaw + float(mount[2]))
+            parts.append(f"it is turned by {math.degrees(mount[2]):.1f} degrees more, yaw {right.yaw:.3f}")
+        if mount[:2].any():
+            x, y = (round(float(value), 3) for value in camera.mount[:2] + mount[:2])
+            right = replace(right, position_x=x, position_y=y)
+            parts.append(f"it sits at x = {x:.2f}, y = {y:.2f} m on the robot (forward, left)")
         if not parts:
             return ""
-        return _told(ctx, "; ".join(parts), right)
+        return _told(ctx, "; ".join(parts), harm, right)
 
     def elevations_told(
         self, ctx: Context, camera: Camera | None, views: LocalViews, matches: PairMatches, poses: Array
@@ -119,7 +139,7 @@ class CameraCheck(NamedTuple):
             return ""
         top, bottom = (math.degrees(each) for each in right.elevations)
         found = f"its rows go from {top:.1f} to {bottom:.1f} degrees above the horizon, which camera.yaml does not say"
-        return _told(ctx, found, right)
+        return _told(ctx, found, "The map is less exact by it", right)
 
     def _named(self, corrections: Array) -> dict[str, float]:
         return dict(zip((*self.fields, *TILT), corrections.tolist(), strict=True))
@@ -141,10 +161,10 @@ def _say_tilt(ctx: Context, roll: float, pitch: float) -> None:
         )
 
 
-def _told(ctx: Context, found: str, right: Camera) -> str:
+def _told(ctx: Context, found: str, harm: str, right: Camera) -> str:
     ctx.fact("camera_found", found)
     ctx.warn(
-        f"the tour's images show that the camera is not as it is described: {found}. The map is less exact by it; "
+        f"the tour's images show that the camera is not as it is described: {found}. {harm}; "
         "the run's folder has the right description: type camera=FOLDER/camera.yaml"
     )
     return write_camera(right)

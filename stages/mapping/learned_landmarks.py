@@ -8,11 +8,17 @@ import numpy as np
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
-from omninav.stages.geometry.arrays import Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
-from omninav.stages.geometry.landmarks.map_adjustment import AdjustedMap, adjusted_drive, adjusted_to_given
+from omninav.stages.geometry.landmarks.map_adjustment import (
+    AdjustedMap,
+    adjusted_drive,
+    adjusted_to_given,
+    found_with_mount,
+)
 from omninav.stages.geometry.landmarks.map_making import (
     LocalViews,
+    PairMatches,
     bearing_sigma,
     fitting_matches,
     local_views,
@@ -25,6 +31,8 @@ from omninav.stages.geometry.landmarks.map_making import (
     triangulated,
     widely_seen,
 )
+from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
 from omninav.stages.values.length_scale import DEFAULT_M
 from omninav.stages.values.local_features import LocalFeatures
@@ -79,20 +87,33 @@ class LearnLandmarks(Stage):
         ctx.doing("triangulating landmarks")
         found = [each for each, event in zip(features, events, strict=True) if event is not None]
         views, given = _views(found), map.pose_source == "truth"
-        unit = length_scale(map.poses, map.features, map.kind) or DEFAULT_M
         check = CameraCheck.of(camera, found, views.bearings, given)
-        if given:
-            matches = pair_matches(views, neighbouring_pairs(map.poses, _rows(words), unit))
-            adjusted = adjusted_to_given(views, matches, map.poses, check.seen)
-            poses = adjusted.poses
-        else:
-            driven = map if as_driven is None else as_driven
+        described = np.zeros(3) if camera is None else camera.mount
+
+        def matched(poses: Array) -> PairMatches:
+            unit = length_scale(poses, map.features, map.kind) or DEFAULT_M
+            return pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
+
+        matches: PairMatches | None = None
+
+        def as_a_drive(poses: Array) -> AdjustedMap:
             height = None if camera is None else camera.height
-            adjusted = adjusted_drive(
-                views, _rows(words), driven.poses, check.seen, height, ctx.rng, map.pose_source == "guess"
-            )
-            poses = map.poses if adjusted.problem else adjusted.poses
-            matches = pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
+            seen_motion = map.pose_source == "guess"
+            return adjusted_drive(views, _rows(words), poses, check.seen, height, ctx.rng, seen_motion)
+
+        def as_given(poses: Array) -> AdjustedMap:
+            nonlocal matches
+            matches = matched(poses)
+            return adjusted_to_given(views, matches, poses, check.seen)
+
+        measured = map.poses if given or as_driven is None else as_driven.poses
+        mounted = described * [1.0, 1.0, 0.0]
+        adjusted, mount = found_with_mount(measured, mounted, as_given if given else as_a_drive, as_a_drive)
+        turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
+        mount = compose(mount, turn)
+        poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)
+        if matches is None:
+            matches = matched(poses)
         views = check.levelled(views, adjusted.camera)
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
         sightings = widely_seen(views, triangulated(views, tracks, poses))
@@ -109,10 +130,14 @@ class LearnLandmarks(Stage):
             words,
             left_out.found_rate,
             # Poses as they came: those adjusted to a wrong horizon were bent by it.
-            check.told(ctx, adjusted.camera) or check.elevations_told(ctx, camera, views, matches, map.poses),
+            check.told(ctx, camera, adjusted.camera, mount - mounted)
+            or check.elevations_told(ctx, camera, views, matches, map.poses),
             left_out.variance_factor,
+            described,
+            compose(mount, described * [0.0, 0.0, 1.0]),
         )
         ctx.fact("landmarks", len(landmarks))
+        poses = robot_poses(poses, mount)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         ctx.fact("map_adjusted", _words(adjusted, float(moved.max(initial=0.0)), given))
         values = {
@@ -124,7 +149,7 @@ class LearnLandmarks(Stage):
         }
         if not adjusted.problem:
             values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}
-        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera)}, QUANTITIES)
+        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted)}, QUANTITIES)
         return self.Out(map=replace(map, poses=poses, landmarks=landmarks), metrics=metrics)
 
 

@@ -2,6 +2,7 @@
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.appearance.length_scale import length_scale
+from omninav.stages.geometry.plane.mount import camera_poses
 from omninav.stages.values.length_scale import DEFAULT_M, LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -21,7 +22,9 @@ class AppearanceLengthScale(Stage):
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Measure one map."""
-        metres = length_scale(map.poses, map.features, map.kind)
+        # Two poses of a robot that turns are one, those of a camera beside its axis are not.
+        seen_from = map.poses if map.landmarks is None else camera_poses(map.poses, map.landmarks.mount)
+        metres = length_scale(seen_from, map.features, map.kind)
         metres = DEFAULT_M if metres is None else metres
         ctx.fact("appearance_length_scale_m", round(metres, 3))
         return self.Out(length_scale=LengthScale(metres))

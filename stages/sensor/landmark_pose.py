@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
+from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
@@ -71,8 +74,9 @@ class LandmarkPose(Stage):
         features: LocalFeatures,
         map: ReferenceGraph,
         near: Particles | None = None,
+        camera: Camera | None = None,
     ) -> Out:
-        """Find the pose of one image."""
+        """Find the pose of the robot that took one image."""
         landmarks = map.landmarks
         if landmarks is None:
             ctx.warn(WITHOUT_LANDMARKS)
@@ -91,7 +95,11 @@ class LandmarkPose(Stage):
                 best = fix
             if best is not None and best.probabilities[0] > 0.5:
                 break
-        return self.Out(fix=best)
+        if best is None or camera is None:
+            return self.Out(fix=best)
+        mount = landmarks.mounted(camera.mount)
+        covariances = robot_covariances(best.covariances, best.poses, mount)
+        return self.Out(fix=replace(best, poses=robot_poses(best.poses, mount), covariances=covariances))
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:
         theirs = restored_descriptors(landmarks.descriptors[rows])

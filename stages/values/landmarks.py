@@ -1,6 +1,6 @@
 """Landmarks of a map, and the pose of an image that sees them."""
 
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Annotated
 
 import numpy as np
@@ -26,6 +26,8 @@ class Landmarks(Value):
     `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
     `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
     `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings say.
+    `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description says and as its
+    images show.
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -37,6 +39,8 @@ class Landmarks(Value):
     found_rate: Annotated[float, Bounds(ge=0, le=1)]
     camera: str = ""
     variance_factor: Annotated[float, Bounds(ge=1, le=1e9)] = 2.5
+    described: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
+    mount: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -47,6 +51,14 @@ class Landmarks(Value):
         if one == other or not len(self) or not len(self.words.centres):
             return None
         return f"'words' are of descriptors of {other} numbers, those of the landmarks have {one}"
+
+    def mounted(self, described: Array) -> Array:
+        """Pose (3,) on the robot of the frame that bearings are in, of a camera whose description puts it at (3,).
+
+        One that is described as the tour's was sits where the tour's images showed it.
+        """
+        x, y, yaw = self.mount if np.array_equal(described, self.described) else described
+        return np.array([x, y, yaw - described[2]])
 
     @property
     def references(self) -> int:

@@ -8,7 +8,8 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
-from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.geometry.plane.mount import camera_poses, found_mount
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 
 from .adjustment import Lens, Motions, adjusted
 from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
@@ -46,6 +47,8 @@ SEEN_LOOSENESS = (10.0, 10.0, 3.0)
 are off by a third and more, and it says what the images say anyway."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
+MOUNT_ROUNDS = 5
+"""Adjustments at most that a mount is found from: each begins with the mount of the one before."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
@@ -55,6 +58,7 @@ class AdjustedMap(NamedTuple):
 
     `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
     `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
+    `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing was.
     """
 
     poses: Array
@@ -62,6 +66,29 @@ class AdjustedMap(NamedTuple):
     problem: str = ""
     closures: int = 0
     scale: float | None = None
+    seen: Array | None = None
+
+
+def found_with_mount(
+    robot: Array, described: Array, adjust: Callable[[Array], AdjustedMap], again: Callable[[Array], AdjustedMap]
+) -> tuple[AdjustedMap, Array]:
+    """What `adjust` makes of the camera's poses on a robot with poses (R, 3), and the mount (3,) that it then has.
+
+    `described`: the mount as the camera's description says it. Where the adjusted poses show another one, those that
+    begin with it are adjusted again. `again`: adjusts poses that tell a mount, where those as measured fit nothing.
+    """
+    found, mount = adjust(camera_poses(robot, described)), described
+    for round_ in range(MOUNT_ROUNDS):
+        start = camera_poses(robot, mount)
+        seen = (again(start) if found.problem else found).seen
+        by = None if seen is None else found_mount(seen, start, left=round_ > 0)
+        if by is None:
+            break
+        tried = adjust(camera_poses(robot, compose(mount, by)))
+        if tried.problem and not found.problem:
+            break
+        found, mount = tried, compose(mount, by)
+    return found, described if found.problem else mount
 
 
 def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, seen: Seen) -> AdjustedMap:
@@ -94,7 +121,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     confirmed = np.median(away) < CONFIRMED_M or agreed.sum() < MIN_GAIN * given.sum()
     # A single pose is off where its own matches say so by three standard deviations of their number.
     exact = confirmed & ((away < OUTLYING_M) | (agreed < MIN_GAIN * given + 3.0 * np.sqrt(given)))
-    return AdjustedMap(_wrapped(np.where(exact[:, None], poses, found.poses)), found.camera)
+    return AdjustedMap(_wrapped(np.where(exact[:, None], poses, found.poses)), found.camera, seen=found.poses)
 
 
 def _fitting(views: LocalViews, matches: PairMatches, poses: Array) -> Ints:
@@ -149,7 +176,8 @@ def adjusted_drive(
     scale = height / depth if height and depth is not None else None
     poses = found.poses.copy()
     poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])
-    return AdjustedMap(_wrapped(poses), found.camera, closures=closures, scale=scale)
+    poses = _wrapped(poses)
+    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=poses)
 
 
 class _Found(NamedTuple):
