@@ -6,15 +6,18 @@ from dataclasses import field
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage, State
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Bools, Bytes
 from omninav.stages.geometry.landmarks.unbroken_view import Carried, carried
-from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.plane.mount import camera_poses
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.track import Track
 
@@ -95,8 +98,10 @@ class UnbrokenTrack(Stage):
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
         restart: Reinitialise | None = None,
+        map: ReferenceGraph | None = None,
+        camera: Camera | None = None,
     ) -> Out:
-        """Judge one image; `features`: of it, from which `fix` was made."""
+        """Judge one image; `features`: of it, from which `fix` was made; `map`: tells where the camera sits."""
         unit = metres_of(length_scale)
         if motion is None or ctx.tick.first_of_log or restart is not None:
             vars(state).update(vars(UnbrokenTrackState()))
@@ -108,7 +113,9 @@ class UnbrokenTrack(Stage):
             state.confirmed = 0.0
         left_out, surely = np.zeros(0 if fix is None else len(fix), np.bool_), False
         if features is not None:
-            left_out, surely = self._judged(state, belief, features, fix, unit)
+            landmarks = None if map is None else map.landmarks
+            mount = np.zeros(3) if landmarks is None or camera is None else landmarks.mounted(camera.mount)
+            left_out, surely = self._judged(state, belief, features, fix, unit, mount)
         holds = state.against < state.confirmed
         if holds and belief.recovery_particles:
             belief = without_recovery(belief)
@@ -123,9 +130,10 @@ class UnbrokenTrack(Stage):
         features: LocalFeatures,
         fix: LandmarkFix | None,
         unit: float,
+        mount: Array,
     ) -> tuple[Bools, bool]:
-        """Update the track by one image. Returns which poses (K,) are left out, and whether the robot was surely
-        carried to this image."""
+        """Update the track by one image of a camera with this `mount` (3,). Returns which poses (K,) are left out, and
+        whether the robot was surely carried to this image."""
         before, now, moved = (state.bearings, state.descriptors), (features.bearings, features.descriptors), state.moved
         (state.bearings, state.descriptors), state.moved = now, np.zeros(3)
         driven = math.hypot(moved[0], moved[1])
@@ -135,7 +143,8 @@ class UnbrokenTrack(Stage):
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_), False
-        how = carried(before, now, moved) if len(before[0]) else Carried(math.inf, False)
+        seen = between(mount, camera_poses(moved, mount)) if np.any(mount) else moved
+        how = carried(before, now, seen) if len(before[0]) else Carried(math.inf, False)
         state.carried = max(state.carried, how.at_most)
         # a narrow view turns out of what it saw
         surely = how.surely and driven < FREQUENT[0] and abs(float(moved[2])) < FREQUENT[1]

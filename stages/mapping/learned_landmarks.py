@@ -58,11 +58,11 @@ class LearnLandmarks(Stage):
 
     Neighbouring references that share visual words are matched by their local features; matches that fit the motion
     between both join to tracks, and tracks become points with a mean descriptor (RootSIFT). Poses, points and, with
-    `camera` wired, the camera's axis and tilt are adjusted together: given poses may be exact or off by decimetres and
-    degrees; those of odometry alone are straightened first by the places that the tour came back to, and scaled by the
-    camera's height over the floor, which then replaces what was straightened by appearance. Where too little is seen
-    the poses stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and kept with the
-    landmarks; points are those of a level camera.
+    `camera` wired, the camera's axis, tilt and mount are adjusted together: given poses may be exact or off by
+    decimetres and degrees; those of odometry alone are straightened first by the places that the tour came back to, and
+    scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Where too
+    little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and
+    kept with the landmarks; points are those of a level camera, and poses those of the robot under it.
     There are none where images are too small for local features, and the map is used without them.
     """
 
@@ -108,7 +108,11 @@ class LearnLandmarks(Stage):
 
         measured = map.poses if given or as_driven is None else as_driven.poses
         mounted = described * [1.0, 1.0, 0.0]
-        adjusted, mount = found_with_mount(measured, mounted, as_given if given else as_a_drive, as_a_drive)
+        adjust = as_given if given else as_a_drive
+        if camera is None:
+            adjusted, mount = adjust(measured), mounted
+        else:
+            adjusted, mount = found_with_mount(measured, mounted, adjust, as_a_drive)
         turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
         mount = compose(mount, turn)
         poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)

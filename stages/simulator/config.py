@@ -325,8 +325,6 @@ class CameraErrors:
     """Share by which its focal lengths are longer or shorter."""
     centre_px: Annotated[float, Bounds(ge=0, le=100)] = 0.0
     """Pixels by which its centre lies elsewhere."""
-    forward_m: Annotated[float, Bounds(ge=-2, le=2)] = 0.0
-    """Metres by which it sits further forward on the robot; the image of the robot itself stays where it is."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class RobotCamera:
         self._ramps_begin = self._drawn("ramps").uniform(0, world.ramps.period_m)
         self._true = self._with_errors()
         # The rays are turned by the yaw already.
-        self._mount = self.described.mount * [1.0, 1.0, 0.0] + [world.camera_errors.forward_m, 0.0, 0.0]
+        self._mount = self.described.mount * [1.0, 1.0, 0.0]
 
     def image(self, scene: Scene, poses: Array, seconds: float, key: int, people: Sequence[Person] = ()) -> Pixels:
         """The image (rows, columns, 3) that is taken of a scene `seconds` into the drive.

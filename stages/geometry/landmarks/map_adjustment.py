@@ -58,7 +58,8 @@ class AdjustedMap(NamedTuple):
 
     `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
     `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
-    `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing was.
+    `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where these tell
+    nothing that was measured apart from them.
     """
 
     poses: Array
@@ -177,7 +178,8 @@ def adjusted_drive(
     poses = found.poses.copy()
     poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])
     poses = _wrapped(poses)
-    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=poses)
+    seen_apart = None if seen_motion else poses  # what images measured tells nothing of the robot under them
+    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=seen_apart)
 
 
 class _Found(NamedTuple):

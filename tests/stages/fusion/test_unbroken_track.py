@@ -3,12 +3,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from landmark_tour import mapped_room, room
+from landmark_tour import seen_from as seen_in_room
 from landmark_world import NOISE
 from made_beliefs import even
 from made_words import NOTHING, features_of
 
 from omninav.pipeline import Context
+from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.fusion.unbroken_track import UnbrokenTrack, UnbrokenTrackState, without_recovery
+from omninav.stages.geometry.plane.mount import camera_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix
@@ -162,3 +166,22 @@ def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_
     assert only.poses.tolist() == [pose.tolist()]
     assert only.probabilities == pytest.approx([0.8])
     assert only.agree.tolist() == [-1, 0, -1, 0]
+
+
+def test_a_camera_that_swings_round_with_its_robot_was_not_carried() -> None:
+    mount, camera = (
+        np.array([0.6, 0.0, 0.0]),
+        Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5),
+    )
+    plain = mapped_room()
+    map = replace(plain, landmarks=replace(plain.landmarks, mount=mount))
+    robot = np.column_stack([np.full(6, 5.0), np.full(6, 3.0), 0.7 * np.arange(6)])
+    carried = {}
+    for where, wired in (("told", {"map": map, "camera": camera}), ("untold", {})):
+        state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0))
+        for n, pose in enumerate(robot):
+            features = seen_in_room(room(), camera_poses(pose, mount))
+            motion = Motion(0.0, 0.0, 0.7) if n else None
+            stage.step(ctx, state, Particles(pose[None], np.ones(1)), features, None, motion, **wired)
+        carried[where] = state.carried
+    assert carried == {"told": 0.0, "untold": 5.0}

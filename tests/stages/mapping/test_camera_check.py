@@ -41,21 +41,25 @@ def corrections(check, world):
     return adjusted(world.poses, world.points, world.references, world.landmarks, lens, NOISE, held).camera
 
 
+def told(ctx, check, found):
+    return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]))
+
+
 def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
     pixels, world = seen
     ctx, check = Context("landmarks"), check_of(BESIDE, pixels)
     found = corrections(check, world)
-    right = parse_camera(check.told(ctx, found), "camera.yaml")
+    right = parse_camera(told(ctx, check, found), "camera.yaml")
     assert (right.centre_x, right.centre_y) == pytest.approx((319.5, 239.5), abs=0.05)
     assert (right.yaw, right.height) == (0.3, 0.9)
     assert "its axis lies 3.0 px beside, at 319.5, 239.5" in ctx.warnings[0]
-    assert check.metrics(found)["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
+    assert check.metrics(found, np.zeros(3))["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
 
 
 def test_a_camera_that_is_turned_is_said(seen):
     pixels, world = seen
     ctx, check = Context("landmarks"), check_of(replace(TRUE, yaw=0.2), pixels)
-    right = parse_camera(check.told(ctx, corrections(check, world)), "camera.yaml")
+    right = parse_camera(told(ctx, check, corrections(check, world)), "camera.yaml")
     assert right.yaw == pytest.approx(0.3, abs=0.001)
     assert (right.centre_x, right.centre_y) == (319.5, 239.5)
     assert "turned by 5.7 degrees more" in ctx.warnings[0]
@@ -64,7 +68,7 @@ def test_a_camera_that_is_turned_is_said(seen):
 def test_of_a_camera_as_it_is_described_nothing_is_said(seen):
     pixels, world = seen
     ctx, check = Context("landmarks"), check_of(TRUE, pixels)
-    assert check.told(ctx, corrections(check, world)) == ""
+    assert told(ctx, check, corrections(check, world)) == ""
     assert not ctx.warnings
 
 
@@ -78,9 +82,9 @@ def test_a_camera_that_leans_is_said(camera):
     pixels, shown = camera.project(world.bearings @ mounted)
     ctx, check = Context("landmarks"), check_of(camera, pixels)
     found = corrections(check, world)
-    assert check.told(ctx, found) == ""
+    assert told(ctx, check, found) == ""
     assert "leans by 0.5 degrees forward and 3.0 to the left" in ctx.warnings[0]
-    assert check.metrics(found)["camera"]["tilt_deg"] == pytest.approx(3.04, abs=0.02)
+    assert check.metrics(found, np.zeros(3))["camera"]["tilt_deg"] == pytest.approx(3.04, abs=0.02)
     views = LocalViews(np.array([0, len(world.bearings)]), check.bearings, np.empty((0, 128), np.uint8))
     level = check.levelled(views, found).bearings
     np.testing.assert_allclose(level[shown], world.bearings[shown], atol=0.003)
@@ -93,7 +97,7 @@ def test_bearings_of_other_pixels_and_cameras_of_a_part_of_the_circle_are_not_ch
     ahead = check_of(Perspective(640, 480, 400.0, 400.0, 319.5, 239.5), np.full((5, 2), 100.0))
     for each in (other, ahead, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
         assert each.camera is None
-        assert each.metrics(np.empty(0)) == {}
+        assert each.metrics(np.empty(0), np.zeros(3)) == {}
         assert each.seen(np.arange(0)).sigmas.shape == (0,)
 
 

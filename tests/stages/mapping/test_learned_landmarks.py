@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +8,12 @@ from made_words import NOTHING
 from scipy.spatial import KDTree
 
 from omninav.pipeline import Context
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks
 from omninav.stages.mapping.learned_words import LearnVisualWords
+from omninav.stages.recordings.camera_yaml import parse_camera
 from omninav.stages.values.landmarks import DESCRIPTOR_SCALE
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
@@ -113,3 +117,47 @@ def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
         ctx, out = learned(poses, source, [NOTHING] * len(poses))
         assert (out.map.poses == poses).all()
         assert ctx.facts["map_adjusted"].startswith("no: ")
+
+
+CAMERA = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_bottom=-math.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("source", "mount"),
+    [
+        ("truth", (0.1, 0.0, 0.0)),
+        ("truth", (0.5, -0.2, 0.0)),
+        ("odometry", (0.5, -0.2, 0.0)),
+        ("odometry", (0.2, 0.0, math.radians(8.0))),  # given poses tell a turn with the camera's axis
+    ],
+)
+def test_where_a_camera_sits_on_the_robot_is_found_and_its_map_is_as_exact(source, mount) -> None:
+    poses = tour_poses(0.2)
+    robot = robot_poses(poses, np.array(mount))
+    ctx, out = learned(robot, source, seen_along(poses), camera=CAMERA)
+    landmarks = out.map.landmarks
+    assert landmarks.mount == pytest.approx(mount, abs=0.005)
+    assert np.hypot(*(out.map.poses - robot)[:, :2].T).max() < 0.02
+    gap, _ = KDTree(room().where - (0.0, 0.0, HEIGHT_M)).query(landmarks.points)
+    assert np.median(gap) < 0.01
+    right = parse_camera(landmarks.camera, "camera.yaml")
+    assert right.mount == pytest.approx(mount, abs=0.005)
+    assert "it sits at x = " in ctx.warnings[0]
+    assert out.metrics.values["camera"]["position_beside_m"] == pytest.approx(math.hypot(*mount[:2]), abs=0.005)
+
+
+def test_a_mount_that_is_described_is_believed_and_nothing_is_said() -> None:
+    poses, mount = tour_poses(), np.array([0.5, -0.2, 0.0])
+    camera = replace(CAMERA, position_x=0.5, position_y=-0.2)
+    ctx, out = learned(robot_poses(poses, mount), "truth", seen_along(poses), camera=camera)
+    assert not ctx.warnings
+    assert not out.map.landmarks.camera
+    assert (out.map.landmarks.mount == mount).all()
+    gap, _ = KDTree(room().where - (0.0, 0.0, HEIGHT_M)).query(out.map.landmarks.points)
+    assert np.median(gap) < 0.001
+
+
+def test_motion_that_was_seen_in_the_images_tells_no_mount() -> None:
+    poses = tour_poses(0.2)
+    _, out = learned(robot_poses(poses, np.array([0.5, 0.0, 0.0])), "guess", seen_along(poses), camera=CAMERA)
+    assert not out.map.landmarks.mount.any()

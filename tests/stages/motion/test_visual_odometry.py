@@ -11,6 +11,7 @@ from made_tour import Landmarks as Points
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState
 from omninav.stages.values.landmarks import LandmarkFix
@@ -38,7 +39,21 @@ def walk(images: int) -> np.ndarray:
     return np.array(poses)
 
 
-def run(points, poses: np.ndarray, height: float | None = None, hidden=(), fixes=None, kept=False, log=0, **options):
+NONE = np.zeros(3)
+"""Mount of a camera on the robot's axis."""
+
+
+def run(
+    points,
+    poses: np.ndarray,
+    height: float | None = None,
+    hidden=(),
+    fixes=None,
+    kept=False,
+    log=0,
+    mount=NONE,
+    **options,
+):
     """The stage's output for each image; `hidden` ones show nothing. `kept`: its state goes through bytes."""
     stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
     rng, outs, ctx.tick = np.random.default_rng(1), [], Tick(0, 0, log)
@@ -53,7 +68,10 @@ def run(points, poses: np.ndarray, height: float | None = None, hidden=(), fixes
             fresh = VisualOdometryState()
             restore_state(fresh, decode(encode(encode_state(state))))
             state = fresh
-        camera, fix = SimpleNamespace(height=height), None if fixes is None or not number else fixes[number - 1]
+        camera, fix = (
+            SimpleNamespace(height=height, mount=mount),
+            None if fixes is None or not number else fixes[number - 1],
+        )
         outs.append(stage.step(ctx, features, camera, motion, AssumedPose(0.0, 0.0, 0.0), state, fix))
     return outs, ctx
 
@@ -86,6 +104,16 @@ def test_the_cameras_height_over_the_floor_gives_metres() -> None:
     assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
     assert "floor" in ctx.facts["scale"]
     assert not ctx.warnings
+
+
+def test_the_motion_is_that_of_the_robot_under_a_camera_in_front_of_its_axis() -> None:
+    poses, mount = walk(40), np.array([0.3, 0.1, 0.2])  # bearings are turned by the 0.2 already
+    robot = robot_poses(poses, mount * [1.0, 1.0, 0.0])
+    outs, _ = run(room(floor=True), poses, height=FLOOR_M, mount=mount)
+    beside, _ = run(room(floor=True), poses, height=FLOOR_M)
+    true = between(robot[0], robot)
+    missed, without = (np.hypot(*(path(each) - true)[20:, :2].T).mean() for each in (outs, beside))
+    assert missed < 0.5 * without
 
 
 def fix_at(pose: np.ndarray) -> LandmarkFix:
@@ -169,6 +197,6 @@ def test_motions_that_were_measured_stay() -> None:
     stage, state = VisualOdometry(), VisualOdometryState()
     motion, odometry = Motion(0.1, 0.0, 0.2), Pose(3.0, 1.0, 0.0)
     features = room(floor=True).seen(odometry)
-    out = stage.step(Context("seen"), features, SimpleNamespace(height=None), motion, odometry, state)
+    out = stage.step(Context("seen"), features, SimpleNamespace(height=None, mount=NONE), motion, odometry, state)
     assert out.motion is motion
     assert out.odometry is odometry

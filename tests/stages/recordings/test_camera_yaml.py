@@ -36,7 +36,7 @@ CAMERAS = [
     ),
     Equirectangular(**SIZE, column_of_forward=320, elevation_top=1.5, elevation_bottom=-1.5),
     Fisheye(**SIZE, focal_px=150, centre_x=320, centre_y=240, outer_radius_px=235, inner_radius_px=3, yaw=-1),
-    Perspective(**SIZE, **PINHOLE, height=0.4, yaw=0.1),
+    Perspective(**SIZE, **PINHOLE, height=0.4, yaw=0.1, position_x=0.3, position_y=-0.1),
 ]
 HOUSE = write_camera(CAMERAS[0])
 

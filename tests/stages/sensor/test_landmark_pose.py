@@ -12,6 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
+from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.sensor.landmark_pose import LandmarkPose, covariance_of, probabilities_of, sectors_of
 from omninav.stages.values.belief import Particles
@@ -190,3 +191,22 @@ def test_the_variance_of_a_pose_is_that_of_bearings_by_map_or_image_and_never_be
     pose = BearingPose(np.zeros(3), np.diag([1.0, 2.0, 0.0]), 0.02, np.ones(9, np.bool_), 0.0)
     expected = [4.0 * larger**2 + 9e-8, 8.0 * larger**2 + 9e-8, math.radians(0.003) ** 2]
     assert covariance_of(pose, sigma, 4.0) == pytest.approx(np.diag(expected))
+
+
+def test_the_pose_is_that_of_the_robot_where_the_camera_sits_beside_its_axis() -> None:
+    plain, mount = mapped_room(), np.array([0.4, -0.1, 0.2])
+    described = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5, yaw=0.05)
+    seen = seen_from(room(), FIRST)
+    at = LandmarkPose().step(Context("landmark_pose"), seen, plain).fix
+
+    def of(camera: Equirectangular, **said: np.ndarray) -> LandmarkFix:
+        map = replace(plain, landmarks=replace(plain.landmarks, **said))
+        return LandmarkPose().step(Context("landmark_pose"), seen, map, camera=camera).fix
+
+    found = of(described, described=described.mount, mount=mount + np.array([0.0, 0.0, 0.05]))
+    assert found.poses[0] == pytest.approx(robot_poses(at.poses[0], mount))
+    assert found.covariances[0] == pytest.approx(robot_covariances(at.covariances, at.poses, mount)[0])
+    assert found.inliers[0] == at.inliers[0]
+    # A camera that is described otherwise than the tour's sits where its own description says.
+    other = of(replace(described, position_x=0.3), described=described.mount, mount=mount)
+    assert other.poses[0] == pytest.approx(robot_poses(at.poses[0], np.array([0.3, 0.0, 0.0])))
