@@ -3,8 +3,15 @@ import pytest
 from landmark_world import displaced, driven, misplaced
 
 from omninav.stages.geometry.landmarks.adjustment import Lens
-from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive, adjusted_to_given
+from omninav.stages.geometry.landmarks.map_adjustment import (
+    AdjustedMap,
+    adjusted_drive,
+    adjusted_to_given,
+    found_with_mount,
+)
 from omninav.stages.geometry.landmarks.map_making import LocalViews, neighbouring_pairs, pair_matches
+from omninav.stages.geometry.plane.mount import camera_poses
+from omninav.stages.geometry.plane.se2 import chain, wrap
 
 
 def seen_in(views):
@@ -96,3 +103,36 @@ def test_images_without_features_leave_the_poses(number):
     matches = pair_matches(nothing, neighbouring_pairs(poses, alike, 0.5))
     assert adjusted_to_given(nothing, matches, poses, seen_in(nothing)).problem
     assert adjusted_drive(nothing, alike, poses, seen_in(nothing), None, np.random.default_rng(0)).problem
+
+
+def half_seen(mount: np.ndarray, problem: str = ""):
+    """An adjustment that brings the poses of a camera with a `mount` 0.7 of the way to where they are."""
+    robot = turning_drive()
+
+    def adjust(poses: np.ndarray) -> AdjustedMap:
+        missing = camera_poses(robot, mount) - poses
+        missing[:, 2] = wrap(missing[:, 2])
+        return AdjustedMap(poses, np.empty(0), problem, seen=poses + 0.7 * missing)
+
+    return robot, adjust
+
+
+def turning_drive() -> np.ndarray:
+    turns = 0.3 * np.random.default_rng(0).normal(size=100)
+    return chain(np.column_stack([np.full(100, 0.4), np.zeros(100), turns]))
+
+
+def test_a_mount_is_found_round_by_round_until_little_is_left():
+    mount = np.array([0.4, -0.1, 0.0])
+    robot, adjust = half_seen(mount)
+    found, as_found = found_with_mount(robot, np.zeros(3), adjust, adjust)
+    assert as_found == pytest.approx(mount, abs=0.0015)
+    assert found.poses == pytest.approx(camera_poses(robot, as_found))
+
+
+def test_a_mount_with_which_nothing_fits_either_is_not_believed():
+    robot, adjust = half_seen(np.array([0.4, 0.0, 0.0]), problem="too few landmarks are seen")
+    described = np.array([0.1, 0.0, 0.0])
+    found, mount = found_with_mount(robot, described, adjust, half_seen(np.array([0.4, 0.0, 0.0]))[1])
+    assert found.problem
+    assert (mount == described).all()

@@ -62,3 +62,10 @@ def test_of_a_camera_on_the_robots_axis_none_is_found() -> None:
 def test_a_drive_straight_ahead_or_of_few_steps_tells_none() -> None:
     for robot in (driven(turns=0.01), driven(steps=15)):
         assert found_mount(camera_poses(robot, MOUNT), robot) is None
+
+
+def test_a_mount_that_noise_could_be_is_none() -> None:
+    robot, rng = driven(turns=0.12), np.random.default_rng(3)
+    camera = camera_poses(robot, np.array([0.05, 0.0, 0.0]))
+    camera[:, :2] += rng.normal(0.0, 0.03, (len(robot), 2))
+    assert found_mount(camera, robot) is None
