@@ -131,6 +131,11 @@ class Camera(Value, ABC):
         return np.array([self.position_x or 0.0, self.position_y or 0.0, self.yaw])
 
     @property
+    def arm(self) -> Array:
+        """The mount (3,) of the frame that bearings are in: they are turned by the yaw already."""
+        return self.mount * [1.0, 1.0, 0.0]
+
+    @property
     def elevations(self) -> tuple[float, float] | None:
         """Highest and lowest elevation (rad) of a camera that sees the full circle; None for any other.
 

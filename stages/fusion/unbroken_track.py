@@ -9,8 +9,8 @@ from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Bools, Bytes
 from omninav.stages.geometry.landmarks.unbroken_view import Carried, carried
-from omninav.stages.geometry.plane.mount import camera_poses
-from omninav.stages.geometry.plane.se2 import between, compose, wrap
+from omninav.stages.geometry.plane.mount import camera_step
+from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.commands import Reinitialise
@@ -143,8 +143,7 @@ class UnbrokenTrack(Stage):
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_), False
-        seen = between(mount, camera_poses(moved, mount)) if np.any(mount) else moved
-        how = carried(before, now, seen) if len(before[0]) else Carried(math.inf, False)
+        how = carried(before, now, camera_step(moved, mount)) if len(before[0]) else Carried(math.inf, False)
         state.carried = max(state.carried, how.at_most)
         # a narrow view turns out of what it saw
         surely = how.surely and driven < FREQUENT[0] and abs(float(moved[2])) < FREQUENT[1]

@@ -11,6 +11,7 @@ from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, Lo
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.pose import Motion
 
+from .camera_motion import camera_motion
 from .image_tracking import HISTOGRAM_BINS, best_nearby, find_again, histograms, track, trackability
 from .working_image import WorkingImage, working_image
 
@@ -72,7 +73,7 @@ class FeatureTracker(Stage):
             found_again = np.zeros(0, np.int64)
         else:
             found_again = self._update(state, seen._replace(grey=state.image), local_map)
-        tracks = self._track(state, seen, local_map.moved(motion), found_again)
+        tracks = self._track(state, seen, local_map.moved(camera_motion(motion, camera)), found_again)
         state.image = seen.grey
         return self.Out(tracks=tracks)
 

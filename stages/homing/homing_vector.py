@@ -2,7 +2,11 @@
 
 import math
 
+import numpy as np
+
 from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.plane.mount import robot_step
 from omninav.stages.geometry.two_views.epipolar import yaw_of
 from omninav.stages.values.homing import HomingVector, LocalMap
 
@@ -18,20 +22,22 @@ class HomingVectorFromMap(Stage):
 
         vector: HomingVector | None = None
 
-    def step(self, ctx: Context, map: LocalMap | None = None) -> Out:
-        """One homing vector."""
+    def step(self, ctx: Context, map: LocalMap | None = None, camera: Camera | None = None) -> Out:
+        """One homing vector, of the robot under the `camera`."""
         if map is None:
             return self.Out()
         if not len(map):
             return self.Out(
                 vector=HomingVector(map.target, 0.0, 0.0, 1.0, 1.0, 1.0, None, map.inliers, map.state, map.why)
             )
-        x, y, _ = map.to_target()
+        (x, y, _), turn = map.to_target(), yaw_of(map.rotation.T @ map.goal_rotation)
+        if camera is not None and map.metres > 0.0:
+            x, y, _ = robot_step(np.array([x, y, turn]), camera.arm / [map.metres, map.metres, 1.0]).tolist()
         distance, depth = math.hypot(x, y), map.depth()
         vector = HomingVector(
             number=map.target,
             direction=math.atan2(y, x),
-            turn=yaw_of(map.rotation.T @ map.goal_rotation),
+            turn=turn,
             distance=distance,
             ratio=distance * map.unit,
             nearness=distance / depth if depth > 0.0 else 1.0,

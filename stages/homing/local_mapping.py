@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
@@ -20,6 +21,8 @@ from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import LOST, MATCHED, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
+
+from .camera_motion import camera_motion
 
 MIN_MAP_MOTION, MIN_ODOMETRY_M = 0.1, 0.05
 """Distances since the map was made, in its unit and in metres, from which they are compared for the unit in metres."""
@@ -148,7 +151,8 @@ class LocalMapping(Stage):
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
     metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
-    only sensor. Raises BadInput for correspondences of other features.
+    only sensor. The map has the places of the `camera`, which may sit beside the robot's axis. Raises BadInput for
+    correspondences of other features.
     """
 
     matching: Literal["every_image", "at_start"] = "every_image"
@@ -180,8 +184,10 @@ class LocalMapping(Stage):
         correspondences: Correspondences | None = None,
         tracks: TrackedFeatures | None = None,
         motion: Motion | None = None,
+        camera: Camera | None = None,
     ) -> Out:
-        """Locate the robot; `correspondences` are of `features` with those of the target."""
+        """Locate the camera; `correspondences` are of `features` with those of the target."""
+        motion = camera_motion(motion, camera)
         if motion is not None:
             way = math.hypot(motion.x, motion.y)
             state.since = compose(state.since, (motion.x, motion.y, motion.turn))

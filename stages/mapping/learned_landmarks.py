@@ -107,7 +107,7 @@ class LearnLandmarks(Stage):
             return adjusted_to_given(views, matches, poses, check.seen)
 
         measured = map.poses if given or as_driven is None else as_driven.poses
-        mounted = described * [1.0, 1.0, 0.0]
+        mounted = np.zeros(3) if camera is None else camera.arm
         adjust = as_given if given else as_a_drive
         if camera is None:
             adjusted, mount = adjust(measured), mounted

@@ -11,7 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 from omninav.stages.geometry.landmarks.map_making import LocalViews
 from omninav.stages.geometry.landmarks.visual_odometry import STILL, Keyframes, begun, extended, is_keyframe, tracked
-from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
+from omninav.stages.geometry.plane.mount import camera_poses, robot_step
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
@@ -110,11 +110,10 @@ class VisualOdometry(Stage):
         if motion is not None and not isinstance(motion, AssumedMotion):
             return self.Out(motion=motion, odometry=odometry)
         descriptors = features.descriptors
-        mount = camera.mount * [1.0, 1.0, 0.0]  # bearings are turned by the yaw already
         if motion is None:
             _begin(state, odometry, features.bearings, descriptors)
             return self.Out(odometry=odometry)
-        _scale_by_map(state, fix, mount)
+        _scale_by_map(state, fix, camera.arm)
         guess = math.hypot(motion.x, motion.y) or motion.sigma_m
         state.length += guess
         before, usual = state.pose, state.speed_ratio * guess
@@ -140,7 +139,7 @@ class VisualOdometry(Stage):
                 self._say_scale(ctx, state)
             elif not len(state.points) and found.parallax < STILL:
                 state.length = 0.0  # lengths begin where the camera moves off
-            x, y, turn = between(*robot_poses(np.array([before, state.pose]), mount)).tolist()
+            x, y, turn = robot_step(between(before, state.pose), camera.arm).tolist()
             length = math.hypot(x, y)
             if found.scaled and not lost and length > MOVING * state.speed_ratio * guess:
                 state.speed_ratio += SPEED_GAIN * (length / guess - state.speed_ratio)

@@ -38,8 +38,6 @@ class RobotCamera:
         self._mounting = lean(math.radians(world.camera_errors.tilt_deg), self._drawn("tilt").uniform(0, 2 * math.pi))
         self._ramps_begin = self._drawn("ramps").uniform(0, world.ramps.period_m)
         self._true = self._with_errors()
-        # The rays are turned by the yaw already.
-        self._mount = self.described.mount * [1.0, 1.0, 0.0]
 
     def image(self, scene: Scene, poses: Array, seconds: float, key: int, people: Sequence[Person] = ()) -> Pixels:
         """The image (rows, columns, 3) that is taken of a scene `seconds` into the drive.
@@ -49,7 +47,7 @@ class RobotCamera:
         return render(
             scene,
             self._rays_at(poses[len(poses) // 2]),
-            camera_poses(poses, self._mount),
+            camera_poses(poses, self.described.arm),
             self._world.eye_height,
             exposure=self._exposure(seconds),
             noise=self._world.sensor.noise,

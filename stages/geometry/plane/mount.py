@@ -34,6 +34,16 @@ def robot_poses(camera: Array, mount: Array) -> Array:
     return compose(camera, between(mount, np.zeros(3))) if np.any(mount) else camera
 
 
+def camera_step(robot: Array, mount: Array) -> Array:
+    """The motion (3,) of a camera, in its own frame, whose robot makes a motion (3,)."""
+    return between(mount, compose(robot, mount)) if np.any(mount) else robot
+
+
+def robot_step(camera: Array, mount: Array) -> Array:
+    """The motion (3,) of a robot, in its own frame, whose camera makes a motion (3,): the inverse of `camera_step`."""
+    return compose(compose(mount, camera), between(mount, np.zeros(3))) if np.any(mount) else camera
+
+
 def robot_covariances(covariances: Array, camera: Array, mount: Array) -> Array:
     """Covariances (K, 3, 3) of a robot's poses, of those of its camera's poses (K, 3)."""
     if not np.any(mount):

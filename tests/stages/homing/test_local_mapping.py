@@ -15,6 +15,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.donut import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver
@@ -58,6 +59,8 @@ def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
 class Homing:
     """The three stages of homing, wired as in the variants; one image suffices for a map, unless `verify`."""
 
+    camera = CAMERA
+
     def __init__(self, kind: str = "mirror", seed: int = 0, verify: bool = False, **parameters) -> None:
         self.kind, self.ctx = kind, Context("local_map", np.random.default_rng(seed))
         self.tracker, self.tracked = FeatureTracker(), FeatureTrackerState()
@@ -73,10 +76,10 @@ class Homing:
             kept = slice(0, round(share * len(pairs)))
             pairs = Correspondences(pairs.first[kept], pairs.second[kept], pairs.distance[kept])
         image = look(self.kind, pose[2], *pose[:2]) if image is None else image
-        tracks = self.tracker.step(self.ctx, self.tracked, image, CAMERA, self.map, motion).tracks
-        out = self.mapping.step(self.ctx, self.mapped, features, self.target, pairs, tracks, motion)
+        tracks = self.tracker.step(self.ctx, self.tracked, image, self.camera, self.map, motion).tracks
+        out = self.mapping.step(self.ctx, self.mapped, features, self.target, pairs, tracks, motion, self.camera)
         self.map, self.tracks = out.map, out.tracks
-        vector = HomingVectorFromMap().step(self.ctx, out.map).vector
+        vector = HomingVectorFromMap().step(self.ctx, out.map, self.camera).vector
         assert vector is not None
         return vector
 
@@ -156,6 +159,22 @@ def test_a_place_far_from_where_odometry_leads_is_not_believed(metres: float, st
     elsewhere = homing.map.translation + np.array([metres / homing.map.metres, 0.0, 0.0])
     homing.map = homing.mapped.map = replace(homing.map, translation=elsewhere)
     assert on_the_way(homing, poses[5:6], before=poses[4]) == [state]
+
+
+def test_under_a_camera_in_front_of_its_axis_the_vector_is_the_robots() -> None:
+    homing = Homing()
+    homing.camera = replace(CAMERA, position_x=0.3, position_y=0.1)
+    arm, poses = homing.camera.arm, drive(6, end=(4.6, 4.68, -0.3))
+    robot, target = robot_poses(np.array(poses), arm), robot_poses(np.array(TARGET), arm)
+    vector = homing.at(poses[0])
+    for n in range(1, 6):
+        vector = homing.at(poses[n], Motion(*between(robot[n - 1], robot[n]).tolist()))
+    x, y, turn = between(robot[-1], target).tolist()
+    assert vector.metres == pytest.approx(math.hypot(x, y), abs=0.05)
+    assert wrapped(vector.direction - math.atan2(y, x)) == pytest.approx(0.0, abs=0.1)
+    assert vector.turn == pytest.approx(turn, abs=0.03)
+    beside = between(np.array(poses[-1]), np.array(TARGET))
+    assert abs(wrapped(math.atan2(beside[1], beside[0]) - math.atan2(y, x))) > 0.2
 
 
 def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:

@@ -107,8 +107,8 @@ def test_the_cameras_height_over_the_floor_gives_metres() -> None:
 
 
 def test_the_motion_is_that_of_the_robot_under_a_camera_in_front_of_its_axis() -> None:
-    poses, mount = walk(40), np.array([0.3, 0.1, 0.2])  # bearings are turned by the 0.2 already
-    robot = robot_poses(poses, mount * [1.0, 1.0, 0.0])
+    poses, mount = walk(40), np.array([0.3, 0.1, 0.0])
+    robot = robot_poses(poses, mount)
     outs, _ = run(room(floor=True), poses, height=FLOOR_M, mount=mount)
     beside, _ = run(room(floor=True), poses, height=FLOOR_M)
     true = between(robot[0], robot)
@@ -197,6 +197,6 @@ def test_motions_that_were_measured_stay() -> None:
     stage, state = VisualOdometry(), VisualOdometryState()
     motion, odometry = Motion(0.1, 0.0, 0.2), Pose(3.0, 1.0, 0.0)
     features = room(floor=True).seen(odometry)
-    out = stage.step(Context("seen"), features, SimpleNamespace(height=None, mount=NONE), motion, odometry, state)
+    out = stage.step(Context("seen"), features, SimpleNamespace(height=None, arm=NONE), motion, odometry, state)
     assert out.motion is motion
     assert out.odometry is odometry
