@@ -69,7 +69,7 @@ def run(
             restore_state(fresh, decode(encode(encode_state(state))))
             state = fresh
         camera, fix = (
-            SimpleNamespace(height=height, mount=mount),
+            SimpleNamespace(height=height, arm=mount),
             None if fixes is None or not number else fixes[number - 1],
         )
         outs.append(stage.step(ctx, features, camera, motion, AssumedPose(0.0, 0.0, 0.0), state, fix))
