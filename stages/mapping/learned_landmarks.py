@@ -138,7 +138,7 @@ class LearnLandmarks(Stage):
             or check.elevations_told(ctx, camera, views, matches, map.poses),
             left_out.variance_factor,
             described,
-            compose(mount, described * [0.0, 0.0, 1.0]),
+            mount + described * [0.0, 0.0, 1.0],
         )
         ctx.fact("landmarks", len(landmarks))
         poses = robot_poses(poses, mount)

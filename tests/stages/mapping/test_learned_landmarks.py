@@ -157,6 +157,12 @@ def test_a_mount_that_is_described_is_believed_and_nothing_is_said() -> None:
     assert np.median(gap) < 0.001
 
 
+def test_a_camera_that_is_as_it_is_described_is_mounted_so_to_the_last_bit() -> None:
+    poses, camera = tour_poses(), replace(CAMERA, yaw=0.3)
+    _, out = learned(poses, "truth", seen_along(poses), camera=camera)
+    assert not out.map.landmarks.mounted(camera.mount).any()
+
+
 def test_motion_that_was_seen_in_the_images_tells_no_mount() -> None:
     poses = tour_poses(0.2)
     _, out = learned(robot_poses(poses, np.array([0.5, 0.0, 0.0])), "guess", seen_along(poses), camera=CAMERA)
