@@ -118,9 +118,9 @@ class CameraCheck(NamedTuple):
             right = replace(right, yaw=right.yaw + float(mount[2]))
             parts.append(f"it is turned by {math.degrees(mount[2]):.1f} degrees more, yaw {right.yaw:.3f}")
         if mount[:2].any():
-            x, y = (round(float(value), 3) for value in camera.mount[:2] + mount[:2])
+            x, y = (round(float(value), 3) + 0.0 for value in camera.mount[:2] + mount[:2])
             right = replace(right, position_x=x, position_y=y)
-            parts.append(f"it sits at x = {x:.2f}, y = {y:.2f} m on the robot (forward, left)")
+            parts.append(f"it sits at x = {x:z.2f}, y = {y:z.2f} m on the robot (forward, left)")
         if not parts:
             return ""
         return _told(ctx, "; ".join(parts), harm, right)
