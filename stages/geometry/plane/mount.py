@@ -13,7 +13,7 @@ MIN_ARM_M, MIN_TURN = 0.02, math.radians(1.0)
 FINE_ARM_M, FINE_TURN = 0.001, math.radians(0.1)
 """The same of what is left of one that was found before."""
 MIN_SIGMAS = 4.0
-"""Distance and turn below which they do not, in their standard deviations."""
+"""Distance and turn below which it is taken for none, in their standard deviations."""
 MIN_STEPS = 20
 """Steps between poses that a mount is found from, at least."""
 MIN_TURNED = math.radians(5.0)
@@ -68,6 +68,8 @@ def found_mount(camera: Array, robot: Array, left: bool = False) -> Array | None
         return None
     steps, measured = (each[:, 0] + 1j * each[:, 1] for each in (driven, seen))
     rows = np.column_stack([steps, turned])
+    if np.linalg.matrix_rank(rows) < rows.shape[1]:  # a robot that stands, or odometry at rest
+        return None
     weights, sigma, found = np.ones(len(rows)), 0.0, np.zeros(2, np.complex128)
     square = np.empty((2, 2), np.complex128)
     for _ in range(ROUNDS):

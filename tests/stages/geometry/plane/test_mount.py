@@ -59,8 +59,9 @@ def test_of_a_camera_on_the_robots_axis_none_is_found() -> None:
     assert found_mount(near, robot, left=True) == pytest.approx([0.01, 0.0, 0.01], abs=1e-4)
 
 
-def test_a_drive_straight_ahead_or_of_few_steps_tells_none() -> None:
-    for robot in (driven(turns=0.01), driven(steps=15)):
+def test_a_drive_straight_ahead_or_of_few_steps_or_on_one_spot_tells_none() -> None:
+    standing = np.column_stack([np.ones((60, 2)), np.arange(60.0)])
+    for robot in (driven(turns=0.01), driven(steps=15), standing, np.ones((60, 3))):
         assert found_mount(camera_poses(robot, MOUNT), robot) is None
 
 
