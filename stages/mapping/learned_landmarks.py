@@ -135,7 +135,7 @@ class LearnLandmarks(Stage):
             left_out.found_rate,
             # Poses as they came: those adjusted to a wrong horizon were bent by it.
             check.told(ctx, camera, adjusted.camera, mount - mounted)
-            or check.elevations_told(ctx, camera, views, matches, map.poses),
+            or check.elevations_told(ctx, camera, views, matches, camera_poses(map.poses, mount)),
             left_out.variance_factor,
             described,
             mount + described * [0.0, 0.0, 1.0],
