@@ -42,7 +42,7 @@ MAX_SIDE, MAX_PIXELS = 32_768, 100_000_000
 FAR_PX = 1e6
 """No place of a camera's image, and no radius in it, is further from its corner than this."""
 FAR_M = 20.0
-"""No camera sits further from its robot's origin than this."""
+"""Largest distance of a camera from its robot's origin along x or y, m."""
 FocalX = Annotated[float, Key("K", 0), Bounds(ge=1, le=FAR_PX)]
 FocalY = Annotated[float, Key("K", 4), Bounds(ge=1, le=FAR_PX)]
 CentreX = Annotated[float, Key("K", 2), Bounds(ge=-FAR_PX, le=FAR_PX)]
@@ -95,9 +95,9 @@ class Camera(Value, ABC):
     yaw: Annotated[float, Bounds(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
     """Angle by which the camera is turned against the robot, radians, counter-clockwise."""
     position_x: Annotated[float, Key("position", "x"), Bounds(ge=-FAR_M, le=FAR_M)] | None = None
-    """How far the camera sits in front of the robot's origin, m; None where it is not known."""
+    """Position of the camera in front of the robot's origin, m; None where it is not known."""
     position_y: Annotated[float, Key("position", "y"), Bounds(ge=-FAR_M, le=FAR_M)] | None = None
-    """The same to the left of it, m."""
+    """Position of the camera to the left of the robot's origin, m; None where it is not known."""
 
     def __init_subclass__(cls, projection: str = "", **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -127,7 +127,7 @@ class Camera(Value, ABC):
 
     @property
     def mount(self) -> Array:
-        """Where the description puts the camera on the robot (3,): x, y (m), yaw (rad)."""
+        """The described pose of the camera on the robot (3,): x, y (m), yaw (rad)."""
         return np.array([self.position_x or 0.0, self.position_y or 0.0, self.yaw])
 
     @property

@@ -48,7 +48,7 @@ are off by a third and more, and it says what the images say anyway."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
 MOUNT_ROUNDS = 5
-"""Adjustments at most that a mount is found from: each begins with the mount of the one before."""
+"""Largest number of adjustments that a mount is found from; each begins with the mount of the one before."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
@@ -58,8 +58,8 @@ class AdjustedMap(NamedTuple):
 
     `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
     `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
-    `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where these tell
-    nothing that was measured apart from them.
+    `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
+    images measured any.
     """
 
     poses: Array
@@ -73,7 +73,7 @@ class AdjustedMap(NamedTuple):
 def found_with_mount(
     robot: Array, described: Array, adjust: Callable[[Array], AdjustedMap], again: Callable[[Array], AdjustedMap]
 ) -> tuple[AdjustedMap, Array]:
-    """What `adjust` makes of the camera's poses on a robot with poses (R, 3), and the mount (3,) that it then has.
+    """Adjusts the poses of a camera on a robot with poses (R, 3), and finds its mount (3,).
 
     `described`: the mount as the camera's description says it. Where the adjusted poses show another one, those that
     begin with it are adjusted again. `again`: adjusts poses that tell a mount, where those as measured fit nothing.
@@ -178,8 +178,8 @@ def adjusted_drive(
     poses = found.poses.copy()
     poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])
     poses = _wrapped(poses)
-    seen_apart = None if seen_motion else poses  # what images measured tells nothing of the robot under them
-    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=seen_apart)
+    # Motion that was seen in the images is the camera's, and tells nothing of the robot under it.
+    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=None if seen_motion else poses)
 
 
 class _Found(NamedTuple):

@@ -1,4 +1,4 @@
-"""Where a camera sits on its robot: its pose (x forward, y left, heading) in the robot's frame (m, m, rad)."""
+"""The mount of a camera: its pose (x forward, y left, heading) in the frame of its robot (m, m, rad)."""
 
 import math
 
