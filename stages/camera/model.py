@@ -43,6 +43,8 @@ FAR_PX = 1e6
 """No place of a camera's image, and no radius in it, is further from its corner than this."""
 FAR_M = 20.0
 """Largest distance of a camera from its robot's origin along x or y, m."""
+MAX_DELAY_S = 10.0
+"""Largest delay of a camera's images, early or late, s."""
 FocalX = Annotated[float, Key("K", 0), Bounds(ge=1, le=FAR_PX)]
 FocalY = Annotated[float, Key("K", 4), Bounds(ge=1, le=FAR_PX)]
 CentreX = Annotated[float, Key("K", 2), Bounds(ge=-FAR_PX, le=FAR_PX)]
@@ -98,6 +100,8 @@ class Camera(Value, ABC):
     """Position of the camera in front of the robot's origin, m; None where it is not known."""
     position_y: Annotated[float, Key("position", "y"), Bounds(ge=-FAR_M, le=FAR_M)] | None = None
     """Position of the camera to the left of the robot's origin, m; None where it is not known."""
+    delay: Annotated[float, Bounds(ge=-MAX_DELAY_S, le=MAX_DELAY_S)] | None = None
+    """Time by which images on a topic are stamped later than they were taken, s; None where it is not known."""
 
     def __init_subclass__(cls, projection: str = "", **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -129,6 +133,11 @@ class Camera(Value, ABC):
     def mount(self) -> Array:
         """The described pose of the camera on the robot (3,): x, y (m), yaw (rad)."""
         return np.array([self.position_x or 0.0, self.position_y or 0.0, self.yaw])
+
+    @property
+    def delay_ns(self) -> int:
+        """The described delay of its images, ns."""
+        return round((self.delay or 0.0) * 1e9)
 
     @property
     def arm(self) -> Array:

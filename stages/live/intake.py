@@ -203,7 +203,8 @@ class Intake:
             if stamp is None:
                 self._drop("bad_message", f"{arrival.topic}: a message of {len(arrival.data)} bytes is no image")
             else:
-                self._images.append(_Pending(stamp, time.monotonic(), arrival))
+                delay = self.camera.delay_ns if isinstance(self.camera, Camera) else 0
+                self._images.append(_Pending(stamp - delay, time.monotonic(), arrival))
             return
         try:
             message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)

@@ -52,6 +52,8 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         variance_factor=max(each.variance_factor for each in given),
         described=given[0].described,
         mount=given[0].mount,
+        described_delay_s=given[0].described_delay_s,
+        delay_s=given[0].delay_s,
     )
 
 

@@ -22,6 +22,7 @@ CAMERA_QUANTITIES = {
     "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),
     "camera.tilt_deg": Quantity(title="Camera's tilt", unit="deg", context=True),
     "camera.yaw_beside_deg": Quantity(title="Camera turned against its description", unit="deg", context=True),
+    "camera.delay_beside_s": Quantity(title="Images later than their description says", unit="s", context=True),
     "camera.position_beside_m": Quantity(
         title="Camera's position on the robot beside its description", unit="m", context=True
     ),
@@ -80,9 +81,14 @@ class CameraCheck(NamedTuple):
         yaw = self._named(corrections).get("yaw", 0.0) if self.camera is not None and len(corrections) else 0.0
         return yaw if abs(yaw) > MAX_YAW else 0.0
 
-    def metrics(self, corrections: Array, mount: Array) -> dict[str, Any]:
-        """Deviations of the camera from its description; `mount` (3,): of where it sits on the robot (m, m, rad)."""
+    def metrics(self, corrections: Array, mount: Array, late_s: float) -> dict[str, Any]:
+        """Deviations of the camera from its description; `mount` (3,): of where it sits on the robot (m, m, rad).
+
+        `late_s`: by how much more its images are late (s).
+        """
         values = {"position_beside_m": math.hypot(mount[0], mount[1])} if mount[:2].any() else {}
+        if late_s:
+            values["delay_beside_s"] = late_s
         if mount[2]:
             values["yaw_beside_deg"] = abs(math.degrees(mount[2]))
         if self.camera is None or not len(corrections):
@@ -95,11 +101,11 @@ class CameraCheck(NamedTuple):
             values["yaw_beside_deg"] = abs(math.degrees(by["yaw"]))
         return {"camera": values}
 
-    def told(self, ctx: Context, camera: Camera | None, corrections: Array, mount: Array) -> str:
+    def told(self, ctx: Context, camera: Camera | None, corrections: Array, mount: Array, late_s: float) -> str:
         """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is.
 
-        `mount` (3,): how the camera sits on the robot otherwise than described (m, m, rad). Nothing in a camera.yaml
-        says that a camera leans.
+        `mount` (3,), `late_s`: how the camera sits on the robot, and how late its images are, otherwise than described
+        (m, m, rad; s). Nothing in a camera.yaml says that a camera leans.
         """
         if camera is None:
             return ""
@@ -121,6 +127,11 @@ class CameraCheck(NamedTuple):
             x, y = (round(float(value), 3) + 0.0 for value in camera.mount[:2] + mount[:2])
             right = replace(right, position_x=x, position_y=y)
             parts.append(f"it sits at x = {x:z.2f}, y = {y:z.2f} m on the robot (forward, left)")
+        if late_s:
+            right = replace(right, delay=round((right.delay or 0.0) + late_s, 3) + 0.0)
+            parts.append(
+                f"its images are stamped {abs(late_s):.2f} s {'later' if late_s > 0.0 else 'earlier'} than said"
+            )
         if not parts:
             return ""
         return _told(ctx, "; ".join(parts), harm, right)

@@ -1,17 +1,18 @@
 """Learns the landmarks of a map from the local features of its references."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
     AdjustedMap,
+    Seen,
     adjusted_drive,
     adjusted_to_given,
     found_with_mount,
@@ -31,12 +32,14 @@ from omninav.stages.geometry.landmarks.map_making import (
     triangulated,
     widely_seen,
 )
+from omninav.stages.geometry.plane.image_delay import RobotPath
 from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
 from omninav.stages.values.length_scale import DEFAULT_M
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
+from omninav.stages.values.pose import Pose
 from omninav.stages.values.visual_words import VisualWords
 
 from .camera_check import CAMERA_QUANTITIES, CameraCheck
@@ -81,43 +84,31 @@ class LearnLandmarks(Stage):
         words: VisualWords,
         as_driven: ReferenceGraph | None = None,
         camera: Camera | None = None,
+        ticks: Sequence[Tick] = (),
+        odometry: Sequence[Pose | None] = (),
+        truth: Sequence[Pose | None] = (),
     ) -> Out:
         """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
-        straightened."""
+        straightened. `ticks` and poses, of all its images, tell how late these are."""
         ctx.doing("triangulating landmarks")
         found = [each for each, event in zip(features, events, strict=True) if event is not None]
         views, given = _views(found), map.pose_source == "truth"
         check = CameraCheck.of(camera, found, views.bearings, given)
         described = np.zeros(3) if camera is None else camera.mount
-
-        def matched(poses: Array) -> PairMatches:
-            unit = length_scale(poses, map.features, map.kind) or DEFAULT_M
-            return pair_matches(views, neighbouring_pairs(poses, _rows(words), unit))
-
-        matches: PairMatches | None = None
-
-        def as_a_drive(poses: Array) -> AdjustedMap:
-            height = None if camera is None else camera.height
-            seen_motion = map.pose_source == "guess"
-            return adjusted_drive(views, _rows(words), poses, check.seen, height, ctx.rng, seen_motion)
-
-        def as_given(poses: Array) -> AdjustedMap:
-            nonlocal matches
-            matches = matched(poses)
-            return adjusted_to_given(views, matches, poses, check.seen)
-
-        measured = map.poses if given or as_driven is None else as_driven.poses
         mounted = np.zeros(3) if camera is None else camera.arm
-        adjust = as_given if given else as_a_drive
+        described_delay = 0.0 if camera is None else camera.delay or 0.0
+        tour = _Tour(views, map, words, check.seen, None if camera is None else camera.height, ctx.rng)
+        adjust = tour.as_given if given else tour.as_a_drive
+        measured = map.poses if given or as_driven is None else as_driven.poses
         if camera is None:
-            adjusted, mount = adjust(measured), mounted
+            adjusted, mount, late = adjust(measured), mounted, 0.0
         else:
-            adjusted, mount = found_with_mount(measured, mounted, adjust, as_a_drive)
+            robot = _robot(measured, events, ticks, truth if given else odometry)
+            adjusted, mount, late = found_with_mount(robot, mounted, adjust, tour.as_a_drive)
         turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
         mount = compose(mount, turn)
         poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)
-        if matches is None:
-            matches = matched(poses)
+        matches = tour.matches or tour.matched(poses)
         views = check.levelled(views, adjusted.camera)
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
         sightings = widely_seen(views, triangulated(views, tracks, poses))
@@ -134,11 +125,13 @@ class LearnLandmarks(Stage):
             words,
             left_out.found_rate,
             # Poses as they came: those adjusted to a wrong horizon were bent by it.
-            check.told(ctx, camera, adjusted.camera, mount - mounted)
+            check.told(ctx, camera, adjusted.camera, mount - mounted, late)
             or check.elevations_told(ctx, camera, views, matches, camera_poses(map.poses, mount)),
             left_out.variance_factor,
             described,
             mount + described * [0.0, 0.0, 1.0],
+            described_delay,
+            described_delay + late,
         )
         ctx.fact("landmarks", len(landmarks))
         poses = robot_poses(poses, mount)
@@ -153,8 +146,52 @@ class LearnLandmarks(Stage):
         }
         if not adjusted.problem:
             values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}
-        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted)}, QUANTITIES)
+        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted, late)}, QUANTITIES)
         return self.Out(map=replace(map, poses=poses, landmarks=landmarks), metrics=metrics)
+
+
+@dataclass
+class _Tour:
+    """Adjusts poses of a tour's references, whose `height` over the floor (m) may be known, to what they show."""
+
+    views: LocalViews
+    map: ReferenceGraph
+    words: VisualWords
+    seen: Seen
+    height: float | None
+    rng: np.random.Generator
+    matches: PairMatches | None = None
+    """Matches of neighbours by the poses that were given last."""
+
+    def matched(self, poses: Array) -> PairMatches:
+        """Matches of references that are neighbours by their poses (R, 3)."""
+        unit = length_scale(poses, self.map.features, self.map.kind) or DEFAULT_M
+        return pair_matches(self.views, neighbouring_pairs(poses, _rows(self.words), unit))
+
+    def as_given(self, poses: Array) -> AdjustedMap:
+        """Adjust poses (R, 3) that may be exact."""
+        self.matches = self.matched(poses)
+        return adjusted_to_given(self.views, self.matches, poses, self.seen)
+
+    def as_a_drive(self, poses: Array) -> AdjustedMap:
+        """Adjust poses (R, 3) that odometry has measured."""
+        seen_motion = self.map.pose_source == "guess"
+        return adjusted_drive(self.views, _rows(self.words), poses, self.seen, self.height, self.rng, seen_motion)
+
+
+def _robot(
+    measured: Array, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick], way: Sequence[Pose | None]
+) -> Callable[[float], Array]:
+    """The robot's poses (R, 3) at so many seconds before the images of references were stamped.
+
+    They are `measured` (R, 3) at any time where the tour is of several logs, or has gaps in its `way`.
+    """
+    times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
+    if len(way) != len(ticks) or None in way or not (np.diff(times) > 0.0).all() or any(tick.log for tick in ticks):
+        return lambda _: measured
+    poses = np.array([(pose.x, pose.y, pose.heading) for pose in way if pose is not None])
+    stamps = times[[event is not None for event in events]]
+    return RobotPath(measured, stamps, poses, times).before
 
 
 def _candidates(words: VisualWords) -> list[Ints]:

@@ -143,15 +143,17 @@ class LiveRecording(TopicRecording):
         stamps: list[int] = []
         places: list[tuple[str, Any]] = []
         drive = self.drive = OdometryBuffer(header)
+        camera = _camera(name, feed)
         for record in feed.scan(set(header.topics)):
             role = header.topics[record.topic]
             if role == "image":
-                made = drive.frame(record.stamp)
+                taken = record.stamp - camera.delay_ns
+                made = drive.frame(taken)
                 if made is None:
                     feed.drop("outside_odometry", f"{name}: image with stamp {record.stamp} ns has no odometry")
                     continue
                 self._frames.append(made[0])
-                stamps.append(record.stamp)
+                stamps.append(taken)
                 places.append((record.topic, record.location))
                 continue
             try:
@@ -168,7 +170,7 @@ class LiveRecording(TopicRecording):
         odometry = None if drive.odometry is None else np.array([frame.odometry for frame in frames]).reshape(-1, 3)
         super().__init__(
             name=name,
-            camera=_camera(name, feed),
+            camera=camera,
             stamps=np.array(stamps, dtype=np.int64),
             odometry=odometry,
             truth=None if drive.truth is None else np.array([frame.truth for frame in frames]).reshape(-1, 3),

@@ -69,15 +69,6 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
     truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
     frames = _in_order(feed, name, image_topic, found[image_topic], "duplicate_frame")
-    stamps = np.array([frame.stamp for frame in frames], dtype=np.int64)
-    keep = np.ones(len(frames), dtype=bool)
-    if odometry is not None:
-        keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)
-    elif truth is not None:
-        keep = _seen_within(feed, name, "no_position", stamps, truth.stamps, topics.truth)
-    frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
-    if not frames:
-        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
 
     def fetch_image(frame: int) -> Callable[[], Pixels]:
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
@@ -90,6 +81,15 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         raise UnreadableRecording(
             f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )
+    stamps = np.array([frame.stamp for frame in frames], dtype=np.int64) - view.delay_ns
+    keep = np.ones(len(frames), dtype=bool)
+    if odometry is not None:
+        keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)
+    elif truth is not None:
+        keep = _seen_within(feed, name, "no_position", stamps, truth.stamps, topics.truth)
+    frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
+    if not frames:
+        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
     recording = TopicRecording(
         name=name,
         camera=view,

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
@@ -16,11 +16,13 @@ from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
 from omninav.stages.values.visual_words import VisualWords
 
 WORD_REFERENCES = (10, 80)
@@ -47,6 +49,12 @@ WITHOUT_LANDMARKS = (
 """Warning of a run whose map has none."""
 
 
+class LandmarkPoseState(State):
+    """Stamp of the last image (ns)."""
+
+    stamp: int = 0
+
+
 class LandmarkPose(Stage):
     """Gives the poses from which an image may have been taken, with covariances, from bearings of known landmarks.
 
@@ -56,7 +64,8 @@ class LandmarkPose(Stage):
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
-    landmarks. Raises BadInput for features of another kind than the map's.
+    landmarks. Where the tour's images were late, its pose is carried by that part of the last motion. Raises BadInput
+    for features of another kind than the map's.
     """
 
     min_inliers: Annotated[int, Bounds(ge=4)] = 8
@@ -71,12 +80,15 @@ class LandmarkPose(Stage):
     def step(
         self,
         ctx: Context,
+        state: LandmarkPoseState,
         features: LocalFeatures,
         map: ReferenceGraph,
         near: Particles | None = None,
         camera: Camera | None = None,
+        motion: Motion | None = None,
     ) -> Out:
-        """Find the pose of the robot that took one image."""
+        """Find the pose of the robot that took one image; `motion`: since the last one."""
+        seconds, state.stamp = (ctx.tick.stamp - state.stamp) / 1e9, ctx.tick.stamp
         landmarks = map.landmarks
         if landmarks is None:
             ctx.warn(WITHOUT_LANDMARKS)
@@ -97,9 +109,12 @@ class LandmarkPose(Stage):
                 break
         if best is None or camera is None:
             return self.Out(fix=best)
-        mount = landmarks.mounted(camera.mount)
+        mount, late = landmarks.mounted(camera.mount), landmarks.late_by(camera.delay or 0.0)
         covariances = robot_covariances(best.covariances, best.poses, mount)
-        return self.Out(fix=replace(best, poses=robot_poses(best.poses, mount), covariances=covariances))
+        poses = robot_poses(best.poses, mount)
+        if late and motion is not None and seconds > 0.0:
+            poses = compose(poses, late / seconds * np.array([motion.x, motion.y, motion.turn]))
+        return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:
         theirs = restored_descriptors(landmarks.descriptors[rows])

@@ -27,7 +27,7 @@ class Landmarks(Value):
     `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
     `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings say.
     `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description says and as its
-    images show.
+    images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -41,6 +41,8 @@ class Landmarks(Value):
     variance_factor: Annotated[float, Bounds(ge=1, le=1e9)] = 2.5
     described: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
     mount: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
+    described_delay_s: float = 0.0
+    delay_s: float = 0.0
 
     def __len__(self) -> int:
         return len(self.points)
@@ -59,6 +61,10 @@ class Landmarks(Value):
         """
         x, y, yaw = self.mount if np.array_equal(described, self.described) else described
         return np.array([x, y, yaw - described[2]])
+
+    def late_by(self, described_s: float) -> float:
+        """Time (s) by which images are later than a description says that gives this delay, as `mounted`."""
+        return self.delay_s - described_s if described_s == self.described_delay_s else 0.0
 
     @property
     def references(self) -> int:

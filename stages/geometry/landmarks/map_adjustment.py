@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
+from omninav.stages.geometry.plane.image_delay import FINE_DELAY_S, found_delay
 from omninav.stages.geometry.plane.mount import camera_poses, found_mount
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
 
@@ -48,7 +49,7 @@ are off by a third and more, and it says what the images say anyway."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
 MOUNT_ROUNDS = 5
-"""Largest number of adjustments that a mount is found from; each begins with the mount of the one before."""
+"""Largest number of adjustments that a mount and a delay are found from; each begins with the mount of the one before."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
@@ -71,25 +72,32 @@ class AdjustedMap(NamedTuple):
 
 
 def found_with_mount(
-    robot: Array, described: Array, adjust: Callable[[Array], AdjustedMap], again: Callable[[Array], AdjustedMap]
-) -> tuple[AdjustedMap, Array]:
-    """Adjusts the poses of a camera on a robot with poses (R, 3), and finds its mount (3,).
+    robot: Callable[[float], Array],
+    described: Array,
+    adjust: Callable[[Array], AdjustedMap],
+    again: Callable[[Array], AdjustedMap],
+) -> tuple[AdjustedMap, Array, float]:
+    """Adjusts the poses of a camera on a robot, and finds its mount (3,) and the delay of its images (s).
 
-    `described`: the mount as the camera's description says it. Where the adjusted poses show another one, those that
-    begin with it are adjusted again. `again`: adjusts poses that tell a mount, where those as measured fit nothing.
+    `robot(delay)`: the robot's poses (R, 3) at so many seconds before the images' stamps. `described`: the mount as the
+    camera's description says it. Where the adjusted poses show another mount or a delay, those that begin with them are
+    adjusted again. `again`: adjusts poses that tell both, where those as measured fit nothing.
     """
-    found, mount = adjust(camera_poses(robot, described)), described
+    found, mount, delay = adjust(camera_poses(robot(0.0), described)), described, 0.0
     for round_ in range(MOUNT_ROUNDS):
-        start = camera_poses(robot, mount)
-        seen = (again(start) if found.problem else found).seen
-        by = None if seen is None else found_mount(seen, start, left=round_ > 0)
-        if by is None:
+        seen = (again(camera_poses(robot(delay), mount)) if found.problem else found).seen
+        if seen is None:
             break
-        tried = adjust(camera_poses(robot, compose(mount, by)))
+        later = found_delay(seen, robot)
+        by = found_mount(seen, camera_poses(robot(later), mount), left=round_ > 0)
+        if by is None and abs(later - delay) < FINE_DELAY_S:
+            break
+        moved = mount if by is None else compose(mount, by)
+        tried = adjust(camera_poses(robot(later), moved))
         if tried.problem and not found.problem:
             break
-        found, mount = tried, compose(mount, by)
-    return found, described if found.problem else mount
+        found, mount, delay = tried, moved, later
+    return (found, described, 0.0) if found.problem else (found, mount, delay)
 
 
 def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, seen: Seen) -> AdjustedMap:
