@@ -22,7 +22,7 @@ from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.landmarks.bearing_pose import matched, poses_of
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks
 from omninav.stages.mapping.learned_words import LearnVisualWords
-from omninav.stages.sensor.landmark_pose import WORD_FEATURES, LandmarkPose
+from omninav.stages.sensor.landmark_pose import WORD_FEATURES, LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import DESCRIPTOR_SCALE, Landmarks
 from omninav.stages.values.local_features import LocalFeatures
@@ -123,7 +123,7 @@ def pose_times(hall: Hall, map: ReferenceGraph) -> None:
         pose = map.poses[row] + rng.normal(0.0, [0.15, 0.15, 0.3])
         image = hall.seen(pose)
         belief = Particles(pose + rng.normal(0.0, 0.1, (200, 3)), np.full(200, 1 / 200))
-        out, whole = timed(stage.step, ctx, image, map, belief)
+        out, whole = timed(stage.step, ctx, LandmarkPoseState(), image, map, belief)
         _, words = timed(landmarks.words.similarities, image.descriptors[:WORD_FEATURES])
         rows, candidates = timed(landmarks.seen_by, stage._candidates(image, landmarks.words, map, belief))
         pairs, matching = timed(_matched, image, landmarks, rows)

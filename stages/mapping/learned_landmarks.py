@@ -187,7 +187,8 @@ def _robot(
     They are `measured` (R, 3) at any time where the tour is of several logs, or has gaps in its `way`.
     """
     times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
-    if len(way) != len(ticks) or None in way or not (np.diff(times) > 0.0).all() or any(tick.log for tick in ticks):
+    whole = len(way) == len(ticks) == len(events) and None not in way and not any(tick.log for tick in ticks)
+    if not whole or not (np.diff(times) > 0.0).all():
         return lambda _: measured
     poses = np.array([(pose.x, pose.y, pose.heading) for pose in way if pose is not None])
     stamps = times[[event is not None for event in events]]

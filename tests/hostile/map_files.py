@@ -27,7 +27,7 @@ from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.fusion.landmark_update import LandmarkUpdate, LandmarkUpdateState
 from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.references import cut_references, joined_references
-from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
@@ -67,7 +67,7 @@ def used(folder: Path, files: Files) -> Any:
     map = read_artifact(folder / MAP)
     assert isinstance(map, ReferenceGraph)
     ctx = Context("landmark_pose", np.random.default_rng(0))
-    fix = LandmarkPose().step(ctx, _image(), map).fix
+    fix = LandmarkPose().step(ctx, LandmarkPoseState(), _image(), map).fix
     belief = Particles(np.zeros((50, 3)), np.full(50, 0.02))
     return (
         fix,

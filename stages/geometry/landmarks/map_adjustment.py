@@ -49,7 +49,7 @@ are off by a third and more, and it says what the images say anyway."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
 MOUNT_ROUNDS = 5
-"""Largest number of adjustments that a mount and a delay are found from; each begins with the mount of the one before."""
+"""Largest number of adjustments that a mount and a delay are found from; each begins with those of the one before."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
@@ -84,12 +84,12 @@ def found_with_mount(
     adjusted again. `again`: adjusts poses that tell both, where those as measured fit nothing.
     """
     found, mount, delay = adjust(camera_poses(robot(0.0), described)), described, 0.0
-    for round_ in range(MOUNT_ROUNDS):
+    for _ in range(MOUNT_ROUNDS):
         seen = (again(camera_poses(robot(delay), mount)) if found.problem else found).seen
         if seen is None:
             break
         later = found_delay(seen, robot)
-        by = found_mount(seen, camera_poses(robot(later), mount), left=round_ > 0)
+        by = found_mount(seen, camera_poses(robot(later), mount), left=mount is not described)
         if by is None and abs(later - delay) < FINE_DELAY_S:
             break
         moved = mount if by is None else compose(mount, by)

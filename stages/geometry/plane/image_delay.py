@@ -20,6 +20,8 @@ FINE_DELAY_S = 0.003
 """Difference of two delays below which they are the same, s."""
 MIN_TURNS = 20
 """Steps between images that a delay is found from, at least."""
+MIN_SIGMA = math.radians(0.05)
+"""Standard deviation of the difference of two turns, at least (rad)."""
 LOOSE = math.radians(1.0)
 """Turn that odometry may be off between two images (rad): errors beyond count less (Cauchy)."""
 
@@ -64,5 +66,6 @@ def found_delay(camera: Array, before: Callable[[float], Array]) -> float:
     early, there, late = missed(best + STEPS_S[0] * np.array([-1.0, 0.0, 1.0]))
     weights = 1.0 / (1.0 + (there / LOOSE) ** 2)
     slopes = (late - early) / (2.0 * STEPS_S[0])
-    sigma = math.sqrt(float(weights @ there**2 / weights.sum() / max(float(weights @ slopes**2), 1e-9)))
+    variance = max(float(weights @ there**2 / weights.sum()), MIN_SIGMA**2)
+    sigma = math.sqrt(variance / max(float(weights @ slopes**2), 1e-9))
     return best if abs(best) > max(MIN_DELAY_S, MIN_SIGMAS * sigma) else 0.0

@@ -10,7 +10,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.map_files.aligned_by_landmarks import aligned_by_landmarks
 from omninav.stages.map_files.references import joined_references
-from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 
 FRAME = np.array([4.0, -7.0, 2.5])
 
@@ -47,6 +47,6 @@ def test_in_a_joined_map_whose_landmarks_are_there_twice_an_image_is_found_as_in
     twice = joined_references([mapped_room(), mapped_room()], "truth")
     pose = np.array([5.1, 3.1, 0.4])
     for map in (mapped_room(), twice):
-        fix = LandmarkPose().step(Context("landmark_pose"), seen_from(room(), pose), map).fix
+        fix = LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), seen_from(room(), pose), map).fix
         assert fix.inliers[0] > 100
         assert fix.poses[0] == pytest.approx(pose, abs=2e-3)

@@ -8,7 +8,7 @@ from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, wi
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.graph.contents import violation
 from omninav.stages.map_files.references import cut_references, joined_references, thinned_references
-from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.maps import ReferenceGraph
 
 POSE = np.array([3.1, 2.9, 0.4])
@@ -25,7 +25,7 @@ def other_room() -> ReferenceGraph:
 
 def found_in(map: ReferenceGraph, seed: int = 0) -> list[float] | None:
     """The pose that an image of a room has in a map."""
-    fix = LandmarkPose().step(Context("landmark_pose"), seen_from(room(seed), POSE), map).fix
+    fix = LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), seen_from(room(seed), POSE), map).fix
     return None if fix is None else fix.poses[0].tolist()
 
 

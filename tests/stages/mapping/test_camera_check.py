@@ -42,7 +42,7 @@ def corrections(check, world):
 
 
 def told(ctx, check, found):
-    return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]))
+    return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]), 0.0)
 
 
 def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
@@ -53,7 +53,7 @@ def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
     assert (right.centre_x, right.centre_y) == pytest.approx((319.5, 239.5), abs=0.05)
     assert (right.yaw, right.height) == (0.3, 0.9)
     assert "its axis lies 3.0 px beside, at 319.5, 239.5" in ctx.warnings[0]
-    assert check.metrics(found, np.zeros(3))["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
+    assert check.metrics(found, np.zeros(3), 0.0)["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
 
 
 def test_a_camera_that_is_turned_is_said(seen):
@@ -84,7 +84,7 @@ def test_a_camera_that_leans_is_said(camera):
     found = corrections(check, world)
     assert told(ctx, check, found) == ""
     assert "leans by 0.5 degrees forward and 3.0 to the left" in ctx.warnings[0]
-    assert check.metrics(found, np.zeros(3))["camera"]["tilt_deg"] == pytest.approx(3.04, abs=0.02)
+    assert check.metrics(found, np.zeros(3), 0.0)["camera"]["tilt_deg"] == pytest.approx(3.04, abs=0.02)
     views = LocalViews(np.array([0, len(world.bearings)]), check.bearings, np.empty((0, 128), np.uint8))
     level = check.levelled(views, found).bearings
     np.testing.assert_allclose(level[shown], world.bearings[shown], atol=0.003)
@@ -97,7 +97,7 @@ def test_bearings_of_other_pixels_and_cameras_of_a_part_of_the_circle_are_not_ch
     ahead = check_of(Perspective(640, 480, 400.0, 400.0, 319.5, 239.5), np.full((5, 2), 100.0))
     for each in (other, ahead, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
         assert each.camera is None
-        assert each.metrics(np.empty(0), np.zeros(3)) == {}
+        assert each.metrics(np.empty(0), np.zeros(3), 0.0) == {}
         assert each.seen(np.arange(0)).sigmas.shape == (0,)
 
 

@@ -7,16 +7,17 @@ from landmark_tour import HEIGHT_M, graph_of, mapped_room, room, seen_from, tour
 from made_words import NOTHING
 from scipy.spatial import KDTree
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.camera.equirectangular import Equirectangular
-from omninav.stages.geometry.plane.mount import robot_poses
-from omninav.stages.geometry.plane.se2 import between, chain, compose
+from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
+from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks
 from omninav.stages.mapping.learned_words import LearnVisualWords
 from omninav.stages.recordings.camera_yaml import parse_camera
 from omninav.stages.values.landmarks import DESCRIPTOR_SCALE
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
+from omninav.stages.values.pose import Pose
 
 
 def seen_along(poses: np.ndarray) -> list[LocalFeatures | None]:
@@ -144,6 +145,40 @@ def test_where_a_camera_sits_on_the_robot_is_found_and_its_map_is_as_exact(sourc
     assert right.mount == pytest.approx(mount, abs=0.005)
     assert "it sits at x = " in ctx.warnings[0]
     assert out.metrics.values["camera"]["position_beside_m"] == pytest.approx(math.hypot(*mount[:2]), abs=0.005)
+
+
+def swinging(seconds: np.ndarray) -> np.ndarray:
+    """Poses there and back along the room, swinging to both sides, at times (s) from 0 to 40."""
+    there = np.abs(20.0 - seconds)
+    return np.column_stack([1.0 + 0.5 * there, 2.5 + (seconds > 20.0), wrap(0.7 * seconds + np.sin(seconds))])
+
+
+@pytest.mark.parametrize(("source", "beside"), [("truth", 0.0), ("truth", 0.3), ("odometry", 0.3)])
+def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside) -> None:
+    stamps, camera = np.arange(1.0, 39.0, 0.2), replace(CAMERA, delay=0.05)
+    features = seen_along(camera_poses(swinging(stamps - 0.15), np.array([beside, 0.0, 0.0])))
+    robot = [Pose(*pose) for pose in swinging(stamps).tolist()]
+    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
+    poses = {"odometry": robot, "truth": robot if source == "truth" else [None] * len(robot)}
+    ctx, out = learned(swinging(stamps), source, features, camera=camera, ticks=ticks, **poses)
+    landmarks = out.map.landmarks
+    assert landmarks.late_by(0.05) == pytest.approx(0.15, abs=0.01)
+    assert landmarks.late_by(0.2) == 0.0  # another description is believed
+    assert landmarks.mount == pytest.approx([beside, 0.0, 0.0], abs=0.02)
+    assert np.median(np.hypot(*(out.map.poses - swinging(stamps - 0.15))[:, :2].T)) < 0.04
+    assert parse_camera(landmarks.camera, "camera.yaml").delay == pytest.approx(0.2, abs=0.01)
+    assert "its images are stamped 0.1" in ctx.warnings[0]
+    assert out.metrics.values["camera"]["delay_beside_s"] == pytest.approx(0.15, abs=0.01)
+
+
+def test_the_images_of_several_logs_and_of_a_way_with_gaps_are_taken_to_be_in_time() -> None:
+    stamps = np.arange(1.0, 39.0, 0.2)
+    features, robot = seen_along(swinging(stamps - 0.15)), [Pose(*pose) for pose in swinging(stamps).tolist()]
+    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
+    two_logs = [replace(tick, log=int(tick.index > 50)) for tick in ticks]
+    for way, times in ((robot, two_logs), ([None, *robot[1:]], ticks), (robot[1:], ticks)):
+        _, out = learned(swinging(stamps), "truth", features, camera=CAMERA, ticks=times, truth=way)
+        assert out.map.landmarks.delay_s == 0.0
 
 
 def test_a_mount_that_is_described_is_believed_and_nothing_is_said() -> None:

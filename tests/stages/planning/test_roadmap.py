@@ -19,7 +19,7 @@ from omninav.stages.planning.roadmap import (
     RoadmapPlannerState,
     goal_poses,
 )
-from omninav.stages.sensor.landmark_pose import LandmarkPose
+from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
@@ -35,7 +35,7 @@ BLOCKED = DrivingStatus("blocked", "a chair")
 def fix_of(features: LocalFeatures) -> LandmarkFix | None:
     stage, ctx = LandmarkPose(), Context("landmark_pose")
     stage.setup(ctx)
-    return stage.step(ctx, features, mapped_room()).fix
+    return stage.step(ctx, LandmarkPoseState(), features, mapped_room()).fix
 
 
 def fix_at(pose) -> LandmarkFix:

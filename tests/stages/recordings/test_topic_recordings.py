@@ -4,6 +4,7 @@ import os
 import random
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from itertools import chain, combinations
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from made_logs import (
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings import rosbag
-from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO
+from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, write_camera
 from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, Topics
@@ -262,6 +263,16 @@ def test_a_camera_beside_the_log_or_named_by_the_user_is_taken(tmp_path: Path) -
     named = open_recording(str(path), camera=str(other))
     assert named.camera.column_of_forward == 12
     assert named.digest() != open_recording(str(path)).digest()
+
+
+def test_late_images_have_the_poses_and_the_times_at_which_they_were_taken(tmp_path: Path, whole: Recording) -> None:
+    text = write_camera(replace(whole.camera, delay=0.3))
+    (tmp_path / "late.yaml").write_text(text)
+    late = open_recording(str(write_mcap(tmp_path / "log.mcap")), camera=str(tmp_path / "late.yaml"))
+    kept = whole.stamps[-len(late.stamps) :]
+    assert (late.stamps == kept - 300_000_000).all()
+    np.testing.assert_allclose(late.odometry, [pose_at(at) for at in (late.stamps - START) / 1e9], atol=1.3e-5)
+    assert late.dropped["outside_odometry"] == len(whole.stamps) - len(kept) > 0
 
 
 def test_the_digest_follows_the_content_and_not_the_name(tmp_path: Path, whole: Recording) -> None:

@@ -7,19 +7,26 @@ from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, wi
 from made_tour import Landmarks as Points
 from made_words import NOTHING, features_of
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
-from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.sensor.landmark_pose import LandmarkPose, covariance_of, probabilities_of, sectors_of
+from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.sensor.landmark_pose import (
+    LandmarkPose,
+    LandmarkPoseState,
+    covariance_of,
+    probabilities_of,
+    sectors_of,
+)
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
 
 FIRST = np.array([3.1, 2.9, 0.4])
 AWAY = np.array([40.0, 0.0, 0.0])
@@ -30,7 +37,7 @@ def fix(
 ) -> LandmarkFix | None:
     stage, ctx = LandmarkPose(**parameters), Context("landmark_pose")
     stage.setup(ctx)
-    return stage.step(ctx, features, map or mapped_room(), near).fix
+    return stage.step(ctx, LandmarkPoseState(), features, map or mapped_room(), near).fix
 
 
 def belief(*pose: float) -> Particles:
@@ -171,10 +178,13 @@ def test_it_is_known_which_features_agree_with_which_pose() -> None:
 def test_a_map_that_was_saved_without_landmarks_is_said() -> None:
     ctx = Context("landmark_pose")
     for _ in range(2):
-        assert LandmarkPose().step(ctx, seen_from(room(), FIRST), graph_of(tour_poses()[:3])).fix is None
+        assert (
+            LandmarkPose().step(ctx, LandmarkPoseState(), seen_from(room(), FIRST), graph_of(tour_poses()[:3])).fix
+            is None
+        )
     (said,) = ctx.warnings
     assert "landmarks=sift, or type landmarks=none" in said
-    LandmarkPose().step(ctx, seen_from(room(), FIRST), mapped_room())
+    LandmarkPose().step(ctx, LandmarkPoseState(), seen_from(room(), FIRST), mapped_room())
     assert len(ctx.warnings) == 1
 
 
@@ -197,11 +207,11 @@ def test_the_pose_is_that_of_the_robot_where_the_camera_sits_beside_its_axis() -
     plain, mount = mapped_room(), np.array([0.4, -0.1, 0.2])
     described = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5, yaw=0.05)
     seen = seen_from(room(), FIRST)
-    at = LandmarkPose().step(Context("landmark_pose"), seen, plain).fix
+    at = LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), seen, plain).fix
 
     def of(camera: Equirectangular, **said: np.ndarray) -> LandmarkFix:
         map = replace(plain, landmarks=replace(plain.landmarks, **said))
-        return LandmarkPose().step(Context("landmark_pose"), seen, map, camera=camera).fix
+        return LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), seen, map, camera=camera).fix
 
     found = of(described, described=described.mount, mount=mount + np.array([0.0, 0.0, 0.05]))
     assert found.poses[0] == pytest.approx(robot_poses(at.poses[0], mount))
@@ -210,3 +220,19 @@ def test_the_pose_is_that_of_the_robot_where_the_camera_sits_beside_its_axis() -
     # A camera that is described otherwise than the tour's sits where its own description says.
     other = of(replace(described, position_x=0.3), described=described.mount, mount=mount)
     assert other.poses[0] == pytest.approx(robot_poses(at.poses[0], np.array([0.3, 0.0, 0.0])))
+
+
+def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion() -> None:
+    camera = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5, delay=0.1)
+    plain, seen, motion = mapped_room(), seen_from(room(), FIRST), Motion(0.4, 0.0, 0.2)
+    map = replace(plain, landmarks=replace(plain.landmarks, described_delay_s=0.1, delay_s=0.35))
+    state, ctx = LandmarkPoseState(), Context("landmark_pose")
+
+    def at(stamp: int, camera: Equirectangular = camera) -> np.ndarray:
+        ctx.tick = Tick(1, stamp)
+        return LandmarkPose().step(ctx, state, seen, map, camera=camera, motion=motion).fix.poses[0]
+
+    assert at(0) == pytest.approx(FIRST, abs=1e-3)  # nothing tells the time of its motion
+    assert at(10**9) == pytest.approx(compose(FIRST, [0.1, 0.0, 0.05]), abs=1e-3)
+    assert at(3 * 10**9) == pytest.approx(compose(FIRST, [0.05, 0.0, 0.025]), abs=1e-3)
+    assert at(4 * 10**9, replace(camera, delay=0.35)) == pytest.approx(FIRST, abs=1e-3)
