@@ -1,7 +1,7 @@
 """`camera.yaml`: how a camera's images are to be read, as a file.
 
 `projection:` names the model; the other keys are what the model's class declares (`stages/camera/`): some at the top
-(height, yaw, sense), some in a section (image, mirror, mask, centre, elevation), and the matrix
+(height, yaw, delay, sense), some in a section (image, mirror, mask, centre, elevation), and the matrix
 K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 """
 

@@ -5,6 +5,7 @@ import os
 import resource
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -21,7 +22,7 @@ from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.publish import send
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, MessageQueue
-from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO
+from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera, write_camera
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 
@@ -92,6 +93,14 @@ def test_the_record_of_a_live_drive_gives_the_same_ticks_as_the_drive(wire: Wire
     drive = driven(wire, tmp_path, said())
     assert len(drive.outs) > 5
     assert drive.outs[3].motion is not None
+
+
+def test_images_that_are_stamped_late_are_of_the_time_at_which_they_were_taken(wire: Wire, tmp_path: Path):
+    stamps = [out.tick.stamp for out in driven(wire, tmp_path, said()).outs]
+    (tmp_path / "live.mcap").unlink()
+    (tmp_path / "camera.yaml").write_text(write_camera(replace(read_camera(CAMERA), delay=0.12)))
+    late = driven(wire, tmp_path, said(), camera=str(tmp_path / "camera.yaml")).outs
+    assert {out.tick.stamp + 120_000_000 for out in late[1:]} <= set(stamps)
 
 
 def test_a_mirror_of_which_nothing_is_known_is_recorded_with_the_ring_of_its_first_image(wire: Wire, tmp_path: Path):
