@@ -180,17 +180,17 @@ class _Tour:
 
 
 def _robot(
-    measured: Array, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick], way: Sequence[Pose | None]
+    measured: Array, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick], driven: Sequence[Pose | None]
 ) -> Callable[[float], Array]:
     """The robot's poses (R, 3) at so many seconds before the images of references were stamped.
 
-    They are `measured` (R, 3) at any time where the tour is of several logs, or has gaps in its `way`.
+    They are `measured` (R, 3) at any time where the tour is of several logs, or was not measured at each image.
     """
     times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
-    whole = len(way) == len(ticks) == len(events) and None not in way and not any(tick.log for tick in ticks)
+    whole = len(driven) == len(ticks) == len(events) and None not in driven and not any(tick.log for tick in ticks)
     if not whole or not (np.diff(times) > 0.0).all():
         return lambda _: measured
-    poses = np.array([(pose.x, pose.y, pose.heading) for pose in way if pose is not None])
+    poses = np.array([(pose.x, pose.y, pose.heading) for pose in driven if pose is not None])
     stamps = times[[event is not None for event in events]]
     return RobotPath(measured, stamps, poses, times).before
 

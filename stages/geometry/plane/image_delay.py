@@ -30,19 +30,19 @@ LOOSE = math.radians(1.0)
 class RobotPath:
     """Poses of a robot at references of a tour, and at the times shortly before and after.
 
-    `poses` (R, 3) at `stamps` (R,) in seconds, ascending; `way` (N, 3) at `times` (N,): the whole drive.
+    `poses` (R, 3) at `stamps` (R,) in seconds, ascending; `driven` (N, 3) at `times` (N,): the whole drive.
     """
 
     poses: Array
     stamps: Array
-    way: Array
+    driven: Array
     times: Array
 
     def before(self, delay_s: float) -> Array:
         """Poses (R, 3) at so many seconds before the stamps, by straight steps of the drive."""
         if not delay_s:
             return self.poses
-        then, now = (interpolate(self.times, self.way, at) for at in (self.stamps - delay_s, self.stamps))
+        then, now = (interpolate(self.times, self.driven, at) for at in (self.stamps - delay_s, self.stamps))
         return compose(self.poses, between(now, then))
 
 

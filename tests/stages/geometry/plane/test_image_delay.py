@@ -35,7 +35,7 @@ def test_images_in_time_a_robot_that_turns_evenly_and_few_images_tell_none() -> 
     assert robot.before(0.0) is robot.poses
     noise = rng.normal(0.0, math.radians(0.5), len(robot.poses))
     assert found_delay(robot.poses + noise[:, None] * [0.0, 0.0, 1.0], robot.before) == 0.0
-    few = RobotPath(robot.poses[:20], robot.stamps[:20], robot.way, robot.times)
+    few = RobotPath(robot.poses[:20], robot.stamps[:20], robot.driven, robot.times)
     assert found_delay(driven(few.stamps - 0.15), few.before) == 0.0
     even = np.column_stack([SECONDS, np.zeros(len(SECONDS)), wrap(0.3 * SECONDS)])
     turning = RobotPath(even[10:-10:4], SECONDS[10:-10:4], even, SECONDS)
