@@ -129,9 +129,7 @@ class CameraCheck(NamedTuple):
             parts.append(f"it sits at x = {x:z.2f}, y = {y:z.2f} m on the robot (forward, left)")
         if late_s:
             right = replace(right, delay=round((right.delay or 0.0) + late_s, 3) + 0.0)
-            parts.append(
-                f"its images are stamped {abs(late_s):.2f} s {'later' if late_s > 0.0 else 'earlier'} than said"
-            )
+            parts.append(f"its images are stamped {abs(late_s):.2f} s too {'late' if late_s > 0.0 else 'early'}")
         if not parts:
             return ""
         return _told(ctx, "; ".join(parts), harm, right)
