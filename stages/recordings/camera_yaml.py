@@ -74,7 +74,9 @@ def camera_section(camera: Camera) -> dict[str, Any]:
     return content
 
 
-UNSAID_BY_INFO = "CameraInfo does not say where the camera sits: yaw and position are 0 (else give camera=PATH/camera.yaml)"
+UNSAID_BY_INFO = (
+    "CameraInfo does not say where the camera sits: yaw and position are 0 (else give camera=PATH/camera.yaml)"
+)
 """Sentence on a camera that a CameraInfo message alone describes."""
 
 

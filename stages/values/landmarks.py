@@ -41,8 +41,8 @@ class Landmarks(Value):
     variance_factor: Annotated[float, Bounds(ge=1, le=1e9)] = 2.5
     described: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
     mount: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
-    described_delay_s: float = 0.0
-    delay_s: float = 0.0
+    described_delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
+    delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
 
     def __len__(self) -> int:
         return len(self.points)
