@@ -1,6 +1,6 @@
 """Learns the landmarks of a map from the local features of its references."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -181,18 +181,18 @@ class _Tour:
 
 def _robot(
     measured: Array, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick], driven: Sequence[Pose | None]
-) -> Callable[[float], Array]:
-    """The robot's poses (R, 3) at so many seconds before the images of references were stamped.
+) -> RobotPath:
+    """The robot's path with its `measured` poses (R, 3) at references.
 
-    They are `measured` (R, 3) at any time where the tour is of several logs, or was not measured at each image.
+    They are all that is known of a tour of several logs, and of one that was not measured at each image.
     """
     times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
     whole = len(driven) == len(ticks) == len(events) and None not in driven and not any(tick.log for tick in ticks)
     if not whole or not (np.diff(times) > 0.0).all():
-        return lambda _: measured
+        return RobotPath(measured)
     poses = np.array([(pose.x, pose.y, pose.heading) for pose in driven if pose is not None])
     stamps = times[[event is not None for event in events]]
-    return RobotPath(measured, stamps, poses, times).before
+    return RobotPath(measured, stamps, poses, times)
 
 
 def _candidates(words: VisualWords) -> list[Ints]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
-from omninav.stages.geometry.plane.image_delay import FINE_DELAY_S, found_delay
+from omninav.stages.geometry.plane.image_delay import FINE_DELAY_S, RobotPath, found_delay
 from omninav.stages.geometry.plane.mount import camera_poses, found_mount
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
 
@@ -72,28 +72,27 @@ class AdjustedMap(NamedTuple):
 
 
 def found_with_mount(
-    robot: Callable[[float], Array],
+    robot: RobotPath,
     described: Array,
     adjust: Callable[[Array], AdjustedMap],
     again: Callable[[Array], AdjustedMap],
 ) -> tuple[AdjustedMap, Array, float]:
     """Adjusts the poses of a camera on a robot, and finds its mount (3,) and the delay of its images (s).
 
-    `robot(delay)`: the robot's poses (R, 3) at so many seconds before the images' stamps. `described`: the mount as the
-    camera's description says it. Where the adjusted poses show another mount or a delay, those that begin with them are
+    `described`: the mount as the camera's description says it. Where the adjusted poses show another mount or a delay, those that begin with them are
     adjusted again. `again`: adjusts poses that tell both, where those as measured fit nothing.
     """
-    found, mount, delay = adjust(camera_poses(robot(0.0), described)), described, 0.0
+    found, mount, delay = adjust(camera_poses(robot.poses, described)), described, 0.0
     for _ in range(MOUNT_ROUNDS):
-        seen = (again(camera_poses(robot(delay), mount)) if found.problem else found).seen
+        seen = (again(camera_poses(robot.before(delay), mount)) if found.problem else found).seen
         if seen is None:
             break
         later = found_delay(seen, robot)
-        by = found_mount(seen, camera_poses(robot(later), mount), left=mount is not described)
+        by = found_mount(seen, camera_poses(robot.before(later), mount), left=mount is not described)
         if by is None and abs(later - delay) < FINE_DELAY_S:
             break
         moved = mount if by is None else compose(mount, by)
-        tried = adjust(camera_poses(robot(later), moved))
+        tried = adjust(camera_poses(robot.before(later), moved))
         if tried.problem and not found.problem:
             break
         found, mount, delay = tried, moved, later

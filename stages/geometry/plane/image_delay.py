@@ -1,8 +1,7 @@
 """Delay of a camera's images: how much later than they were taken they are stamped."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,60 +11,65 @@ from .se2 import between, compose, interpolate, wrap
 
 MAX_DELAY_S = 1.0
 """Largest delay that is looked for, either way, s."""
-STEPS_S = (0.02, 0.001)
-"""Steps in which delays are tried, over all of them and around the best, s."""
-MIN_DELAY_S, MIN_SIGMAS = 0.02, 4.0
+ROUNDS = 10
+"""Rounds of least squares."""
+MIN_DELAY_S, MIN_SIGMAS = 0.02, 8.0
 """Delay below which it is taken for none: in seconds, and in its standard deviations."""
 FINE_DELAY_S = 0.003
 """Difference of two delays below which they are the same, s."""
-MIN_TURNS = 20
+MIN_TURNS = 40
 """Steps between images that a delay is found from, at least."""
 MIN_SIGMA = math.radians(0.05)
 """Standard deviation of the difference of two turns, at least (rad)."""
 LOOSE = math.radians(1.0)
-"""Turn that odometry may be off between two images (rad): errors beyond count less (Cauchy)."""
+"""Difference of two turns at which they count by half (Cauchy), at least (rad)."""
 
 
 @dataclass(frozen=True)
 class RobotPath:
     """Poses of a robot at references of a tour, and at the times shortly before and after.
 
-    `poses` (R, 3) at `stamps` (R,) in seconds, ascending; `driven` (N, 3) at `times` (N,): the whole drive.
+    `poses` (R, 3) at `stamps` (R,) in seconds, ascending; `driven` (N, 3) at `times` (N,): the whole drive, empty where
+    it is not known.
     """
 
     poses: Array
-    stamps: Array
-    driven: Array
-    times: Array
+    stamps: Array = field(default_factory=lambda: np.empty(0))
+    driven: Array = field(default_factory=lambda: np.empty((0, 3)))
+    times: Array = field(default_factory=lambda: np.empty(0))
 
     def before(self, delay_s: float) -> Array:
         """Poses (R, 3) at so many seconds before the stamps, by straight steps of the drive."""
-        if not delay_s:
+        if not delay_s or not len(self.times):
             return self.poses
         then, now = (interpolate(self.times, self.driven, at) for at in (self.stamps - delay_s, self.stamps))
         return compose(self.poses, between(now, then))
 
 
-def found_delay(camera: Array, before: Callable[[float], Array]) -> float:
+def found_delay(camera: Array, robot: RobotPath) -> float:
     """The delay (s, positive: images are late) that turns of a camera with poses (R, 3), in order, show; 0 for none.
 
-    `before(delay)`: poses (R, 3) of the robot at so many seconds before the stamps of its images. Its turns are those
-    of the camera where the delay is right, wherever the camera sits.
+    The robot's turns are those of the camera where the delay is right, wherever the camera sits. Least squares find it
+    with slopes over whole intervals between images, long ones first: these are independent of the noise of poses,
+    while poses between two that were measured have less noise and would fit better whatever the delay is.
     """
-    if len(camera) <= MIN_TURNS:
+    if len(camera) <= MIN_TURNS or len(robot.times) <= MIN_TURNS:
         return 0.0
-    seen = np.diff(camera[:, 2])
+    seen, interval = np.diff(camera[:, 2]), float(np.median(np.diff(robot.times)))
 
-    def missed(delays: Array) -> Array:
-        return np.array([wrap(seen - np.diff(before(float(delay))[:, 2])) for delay in delays])
+    def missed(delay: float) -> Array:
+        return wrap(seen - np.diff(robot.before(delay)[:, 2]))
 
-    best, reach = 0.0, MAX_DELAY_S
-    for step in STEPS_S:
-        delays = best + np.arange(-reach, reach + step / 2.0, step)
-        best, reach = float(delays[np.log1p((missed(delays) / LOOSE) ** 2).sum(axis=1).argmin()]), step
-    early, there, late = missed(best + STEPS_S[0] * np.array([-1.0, 0.0, 1.0]))
-    weights = 1.0 / (1.0 + (there / LOOSE) ** 2)
-    slopes = (late - early) / (2.0 * STEPS_S[0])
-    variance = max(float(weights @ there**2 / weights.sum()), MIN_SIGMA**2)
-    sigma = math.sqrt(variance / max(float(weights @ slopes**2), 1e-9))
-    return best if abs(best) > max(MIN_DELAY_S, MIN_SIGMAS * sigma) else 0.0
+    delay, spread, reach = 0.0, 0.0, interval * max(1, int(MAX_DELAY_S / interval))
+    for _ in range(ROUNDS):
+        there = missed(delay)
+        slopes = wrap(missed(delay + reach) - missed(delay - reach)) / (2.0 * reach)
+        reach = max(interval, interval * round(reach / interval / 2.0))
+        loose = max(LOOSE, float(np.median(np.abs(there))))
+        weights = 1.0 / (1.0 + (there / loose) ** 2)
+        square = max(float(weights @ slopes**2), 1e-9)
+        delay -= float(weights @ (there * slopes)) / square
+        if abs(delay) > MAX_DELAY_S:
+            return 0.0
+        spread = math.sqrt(max(float(weights @ there**2 / weights.sum()), MIN_SIGMA**2) / square)
+    return delay if abs(delay) > max(MIN_DELAY_S, MIN_SIGMAS * spread) else 0.0

@@ -10,6 +10,7 @@ from omninav.stages.geometry.landmarks.map_adjustment import (
     found_with_mount,
 )
 from omninav.stages.geometry.landmarks.map_making import LocalViews, neighbouring_pairs, pair_matches
+from omninav.stages.geometry.plane.image_delay import RobotPath
 from omninav.stages.geometry.plane.mount import camera_poses
 from omninav.stages.geometry.plane.se2 import chain, wrap
 
@@ -125,7 +126,7 @@ def turning_drive() -> np.ndarray:
 def test_a_mount_is_found_round_by_round_until_little_is_left():
     mount = np.array([0.4, -0.1, 0.0])
     robot, adjust = half_seen(mount)
-    found, as_found, delay = found_with_mount(lambda _: robot, np.zeros(3), adjust, adjust)
+    found, as_found, delay = found_with_mount(RobotPath(robot), np.zeros(3), adjust, adjust)
     assert delay == 0.0
     assert as_found == pytest.approx(mount, abs=0.0015)
     assert found.poses == pytest.approx(camera_poses(robot, as_found))
@@ -134,6 +135,6 @@ def test_a_mount_is_found_round_by_round_until_little_is_left():
 def test_a_mount_with_which_nothing_fits_either_is_not_believed():
     robot, adjust = half_seen(np.array([0.4, 0.0, 0.0]), problem="too few landmarks are seen")
     described = np.array([0.1, 0.0, 0.0])
-    found, mount, _ = found_with_mount(lambda _: robot, described, adjust, half_seen(np.array([0.4, 0.0, 0.0]))[1])
+    found, mount, _ = found_with_mount(RobotPath(robot), described, adjust, half_seen(np.array([0.4, 0.0, 0.0]))[1])
     assert found.problem
     assert (mount == described).all()

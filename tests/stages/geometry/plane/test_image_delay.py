@@ -26,7 +26,7 @@ def test_the_delay_of_a_camera_that_is_turned_and_sits_beside_is_found_in_noise(
     camera = camera_poses(driven(robot.stamps - delay), np.array([0.3, -0.1, 0.4]))
     camera[:, 2] += rng.normal(0.0, math.radians(0.2), len(camera))
     camera[30:, 2] += math.radians(40.0)  # odometry slips
-    assert found_delay(camera, robot.before) == pytest.approx(delay, abs=0.01)
+    assert found_delay(camera, robot) == pytest.approx(delay, abs=0.01)
     assert robot.before(delay) == pytest.approx(driven(robot.stamps - delay), abs=0.001)
 
 
@@ -34,9 +34,19 @@ def test_images_in_time_a_robot_that_turns_evenly_and_few_images_tell_none() -> 
     robot, rng = path(), np.random.default_rng(1)
     assert robot.before(0.0) is robot.poses
     noise = rng.normal(0.0, math.radians(0.5), len(robot.poses))
-    assert found_delay(robot.poses + noise[:, None] * [0.0, 0.0, 1.0], robot.before) == 0.0
-    few = RobotPath(robot.poses[:20], robot.stamps[:20], robot.driven, robot.times)
-    assert found_delay(driven(few.stamps - 0.15), few.before) == 0.0
+    assert found_delay(robot.poses + noise[:, None] * [0.0, 0.0, 1.0], robot) == 0.0
+    few = RobotPath(robot.poses[:40], robot.stamps[:40], robot.driven, robot.times)
+    assert found_delay(driven(few.stamps - 0.15), few) == 0.0
     even = np.column_stack([SECONDS, np.zeros(len(SECONDS)), wrap(0.3 * SECONDS)])
     turning = RobotPath(even[10:-10:4], SECONDS[10:-10:4], even, SECONDS)
-    assert found_delay(even[8:-12:4], turning.before) == 0.0
+    assert found_delay(even[8:-12:4], turning) == 0.0
+
+
+def test_headings_that_are_noisy_tell_none_though_those_between_two_fit_better() -> None:
+    found = []
+    for seed in range(20):
+        rng, exact, measured = np.random.default_rng(seed), driven(SECONDS), driven(SECONDS)
+        measured[:, 2] = wrap(measured[:, 2] + rng.normal(0.0, math.radians(1.0), len(measured)))
+        robot = RobotPath(measured[10:-20:4], SECONDS[10:-20:4], measured, SECONDS)
+        found.append(found_delay(exact[10:-20:4], robot))
+    assert not any(found)
