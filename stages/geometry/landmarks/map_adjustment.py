@@ -79,8 +79,9 @@ def found_with_mount(
 ) -> tuple[AdjustedMap, Array, float]:
     """Adjusts the poses of a camera on a robot, and finds its mount (3,) and the delay of its images (s).
 
-    `described`: the mount as the camera's description says it. Where the adjusted poses show another mount or a delay, those that begin with them are
-    adjusted again. `again`: adjusts poses that tell both, where those as measured fit nothing.
+    `described`: the mount as the camera's description says it. Where the adjusted poses show another mount or a delay,
+    those that begin with them are adjusted again. `again`: adjusts poses that tell both, where those as measured fit
+    nothing.
     """
     found, mount, delay = adjust(camera_poses(robot.poses, described)), described, 0.0
     for _ in range(MOUNT_ROUNDS):
