@@ -32,7 +32,7 @@ from omninav.stages.geometry.landmarks.map_making import (
     triangulated,
     widely_seen,
 )
-from omninav.stages.geometry.plane.image_delay import RobotPath
+from omninav.stages.geometry.plane.image_delay import RobotPath, found_delay
 from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
@@ -104,6 +104,8 @@ class LearnLandmarks(Stage):
             adjusted, mount, late = adjust(measured), mounted, 0.0
         else:
             robot = _robot(measured, events, ticks, truth if given else odometry)
+            if given and found_delay(measured, _robot(None, events, ticks, odometry)):
+                robot = RobotPath(measured)  # true poses that are late themselves tell nothing of the images
             adjusted, mount, late = found_with_mount(robot, mounted, adjust, tour.as_a_drive)
         turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
         mount = compose(mount, turn)
@@ -180,19 +182,22 @@ class _Tour:
 
 
 def _robot(
-    measured: Array, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick], driven: Sequence[Pose | None]
+    measured: Array | None,
+    events: Sequence[ReferenceEvent | None],
+    ticks: Sequence[Tick],
+    driven: Sequence[Pose | None],
 ) -> RobotPath:
-    """The robot's path with its `measured` poses (R, 3) at references.
+    """The robot's path with its `measured` poses (R, 3) at references, by default those of the path itself.
 
     They are all that is known of a tour of several logs, and of one that was not measured at each image.
     """
     times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
     whole = len(driven) == len(ticks) == len(events) and None not in driven and not any(tick.log for tick in ticks)
     if not whole or not (np.diff(times) > 0.0).all():
-        return RobotPath(measured)
+        return RobotPath(np.empty((0, 3)) if measured is None else measured)
     poses = np.array([(pose.x, pose.y, pose.heading) for pose in driven if pose is not None])
-    stamps = times[[event is not None for event in events]]
-    return RobotPath(measured, stamps, poses, times)
+    taken = [event is not None for event in events]
+    return RobotPath(poses[taken] if measured is None else measured, times[taken], poses, times)
 
 
 def _candidates(words: VisualWords) -> list[Ints]:

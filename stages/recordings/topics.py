@@ -74,7 +74,10 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
         return lambda: pixels_of(message)
 
-    width, height = _first_size(name, len(frames), fetch_image)
+    inside = odometry or truth
+    within_it = within(np.array([frame.stamp for frame in frames], np.int64), inside.stamps) if inside else None
+    usable = np.arange(len(frames)) if within_it is None or not within_it.any() else np.flatnonzero(within_it)
+    width, height = _first_size(name, usable.tolist(), fetch_image)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
     if (width, height) != (view.width, view.height_px):
         hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
@@ -242,14 +245,16 @@ def _seen_within(feed: Feed, name: str, kind: str, stamps: Stamps, times: Stamps
     return keep
 
 
-def _first_size(name: str, number: int, fetch_image: Callable[[int], Callable[[], Pixels]]) -> tuple[int, int]:
-    """Width and height of the first of a log's images that can be decoded. Raises `UnreadableRecording`."""
+def _first_size(
+    name: str, numbers: Sequence[int], fetch_image: Callable[[int], Callable[[], Pixels]]
+) -> tuple[int, int]:
+    """Width and height of the first of some images that can be decoded. Raises `UnreadableRecording`."""
     reason = ""
-    for frame in range(number):
+    for frame in numbers:
         try:
             height, width = fetch_image(frame)().shape[:2]
         except (BadMessage, Undecodable) as error:
             reason = reason or f": {error}"
         else:
             return width, height
-    raise UnreadableRecording(f"{name}: not one of its {number} images can be decoded{reason}")
+    raise UnreadableRecording(f"{name}: not one of its {len(numbers)} images can be decoded{reason}")

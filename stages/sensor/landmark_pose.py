@@ -42,6 +42,8 @@ that repeats itself, so that of 40 landmarks that agree on a wrong pose all lie 
 that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
+MAX_MOTIONS = 5.0
+"""Largest number of last motions by which the pose of a late image is carried on: between images of a burst, noise."""
 WITHOUT_LANDMARKS = (
     "the map was saved without landmarks, so that images are compared as a whole, to decimetres: "
     "learn it again from its tour with landmarks=sift, or type landmarks=none"
@@ -113,7 +115,8 @@ class LandmarkPose(Stage):
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
         if late and motion is not None and seconds > 0.0:
-            poses = compose(poses, late / seconds * np.array([motion.x, motion.y, motion.turn]))
+            share = min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS)
+            poses = compose(poses, share * np.array([motion.x, motion.y, motion.turn]))
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:

@@ -171,6 +171,18 @@ def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside)
     assert out.metrics.values["camera"]["delay_beside_s"] == pytest.approx(0.15, abs=0.01)
 
 
+def test_true_poses_that_are_late_are_not_taken_for_early_images() -> None:
+    stamps = np.arange(1.0, 39.0, 0.2)
+    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
+    odometry, late = ([Pose(*pose) for pose in swinging(stamps - by).tolist()] for by in (0.0, 0.15))
+    for measured, delay in ((odometry, 0.0), ([None] * len(ticks), -0.15)):
+        _, out = learned(
+            swinging(stamps - 0.15), "truth", seen_along(swinging(stamps)),
+            camera=CAMERA, ticks=ticks, odometry=measured, truth=late,
+        )  # fmt: skip
+        assert out.map.landmarks.delay_s == pytest.approx(delay, abs=0.01)
+
+
 def test_the_images_of_several_logs_and_of_a_way_with_gaps_are_taken_to_be_in_time() -> None:
     stamps = np.arange(1.0, 39.0, 0.2)
     features, robot = seen_along(swinging(stamps - 0.15)), [Pose(*pose) for pose in swinging(stamps).tolist()]

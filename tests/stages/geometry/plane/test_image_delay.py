@@ -50,3 +50,16 @@ def test_headings_that_are_noisy_tell_none_though_those_between_two_fit_better()
         robot = RobotPath(measured[10:-20:4], SECONDS[10:-20:4], measured, SECONDS)
         found.append(found_delay(exact[10:-20:4], robot))
     assert not any(found)
+
+
+def test_odometry_that_slips_in_its_few_turns_tells_none() -> None:
+    found = []
+    for seed in range(15):
+        rng, turns = np.random.default_rng(seed), np.zeros(len(SECONDS))
+        for begin in (400, 800):
+            turns[begin : begin + 20] = math.pi / 2 / 20
+        slipped = turns * (1.0 + 0.2 * rng.normal(size=len(turns)))
+        exact, measured = (np.column_stack([SECONDS, SECONDS, wrap(np.cumsum(each))]) for each in (turns, slipped))
+        robot = RobotPath(measured[10:-20:4], SECONDS[10:-20:4], measured, SECONDS)
+        found.append(found_delay(exact[10:-20:4], robot))
+    assert not any(found)
