@@ -89,7 +89,7 @@ class LearnLandmarks(Stage):
         truth: Sequence[Pose | None] = (),
     ) -> Out:
         """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
-        straightened. `ticks` and poses, of all its images, tell how late these are."""
+        straightened. `ticks`, `odometry` and `truth` of all images tell how late these are stamped."""
         ctx.doing("triangulating landmarks")
         found = [each for each, event in zip(features, events, strict=True) if event is not None]
         views, given = _views(found), map.pose_source == "truth"
@@ -110,7 +110,7 @@ class LearnLandmarks(Stage):
         turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
         mount = compose(mount, turn)
         poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)
-        matches = tour.matches or tour.matched(poses)
+        matches = tour.matched(poses) if tour.matches is None else tour.matches
         views = check.levelled(views, adjusted.camera)
         tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
         sightings = widely_seen(views, triangulated(views, tracks, poses))
@@ -189,7 +189,7 @@ def _robot(
 ) -> RobotPath:
     """The robot's path with its `measured` poses (R, 3) at references, by default those of the path itself.
 
-    They are all that is known of a tour of several logs, and of one that was not measured at each image.
+    Of a tour of several logs, or one with images whose pose was not measured, the references' poses alone are given.
     """
     times = np.array([tick.stamp for tick in ticks], np.int64) / 1e9
     whole = len(driven) == len(ticks) == len(events) and None not in driven and not any(tick.log for tick in ticks)

@@ -355,7 +355,7 @@ def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> st
         f"the images show turns {abs(fit.delay_s):.1f} s {'after' if fit.delay_s > 0 else 'before'} odometry measures "
         f"them, in which the robot drives {driven:.2f} m (this explains {100 * fit.explained:.0f} % of their turning "
         f"over {len(seen)} images, no delay {100 * max(fit.as_is, 0.0):.0f} %): check that both are stamped by one "
-        "clock, images when they are taken, or give the camera.yaml a `delay:`"
+        "clock, images when they are taken, or set `delay:` in camera.yaml"
     )
 
 

@@ -74,17 +74,16 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
         return lambda: pixels_of(message)
 
-    inside = odometry or truth
-    within_it = within(np.array([frame.stamp for frame in frames], np.int64), inside.stamps) if inside else None
-    usable = np.arange(len(frames)) if within_it is None or not within_it.any() else np.flatnonzero(within_it)
-    width, height = _first_size(name, usable.tolist(), fetch_image)
+    stamps, track = np.array([frame.stamp for frame in frames], dtype=np.int64), odometry or truth
+    timed = [] if track is None else np.flatnonzero(within(stamps, track.stamps)).tolist()
+    width, height = _first_size(name, timed or range(len(frames)), fetch_image)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
     if (width, height) != (view.width, view.height_px):
         hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
         raise UnreadableRecording(
             f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )
-    stamps = np.array([frame.stamp for frame in frames], dtype=np.int64) - view.delay_ns
+    stamps = stamps - view.delay_ns
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
         keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)

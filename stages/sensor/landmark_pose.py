@@ -43,7 +43,7 @@ that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 MAX_MOTIONS = 5.0
-"""Largest number of last motions by which the pose of a late image is carried on: between images of a burst, noise."""
+"""Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
     "the map was saved without landmarks, so that images are compared as a whole, to decimetres: "
     "learn it again from its tour with landmarks=sift, or type landmarks=none"
@@ -66,8 +66,8 @@ class LandmarkPose(Stage):
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
-    landmarks. Where the tour's images were late, its pose is carried by that part of the last motion. Raises BadInput
-    for features of another kind than the map's.
+    landmarks. Where the tour showed that images are stamped late, the pose is moved on by the robot's motion over that
+    time. Raises BadInput for features of another kind than the map's.
     """
 
     min_inliers: Annotated[int, Bounds(ge=4)] = 8

@@ -71,7 +71,7 @@ def found_delay(camera: Array, robot: RobotPath) -> float:
         delay -= float(weights @ (there * slopes)) / square
         if abs(delay) > MAX_DELAY_S:
             return 0.0
-        # Where only turns are off, as odometry slips, the errors of steps with a slope count and not all steps alike.
+        # Odometry that slips is wrong in turns alone: the mean error of all steps, mostly straight ones, would hide it.
         of_all, of_turns = weights @ there**2 / weights.sum(), (weights * slopes) ** 2 @ there**2 / square
         spread = math.sqrt(max(float(of_all), float(of_turns), MIN_SIGMA**2) / square)
     return delay if abs(delay) > max(MIN_DELAY_S, MIN_SIGMAS * spread) else 0.0
