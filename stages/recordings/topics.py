@@ -83,7 +83,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         raise UnreadableRecording(
             f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )
-    stamps = stamps - view.delay_ns
+    if track is not None:
+        stamps = stamps - view.delay_ns  # without a track there is nothing to be late against
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
         keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)

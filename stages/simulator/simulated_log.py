@@ -102,6 +102,7 @@ def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arr
     _, stamp, shot = recording.sent[number]
     camera = recording.camera
     size = {"width": camera.width, "height": camera.height_px}
+    stamp += camera.delay_ns
     info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml says the rest
     _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
     image = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}

@@ -176,11 +176,14 @@ def test_true_poses_that_are_late_are_not_taken_for_early_images() -> None:
     ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
     odometry, late = ([Pose(*pose) for pose in swinging(stamps - by).tolist()] for by in (0.0, 0.15))
     for measured, delay in ((odometry, 0.0), ([None] * len(ticks), -0.15)):
-        _, out = learned(
+        ctx, out = learned(
             swinging(stamps - 0.15), "truth", seen_along(swinging(stamps)),
             camera=CAMERA, ticks=ticks, odometry=measured, truth=late,
         )  # fmt: skip
         assert out.map.landmarks.delay_s == pytest.approx(delay, abs=0.01)
+        said = "images are stamped 0.15 s too early against its poses"  # no camera.yaml can say it of a folder
+        assert any(said in warning for warning in ctx.warnings) == bool(delay)
+        assert "delay" not in out.map.landmarks.camera
 
 
 def test_the_images_of_several_logs_and_of_a_way_with_gaps_are_taken_to_be_in_time() -> None:

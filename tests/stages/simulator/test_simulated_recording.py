@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from world_files import DEMO
 
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
@@ -79,14 +80,20 @@ def test_a_route_that_is_not_there_is_refused_with_those_that_are() -> None:
         SimulatedRecording(DEMO, "aisles", 0)
 
 
-def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(tmp_path: Path) -> None:
-    config = dataclasses.replace(DEMO, routes={"short": Route(((2.0, 1.5), (3.5, 1.5)))})
+@pytest.mark.parametrize("delay", [None, 0.1])
+def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(
+    tmp_path: Path, delay: float | None
+) -> None:
+    route, camera = Route(((2.0, 1.5), (3.5, 1.5))), {**DEMO.camera, "delay": delay}
+    config = dataclasses.replace(DEMO, routes={"short": route}, camera=camera)
     recording = SimulatedRecording(config, "short", 2)
     record(recording, tmp_path / "one.mcap")
     record(SimulatedRecording(config, "short", 2), tmp_path / "two.mcap")
     assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "two.mcap").read_bytes()
     log = open_recording(str(tmp_path / "one.mcap"))
     assert not log.dropped
+    stamped = LogReader(tmp_path / "one.mcap").scan({"/camera/image/compressed"})
+    assert next(stamped).stamp == recording.stamps[0] + round((delay or 0.0) * 1e9)
     np.testing.assert_array_equal(log.stamps, recording.stamps)
     np.testing.assert_allclose(log.truth, recording.truth, atol=1e-9)  # type: ignore[arg-type]
     np.testing.assert_allclose(log.odometry, recording.odometry, atol=1e-9)  # type: ignore[arg-type]
