@@ -134,7 +134,9 @@ class CameraCheck(NamedTuple):
             right = replace(right, delay=round((right.delay or 0.0) + late_s, 3) + 0.0)
             parts.append(f"its images are {late}")
         elif late_s:
-            ctx.warn(f"the tour's images are {late} against its poses. Landmarks allow for it; correct one of the clocks")
+            ctx.warn(
+                f"the tour's images are {late} against its poses. Landmarks allow for it; correct one of the clocks"
+            )
         if not parts:
             return ""
         return _told(ctx, "; ".join(parts), harm, right)

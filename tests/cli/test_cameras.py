@@ -25,6 +25,9 @@ FILES: dict[str, dict[str, str]] = {
     "fisheye": DISC | {"focal_px": "38"},
     "double_sphere": DISC
     | {"K": "[[40, 0, 79.5], [0, 40, 59.5], [0, 0, 1]]", "double_sphere": "{xi: -0.2, alpha: 0.6}"},
+    "kannala_brandt": DISC | {"K": "[[38, 0, 79.5], [0, 38, 59.5], [0, 0, 1]]", "D": "[-0.01, 0.004, -0.003, 0.0006]"},
+    "unified": DISC
+    | {"K": "[[60, 0, 79.5], [0, 60, 59.5], [0, 0, 1]]", "xi": "0.9", "D": "[-0.1, 0.02, 0, 0]", "looks": "down"},
     "ocamcalib": DISC
     | {"centre": "{x: 79.5, y: 59.5}", "ocamcalib": "{polynomial: [-40, 0, 0.008], c: 1, d: 0, e: 0, looks: down}"},
     "dual_fisheye": STRIP

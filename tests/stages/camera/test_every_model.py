@@ -15,17 +15,19 @@ from omninav.stages.camera.dual_fisheye import DualFisheye
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.kannala_brandt import KannalaBrandt
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.ocamcalib import OCamCalib
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.camera.unified import Unified
 from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
 
 CAMERAS: list[Camera] = [
     Cylindrical(720, 150, 360.0, elevation_top=0.5, elevation_bottom=-0.4),
     Cylindrical(120, 25, 60.0),
     Donut(640, 480, 320.0, 240.0, 40.0, 200.0, "counter_clockwise", yaw=0.1),
-    DoubleSphere(640, 480, 110.0, 108.0, 318.0, 241.0, -0.2, 0.59, 230.0, yaw=0.4),
+    DoubleSphere(640, 480, 110.0, 108.0, 318.0, 241.0, -0.2, 0.59, outer_radius_px=230.0, yaw=0.4),
     DualFisheye.of_size(640, 320),
     DualFisheye(640, 320, 96.0, 158.0, 161.0, 482.0, 159.0, 156.0, 0.4, -2.0, yaw=0.7),
     Equirectangular(720, 150, 360.0, elevation_top=0.7, elevation_bottom=-0.6),
@@ -33,12 +35,16 @@ CAMERAS: list[Camera] = [
     Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, yaw=-0.7),
     Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, 5.0, "counter_clockwise", yaw=0.2),
     HyperbolicMirror(640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, 0.4, height=0.9, yaw=0.3),
+    KannalaBrandt(640, 480, 140.0, 138.0, 318.0, 241.0, (-0.012, 0.004, -0.003, 0.0006), yaw=0.4),
+    KannalaBrandt(640, 480, 210.0, 208.0, 318.0, 241.0, (0.02, -0.03, 0.001, 0.0), yaw=-0.2),
     OCamCalib(640, 480, (-170.0, 0.0, 1.4e-3, -2.0e-6, 9.0e-9), 241.0, 318.0, 230.0, 5.0, 0.9991, -3e-4, 2e-4),
     OCamCalib(640, 480, (-140.0, 0.0, 4.0e-3), 239.5, 319.5, 236.0, 34.0, looks="down", yaw=0.3),
     Perspective(640, 480, 500.0, 480.0, 320.0, 240.0, 0.3, yaw=0.5),
+    Unified(640, 480, 290.0, 288.0, 318.0, 241.0, 0.9, (-0.25, 0.05, 1e-3, -6e-4), yaw=0.1),
+    Unified(640, 480, 480.0, 478.0, 318.0, 241.0, 2.2134, (0.0168, 1.65, 4e-4, 4e-4), looks="down"),
 ]
 SPHERES: list[Camera] = [
-    DoubleSphere(640, 480, 160.0, 158.0, 318.0, 241.0, xi, alpha, 230.0)
+    DoubleSphere(640, 480, 160.0, 158.0, 318.0, 241.0, xi, alpha, outer_radius_px=230.0)
     for xi in (-0.3, 0.0, 0.4)
     for alpha in (0.0, 0.3, 0.5, 0.62)
 ]

@@ -15,7 +15,7 @@ from omninav.stages.recordings.camera_yaml import parse_camera
 def test_all_models_of_the_folder_are_found_by_their_names_in_camera_yaml() -> None:
     found = camera_models()
     assert {"hyperbolic", "donut", "cylindrical", "equirectangular", "fisheye", "perspective"} <= set(found)
-    assert {"double_sphere", "ocamcalib"} <= set(found)
+    assert {"double_sphere", "kannala_brandt", "ocamcalib", "unified"} <= set(found)
     assert all(model.projection == name for name, model in found.items())
 
 

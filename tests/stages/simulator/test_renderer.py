@@ -85,7 +85,7 @@ CAMERAS = [
     CYLINDER,
     Equirectangular(720, 180, 360.0, elevation_top=0.7, elevation_bottom=-0.85),
     Perspective(320, 240, 277.0, 277.0, 159.5, 119.5),
-    DoubleSphere(320, 240, 55.0, 55.0, 159.5, 119.5, -0.2, 0.59, 119.0, yaw=0.3),
+    DoubleSphere(320, 240, 55.0, 55.0, 159.5, 119.5, -0.2, 0.59, outer_radius_px=119.0, yaw=0.3),
 ]
 
 

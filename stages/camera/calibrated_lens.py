@@ -1,0 +1,69 @@
+"""A calibrated lens or mirror: a projection of directions to a plane, then the matrix K."""
+
+from abc import abstractmethod
+from dataclasses import KW_ONLY
+from typing import Literal
+
+import numpy as np
+
+from omninav.stages.geometry.arrays import Array, Bools
+
+from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring
+from .rays import normalised, turned
+
+
+class CalibratedLens(Camera):
+    """A camera whose optical axis is the robot's z; a subclass says how its lens or mirror projects.
+
+    u runs along the camera's x and v along its y, so a pixel's bearing is atan2(v - cy, u - cx) + yaw.
+    """
+
+    focal_x: FocalX
+    """Pixels; with the next three the matrix K."""
+    focal_y: FocalY
+    centre_x: CentreX
+    centre_y: CentreY
+    _: KW_ONLY
+    outer_radius_px: OuterRadius | None = None
+    """The image is used out to here; if left out, as far as it and the model go all around the axis."""
+    inner_radius_px: InnerRadius = 0.0
+    looks: Literal["up", "down"] = "up"
+    """Direction of the image's centre: up through a lens, or down by way of a mirror above the camera."""
+
+    def __post_init__(self) -> None:
+        if self.outer_radius_px is None:
+            x, y = self.centre_x, self.centre_y
+            radii = np.arange(1.0, max(2.0, min(x, self.width - 1 - x, y, self.height_px - 1 - y) + 1.0))
+            known = self.unproject(np.stack([x + radii, np.full_like(radii, y)], axis=-1))[1]
+            object.__setattr__(self, "outer_radius_px", float(radii[known].max(initial=1.0)))
+        super().__post_init__()
+
+    @abstractmethod
+    def onto_plane(self, rays: Array) -> Array:
+        """Points (..., 2) of the plane that unit rays (..., 3) meet; NaN where they do not. z is the image's centre."""
+
+    @abstractmethod
+    def from_plane(self, points: Array) -> Array:
+        """The inverse of `onto_plane`: rays (..., 3) of points (..., 2); NaN where there are none."""
+
+    @property
+    def ring(self) -> Ring:
+        """Pixels between the two radii around the principal point."""
+        return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px or 1.0)
+
+    def project(self, rays: Array) -> tuple[Array, Bools]:
+        """p = K m, of the point m of the plane."""
+        points = self.onto_plane(normalised(turned(rays, -self.yaw)) * self._upward)
+        with np.errstate(over="ignore"):
+            pixels = points * [self.focal_x, self.focal_y] + [self.centre_x, self.centre_y]
+        return pixels, self.shows(pixels)
+
+    def unproject(self, pixels: Array) -> tuple[Array, Bools]:
+        """The ray of m = K^-1 p."""
+        points = (pixels - [self.centre_x, self.centre_y]) / [self.focal_x, self.focal_y]
+        rays = turned(normalised(self.from_plane(points)) * self._upward, self.yaw)
+        return rays, np.asarray(np.isfinite(rays).all(axis=-1))
+
+    @property
+    def _upward(self) -> Array:
+        return np.array([1.0, 1.0, 1.0 if self.looks == "up" else -1.0])

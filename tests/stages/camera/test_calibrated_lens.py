@@ -1,0 +1,68 @@
+"""Calibrated lenses against OpenCV, against numbers worked by hand, and at the limits of their models."""
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.stages.camera.kannala_brandt import KannalaBrandt
+from omninav.stages.camera.model import require_sight
+from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.camera.unified import Unified
+from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
+
+BENT = (-0.012, 0.004, -0.003, 0.0006)
+
+
+def test_a_fisheye_projects_as_opencv_does() -> None:
+    camera = KannalaBrandt(1280, 960, 350.0, 348.0, 640.0, 480.0, BENT)
+    rays = unit_vectors(np.linspace(-3.0, 3.0, 500), np.linspace(0.05, 1.57, 500))
+    k = np.array([[350.0, 0.0, 640.0], [0.0, 348.0, 480.0], [0.0, 0.0, 1.0]])
+    expected, _ = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), k, np.array(BENT))
+    np.testing.assert_allclose(camera.project(rays)[0], expected[:, 0], atol=1e-9)
+
+
+def test_the_unified_model_worked_by_hand() -> None:
+    # (3, 0, 4) / 5 from 0.5 behind the centre: x = 0.6 / 1.3, and k1, k2, p1, p2 distort it.
+    camera = Unified(640, 480, 200.0, 100.0, 320.0, 240.0, 0.5, (-0.1, 0.02, 0.001, 0.002), outer_radius_px=200.0)
+    square = (0.6 / 1.3) ** 2
+    x = 0.6 / 1.3 * (1.0 - 0.1 * square + 0.02 * square**2) + 0.002 * 3.0 * square
+    expected = (320.0 + 200.0 * x, 240.0 + 100.0 * 0.001 * square)
+    assert camera.project(np.array([3.0, 0.0, 4.0]))[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_mirror_above_the_camera_shows_the_floor_in_the_middle_and_bearings_as_a_lens_does() -> None:
+    lens, mirror = (
+        Unified(640, 480, 290.0, 290.0, 320.0, 240.0, 0.9, (-0.1, 0.0, 0.0, 0.0), looks=looks, yaw=0.3)
+        for looks in ("up", "down")
+    )
+    pixels = np.array([[420.0, 300.0], [250.0, 130.0]])
+    up, down = (camera.unproject(pixels)[0] for camera in (lens, mirror))
+    np.testing.assert_allclose(up * [1, 1, -1], down, atol=1e-12)
+    assert (down[:, 2] < 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        KannalaBrandt(640, 480, 150.0, 150.0, 320.0, 240.0, (-0.2, 0.0, 0.0, 0.0)),  # grows up to 1.29 rad alone
+        Unified(640, 480, 300.0, 300.0, 320.0, 240.0, 0.8, (-0.5, 0.0, 0.0, 0.0)),
+    ],
+    ids=lambda camera: camera.projection,
+)
+def test_what_lies_beyond_the_model_is_not_shown_and_the_mask_ends_there(camera) -> None:
+    top, bottom = camera.elevations
+    assert top == pytest.approx(np.pi / 2)
+    assert 0.1 < bottom < 0.9
+    require_sight(camera)
+    assert not camera.project(unit_vectors(0.3, bottom - 0.1))[1]
+    assert "outer_radius_px" in write_camera(camera)  # what was found stands in the file
+    assert not camera.unproject(np.array([camera.centre_x + camera.outer_radius_px + 15.0, camera.centre_y]))[1]
+
+
+def test_a_wrong_number_of_coefficients_is_refused() -> None:
+    for camera in (KannalaBrandt(640, 480, 150.0, 150.0, 320.0, 240.0, BENT),
+                   Unified(640, 480, 300.0, 300.0, 320.0, 240.0, 0.8, BENT)):  # fmt: skip
+        text = write_camera(camera)
+        assert write_camera(parse_camera(text, "camera.yaml")) == text
+        with pytest.raises(Exception, match="'D' has 3 numbers, expected 4"):
+            parse_camera(text.replace("- 0.0006\n", ""), "camera.yaml")
