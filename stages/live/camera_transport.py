@@ -30,7 +30,7 @@ class CameraTransport(Transport):
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._look, name="camera", daemon=True)
 
-    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
         """Look from now on, where the topic is that of the images."""
         if topic == TOPIC and not self._thread.is_alive():
             self._thread.start()

@@ -53,14 +53,14 @@ class DdsTransport(Transport):
         self._thread = threading.Thread(target=self._receive, name="dds", daemon=True)
         self._thread.start()
 
-    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
         from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
         from cyclonedds.qos import Policy, Qos
         from cyclonedds.sub import DataReader
 
         qos = Qos(
-            Policy.Reliability.BestEffort,
-            Policy.Durability.Volatile,
+            Policy.Reliability.Reliable(0) if latched else Policy.Reliability.BestEffort,
+            Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
             Policy.History.KeepLast(NEWEST_DEPTH if newest else DEPTH),
         )
         with self._lock:

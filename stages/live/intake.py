@@ -3,22 +3,24 @@
 import time
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import header_stamp, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import camera_from_info
 from omninav.stages.recordings.live_record import Frame, LiveHeader, OdometryBuffer, Role
-from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, is_blank, pixels_of
+from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, is_blank, pixels_of
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.plausibility import EXCURSION_S
+from omninav.stages.recordings.static_transforms import TF_STATIC, Mounted, StaticTransforms
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .status import LiveStatus
-from .transport import Arrival, Transport
+from .transport import Arrival, Transport, TransportError
 
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 EMPTY = "std_msgs/msg/Empty"
@@ -40,7 +42,7 @@ WITHOUT = {
     "scan": "topics.scan=null (a robot without a range finder)",
 }
 """Words to type for a robot without the sensor."""
-SHARED = ("tf2_msgs/msg/TFMessage", "diagnostic_msgs/msg/DiagnosticArray")
+SHARED = (TRANSFORMS_TYPE, "diagnostic_msgs/msg/DiagnosticArray")
 """Types of topics that many nodes publish together."""
 SILENT_S = 1.0
 """A topic that has been heard and says nothing for so long is a trouble."""
@@ -87,6 +89,10 @@ class Intake:
         self._images: list[_Pending] = []
         self._earlier: int | None = None
         self._without_scan = False
+        self.mounted: Mounted | None = None
+        """The camera of the first tick, with what static transforms say of it."""
+        self._fixed, self._base, self._info_frame = StaticTransforms(), "", ""
+        self._by_info = self.camera is None
         self._since = time.monotonic()
         self._received: dict[str, float] = {}
         self._used_any = self.last_stamp is not None
@@ -99,6 +105,9 @@ class Intake:
             self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
         if self.camera is None and self.camera_info is not None:
             self.transport.subscribe(self.camera_info, CAMERA_INFO, newest=True)
+        if self._wants_transforms():
+            with suppress(TransportError):  # an installation without that type has no such transforms either
+                self.transport.subscribe(TF_STATIC, TRANSFORMS_TYPE, latched=True)
 
     def next(self, wait_s: float) -> Taken | None:
         """The newest image that can be used, of all that has come; None where none can within that time."""
@@ -207,11 +216,16 @@ class Intake:
                 self._images.append(_Pending(stamp - delay, time.monotonic(), arrival))
             return
         try:
-            message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+            message: Any = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+            if arrival.topic == TF_STATIC:
+                return self._fixed.add(message)
             if role is None:
                 if self.camera is None:
                     self.camera = camera_from_info(message, str(arrival.topic))
+                    self._info_frame = message.header.frame_id
                 return
+            if role == "odometry":
+                self._base = message.child_frame_id
             header = getattr(message, "header", None)
             stamp = arrival.received if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
             items = self.drive.add(role, stamp, message, arrival)
@@ -224,10 +238,10 @@ class Intake:
 
     def _newest(self) -> Taken | None:
         """Of the images that odometry has reached, the newest sound one; older ones are overtaken by it."""
-        if self.camera is None:
+        track, now = self.drive.odometry, time.monotonic()
+        if self.camera is None or self._awaits_transforms(now):
             self._images.clear()
             return None
-        track, now = self.drive.odometry, time.monotonic()
         reached = [one for one in self._images if track is None or (track.last is not None and one.stamp <= track.last)]
         for one in sorted(reached, key=lambda one: one.stamp, reverse=True):
             if self._awaits_truth(one, now):
@@ -254,6 +268,15 @@ class Intake:
         speaks = now - self._received.get(topic, -1e9) < self.patience_s
         return speaks and truth.last is not None and truth.last < image.stamp
 
+    def _wants_transforms(self) -> bool:
+        """Whether static transforms may say where the camera sits: until the first tick, if its file does not."""
+        told = isinstance(self.camera, Camera) and self.camera.position_x is not None
+        return not self._used_any and not told
+
+    def _awaits_transforms(self, now: float) -> bool:
+        waits = TF_STATIC not in self._received and now - self._since <= self.patience_s
+        return waits and self._wants_transforms() and TF_STATIC in self.transport.offered()
+
     def _use(self, image: _Pending, camera: Camera | str) -> Taken | None:
         where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
         if image.stamp == self.last_stamp:
@@ -263,7 +286,7 @@ class Intake:
             self._drop("backward_stamp", f"{where} comes after one of {(self.last_stamp or 0) / 1e9:.3f} s")
             return None
         try:
-            message = standard_types().deserialize_cdr(image.arrival.data, image.arrival.msgtype)
+            message: Any = standard_types().deserialize_cdr(image.arrival.data, image.arrival.msgtype)
             pixels = pixels_of(message)
         except Undecodable as error:
             self._drop("undecodable_image", f"{where}: {error}")
@@ -287,6 +310,10 @@ class Intake:
         if whole is None:
             self._drop("no_ring_in_image", f"{where} shows no mirror's ring; give centre and mask in camera.yaml")
             return None
+        if not self._used_any:
+            own = self._info_frame or message.header.frame_id
+            self.mounted = self._fixed.mounted(whole, self._base, own, self._by_info)
+            whole = self.mounted.camera
         self.camera = whole
         made = self.drive.frame(image.stamp)
         if made is None:

@@ -14,7 +14,7 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera
+from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, LiveRecording, OdometryBuffer, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
@@ -171,8 +171,12 @@ class LiveSource(Source):
             taken = self._intake.next(0.1)
             self._watch(ctx, self._intake)
             if taken is not None:
-                if self._camera is None and not position.ticks:
-                    ctx.warn(f"assumed: {self.topics.camera_info}: {UNSAID_BY_INFO}")
+                if self._intake.mounted is not None and not position.ticks:
+                    said, unsaid = self._intake.mounted.said, self._intake.mounted.unsaid(self._camera is None)
+                    if said:
+                        ctx.fact("camera_mounted", said)
+                    if unsaid:
+                        ctx.warn(f"assumed: {self.topics.camera_info}: {unsaid}")
                 self._write(self._intake, taken.arrivals)
                 assert isinstance(self._intake.camera, Camera)
                 return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)

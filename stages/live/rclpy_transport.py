@@ -49,11 +49,15 @@ class RclpyTransport(Transport):
         self._thread = threading.Thread(target=spin, name="rclpy", daemon=True)
         self._thread.start()
 
-    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
         from rclpy.event_handler import SubscriptionEventCallbacks
-        from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+        from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
-        qos = QoSProfile(depth=NEWEST_DEPTH if newest else DEPTH, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+        qos = QoSProfile(
+            depth=NEWEST_DEPTH if newest else DEPTH,
+            reliability=QoSReliabilityPolicy.RELIABLE if latched else QoSReliabilityPolicy.BEST_EFFORT,
+            durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
+        )
         self.inbox.open(topic, newest)
 
         def receive(data: bytes) -> None:

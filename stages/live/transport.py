@@ -80,10 +80,11 @@ class Transport(ABC):
         """What is still to be sent before the transport is closed."""
 
     @abstractmethod
-    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
         """Receive a topic from now on. `newest`: only its last message waits, and overtaken ones are counted.
+        `latched`: the last ones before, too (transient local).
 
-        Best effort and volatile, which every publisher's QoS fits. Raises `TransportError` for an unknown type.
+        Else best effort and volatile, which every publisher's QoS fits. Raises `TransportError` for an unknown type.
         """
 
     @abstractmethod

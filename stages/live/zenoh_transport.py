@@ -55,7 +55,9 @@ class ZenohTransport(Transport):
         self._held: list[Any] = [liveliness.declare_subscriber(f"@ros2_lv/{domain}/**", heard, history=True)]
         self._declare("NN")
 
-    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
+        from zenoh import ext
+
         self.inbox.open(topic, newest)
 
         def receive(sample: Any) -> None:
@@ -65,8 +67,9 @@ class ZenohTransport(Transport):
             key = (
                 f"{self._domain}{topic}/{_typed(msgtype).partition('/')[0]}/*"  # of whatever distribution, and so hash
             )
-            self._held.append(self._session.declare_subscriber(key, _directly(receive)))
-            self._declare("MS", topic, msgtype, VOLATILE)
+            history = ext.HistoryConfig(detect_late_publishers=True) if latched else None
+            self._held.append(ext.declare_advanced_subscriber(self._session, key, _directly(receive), history=history))
+            self._declare("MS", topic, msgtype, LATCHED if latched else VOLATILE)
 
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
         from zenoh import ext

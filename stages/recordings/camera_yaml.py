@@ -75,7 +75,8 @@ def camera_section(camera: Camera) -> dict[str, Any]:
 
 
 UNSAID_BY_INFO = (
-    "CameraInfo does not say where the camera sits: yaw and position are 0 (else give camera=PATH/camera.yaml)"
+    "neither CameraInfo nor /tf_static says where the camera sits: yaw and position are 0 "
+    "(else give camera=PATH/camera.yaml)"
 )
 """Sentence on a camera that a CameraInfo message alone describes."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,14 @@ from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
-from .camera_yaml import UNSAID_BY_INFO, camera_from_info, parse_camera, read_camera
+from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, poses_at, within
+from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order
 from .transforms import TransformTopic
 
@@ -41,18 +43,25 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         topics = replace(topics, truth=transforms.topic)
     wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
+    wanted.add(TF_STATIC)
     found: dict[str, list[Record]] = {topic: [] for topic in wanted}
     poses = {topic: PoseTopic(topic) for topic in (topics.odometry, topics.truth) if topic}
     infos: list[Any] = []
+    fixed, base = StaticTransforms(), ""
     if transforms is not None:
         poses[transforms.topic] = transforms
     for record in feed.scan(wanted):
         try:
             if transforms is not None and record.topic == transforms.topic:
-                _add_transforms(feed, name, transforms, record)
+                _add_transforms(feed, name, partial(transforms.add_message, record), record)
                 continue
             if record.topic in poses:
-                poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name))
+                message = feed.decode(record.topic, record.data)
+                base = base or getattr(message, "child_frame_id", "")
+                poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name, message))
+                continue
+            if record.topic == TF_STATIC:
+                _add_transforms(feed, name, fixed.add, record)
                 continue
             if record.topic == topics.camera_info:
                 if not infos:
@@ -78,6 +87,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     timed = [] if track is None else np.flatnonzero(within(stamps, track.stamps)).tolist()
     width, height = _first_size(name, timed or range(len(frames)), fetch_image)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
+    by_info = options.camera is None and "camera.yaml" not in feed.attachments and not camera_files
+    mounted = fixed.mounted(view, base, _camera_frame(feed, frames[0], infos) if fixed else "", by_info)
+    view = mounted.camera
     if (width, height) != (view.width, view.height_px):
         hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
         raise UnreadableRecording(
@@ -106,8 +118,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         scans=_scans(name, feed, topics.scan, found),
     )
     told = set_back(found[image_topic]) if len(files) == 1 else ""
-    by_info = options.camera is None and "camera.yaml" not in feed.attachments and not camera_files
-    unsaid = UNSAID_BY_INFO if by_info else ""
+    unsaid = mounted.unsaid(by_info)
+    recording.mounted = mounted.said
     recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)
     return recording
 
@@ -144,17 +156,25 @@ def _camera(
     )
 
 
-def _add_transforms(feed: Feed, name: str, transforms: TransformTopic, record: Record) -> None:
-    if feed.topics.get(record.topic) != TRANSFORMS_TYPE:
-        return  # said once the log has been gone through
+def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
+    """The camera's frame, by its CameraInfo or an image; empty where neither can be read."""
     try:
-        transforms.add_message(record, feed.decode(record.topic, record.data))
+        message = infos[0] if infos else feed.decode(image.topic, feed.fetch(image.location))
+        return str(message.header.frame_id)
+    except BadMessage:
+        return ""
+
+
+def _add_transforms(feed: Feed, name: str, add: Callable[[Any], None], record: Record) -> None:
+    if feed.topics.get(record.topic) != TRANSFORMS_TYPE:
+        return  # where it is needed, that is said once the log has been gone through
+    try:
+        add(feed.decode(record.topic, record.data))
     except ValueError as error:
         feed.drop("bad_message", f"{name}: a message on {record.topic}: {error}")
 
 
-def _pose(feed: Feed, record: Record, name: str) -> tuple[float, float, float]:
-    message = feed.decode(record.topic, record.data)
+def _pose(feed: Feed, record: Record, name: str, message: Any) -> tuple[float, float, float]:
     try:
         return pose_of(message)
     except AttributeError:

@@ -13,6 +13,7 @@ from omninav.stages.recordings.image_folder import ImageFolder
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
+from omninav.stages.recordings.topic_recording import TopicRecording
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import AssumedPose, Motion, Pose
 
@@ -61,6 +62,9 @@ class LogSource(Playback):
         turned = sum(recording.turned for recording in self._opened if isinstance(recording, ImageFolder))
         if turned:
             ctx.fact("turned_images", f"{turned}, as their EXIF orientation says")
+        mounted = {recording.mounted: None for recording in self._opened if isinstance(recording, TopicRecording)}
+        if any(mounted):
+            ctx.fact("camera_mounted", "; ".join(filter(None, mounted)))
 
     def check(self, ctx: Context) -> None:
         """Refuse a variant that needs odometry over a log that has none, where no speed is stated."""

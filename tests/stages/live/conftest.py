@@ -58,7 +58,7 @@ class Wire(Transport):
         self.sent: list[tuple[str, Any]] = []
         self.there: dict[str, str] = {}
 
-    def subscribe(self, topic, msgtype, newest=False):
+    def subscribe(self, topic, msgtype, newest=False, latched=False):
         self.inbox.open(topic, newest)
 
     def publish(self, topic, msgtype, data, latched=False):

@@ -1,6 +1,7 @@
 """The live source over a transport of the test's own."""
 
 import functools
+import math
 import os
 import resource
 import time
@@ -346,6 +347,26 @@ def test_the_yaw_that_a_camera_info_does_not_say_is_said_to_be_assumed(wire: Wir
     assert drive.ctx.warnings == [f"assumed: /camera/camera_info: {UNSAID_BY_INFO}"]
 
 
+def test_static_transforms_say_where_the_camera_sits_and_the_record_keeps_it(wire: Wire, tmp_path: Path):
+    kind = "tf2_msgs/msg/TFMessage"
+    at = {"translation": {"x": 0.2, "y": -0.1, "z": 0.9}, "rotation": {"z": math.sqrt(0.5), "w": math.sqrt(0.5)}}
+    fixed = {"header": {"frame_id": "base_link"}, "child_frame_id": "omni_camera", "transform": at}
+    told = Arrival("/tf_static", kind, 0, encode(kind, {"transforms": [fixed]}))
+    drive = Drive(tmp_path, camera=None)
+    assert drive.intake.camera is None
+    wire.there["/tf_static"] = kind  # it is waited for
+    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    drive.feed(wire, said()[:60])
+    assert not drive.outs
+    wire.inbox.put(told)
+    drive.feed(wire, said()[60:])
+    assert drive.outs[0].camera.mount == pytest.approx([0.2, -0.1, math.pi / 2])
+    assert not drive.ctx.warnings
+    assert "by /tf_static" in drive.ctx.facts["camera_mounted"]
+    drive.end()
+    assert replayed(tmp_path / "live.mcap")[0].camera.mount == pytest.approx([0.2, -0.1, math.pi / 2])
+
+
 def test_a_record_on_a_full_disk_names_its_file(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -365,7 +386,7 @@ def test_topics_without_a_slash_are_those_that_ros_makes_of_them(wire: Wire, tmp
     intake = source._join(LiveSourceState())
     topics = {IMAGE, ODOMETRY, TRUTH, "/scan", "/initialpose", "/goal_pose", "/again"}
     assert intake.header.topics.keys() == topics
-    assert wire.inbox._arrivals.keys() == topics | {"/camera/camera_info"}
+    assert wire.inbox._arrivals.keys() == topics | {"/camera/camera_info", "/tf_static"}
     send(wire, "pose", POSE, encode(POSE, {}))
     assert [topic for topic, _ in wire.sent] == ["/pose"]
 

@@ -71,6 +71,21 @@ def test_messages_pass_both_ways_between_dds_and_rclpy(reach: None, other_end: O
     assert str(decode(POSE, other_end.hear("/amcl_pose"))) == str(decode(POSE, pose))
 
 
+def test_what_was_said_before_is_heard_where_it_is_asked_for(other_end: OtherEnd):
+    transport = connect("dds")
+    said = encode(POSE, {"pose": {"pose": {"position": {"x": 3.0}}}}, 5)
+    for topic in ("/lasting", "/passing"):
+        other_end.order("advertise", topic, type=POSE, durability="TRANSIENT_LOCAL")
+        other_end.publish(topic, said)
+    until(lambda: {"/lasting", "/passing"} <= transport.offered().keys())
+    transport.subscribe("/passing", POSE)
+    transport.subscribe("/lasting", POSE, latched=True)
+    got = transport.take(10.0)
+    assert got is not None
+    assert (got.topic, str(decode(POSE, got.data))) == ("/lasting", str(decode(POSE, said)))
+    assert transport.take(0.2) is None
+
+
 def test_a_qos_that_does_not_fit_is_named(other_end: OtherEnd):
     transport = connect("dds")
     transport.publish("/pose", POSE, encode(POSE, {}, 1))

@@ -23,7 +23,8 @@ STRING = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a1
 def test_messages_pass_both_ways_between_two_processes(router: object):
     transport = connect("zenoh", 3)
     transport.subscribe("/odom", ODOMETRY)
-    transport.publish("/pose", POSE, encode(POSE, {}, 1), latched=True)
+    pose = encode(POSE, {}, 1)
+    transport.publish("/pose", POSE, pose, latched=True)
     script = str(Path(__file__).parent / "zenoh_robot.py")
     robot = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
     try:
@@ -34,7 +35,7 @@ def test_messages_pass_both_ways_between_two_processes(router: object):
         twist = encode(TWIST, {"linear": {"x": 0.25}})
         until(lambda: transport.publish("/cmd_vel", TWIST, twist) or robot.poll() is not None)
         assert robot.stdout is not None
-        assert robot.stdout.read().split() == ["/cmd_vel", TWIST, twist.hex(), POSE]
+        assert robot.stdout.read().split() == ["/cmd_vel", TWIST, twist.hex(), POSE, pose.hex()]
     finally:
         robot.kill()
         robot.wait()

@@ -1,5 +1,6 @@
 """Recordings out of ROS topics: what is read, and what becomes of each kind of damage."""
 
+import math
 import os
 import random
 import sqlite3
@@ -107,6 +108,70 @@ def test_a_camera_that_a_message_alone_describes_has_a_yaw_that_is_assumed(tmp_p
     recording = open_recording(str(path), topics=Topics(camera_info="/camera_info"))
     assert (recording.camera.yaw, whole.assumed) == (0.0, ())
     assert recording.assumed == (f"{path}: {UNSAID_BY_INFO}",)
+
+
+def in_frame(parent: str, child: str, x: float, y: float, z: float, *quaternion: float) -> dict:
+    translation, rotation = dict(zip("xyz", (x, y, z), strict=True)), dict(zip("xyzw", quaternion, strict=True))
+    header, transform = {"frame_id": parent}, {"translation": translation, "rotation": rotation}
+    return {"header": header, "child_frame_id": child, "transform": transform}
+
+
+def fixed_frames(*links: dict) -> Made:
+    content = make_message("tf2_msgs/msg/TFMessage", {"transforms": links})
+    return Made("/tf_static", "tf2_msgs/msg/TFMessage", 0, START, content)
+
+
+def fisheye_info(frame: str) -> Made:
+    height, width = picture(0).shape[:2]
+    k = [12.0, 0.0, width / 2, 0.0, 12.0, height / 2, 0.0, 0.0, 1.0]
+    fields = {"header": {"frame_id": frame}, "width": width, "height": height, "k": k, "d": [-0.01, 0.0, 0.0, 0.0]}
+    fields["distortion_model"] = "equidistant"
+    kind = "sensor_msgs/msg/CameraInfo"
+    return Made("/camera/camera_info", kind, START, START, make_message(kind, fields, START))
+
+
+HALF = math.sqrt(0.5)
+UP = in_frame("plate", "eye", 0.1, 0.0, 0.5, 0.0, 0.0, HALF, HALF)
+"""A lens that looks up, a quarter turn counter-clockwise."""
+PLATE = in_frame("base_link", "plate", 0.2, -0.05, 0.3, 0.0, 0.0, 0.0, 1.0)
+FLOOR = in_frame("base_footprint", "base_link", 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0)
+
+
+def test_static_transforms_say_where_a_camera_sits_that_a_message_describes(tmp_path: Path) -> None:
+    made = chain([fisheye_info("eye"), fixed_frames(PLATE, FLOOR), fixed_frames(UP)], messages())
+    log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
+    assert log.camera.projection == "kannala_brandt"
+    assert log.camera.mount == pytest.approx([0.3, -0.05, math.pi / 2])
+    assert log.camera.height == pytest.approx(0.9)
+    assert log.assumed == ()
+    assert "x 0.300, y -0.050 m in base_link, by /tf_static, turned by 90.0 degrees" in log.mounted
+
+
+def test_a_lens_that_looks_ahead_is_doubted_and_loops_and_unknown_frames_say_nothing(tmp_path: Path) -> None:
+    ahead = in_frame("plate", "eye", 0.1, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5)
+    loop = in_frame("plate", "base_link", 0.2, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0)
+    for links, x, words in (
+        ((PLATE, ahead), 0.3, "its axis 90 degrees off the vertical"),
+        ((PLATE, loop), None, "neither CameraInfo nor /tf_static"),
+        ((UP,), None, "neither CameraInfo nor /tf_static"),
+        ((PLATE, in_frame("plate", "eye", 100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), None, "neither CameraInfo nor"),
+    ):
+        made = chain([fisheye_info("eye"), fixed_frames(*links)], messages())
+        log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
+        assert (log.camera.position_x, log.camera.yaw) == (x, 0.0)
+        assert words in log.assumed[0]
+    made = chain(
+        [fisheye_info("eye"), fixed_frames(in_frame("base_link", "eye", math.nan, 0, 0, 0, 0, 0, 1))], messages()
+    )
+    assert open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None))).dropped["bad_message"] == 1
+
+
+def test_a_camera_yaml_that_says_no_position_has_that_of_the_transforms_and_keeps_its_yaw(tmp_path: Path) -> None:
+    made = chain([fisheye_info("eye"), fixed_frames(PLATE, UP)], messages())
+    path = write_mcap(tmp_path / "log.mcap", made)
+    assert open_recording(str(path)).camera.mount == pytest.approx([0.3, -0.05, 0.0])
+    (tmp_path / "own.yaml").write_bytes(CAMERA + b"position: {x: 0.0, y: 0.0}\n")
+    assert open_recording(str(path), camera=str(tmp_path / "own.yaml")).camera.mount == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_a_bad_chunk_costs_its_images_and_no_others(tmp_path: Path) -> None:

@@ -1,0 +1,110 @@
+"""Where `/tf_static` says that a camera sits on its robot."""
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from omninav.stages.camera.model import FAR_M, Camera
+from omninav.stages.geometry.arrays import Array
+
+from .camera_yaml import UNSAID_BY_INFO
+from .messages import ImpossiblePose, pose_of
+
+TF_STATIC = "/tf_static"
+BASES = ("base_link", "base_footprint")
+"""Frames of a robot where odometry names none."""
+FLOOR = "base_footprint"
+"""Frame of a robot on its floor."""
+MAX_LINKS = 100
+"""Largest number of transforms between a frame and the root of its tree."""
+MAX_FRAMES = 10_000
+"""Largest number of frames that are kept."""
+LEVEL = math.cos(math.radians(20.0))
+"""Cosine of the largest angle between a camera's axis and the vertical, or the horizontal for one that looks ahead."""
+
+
+class Mounted(NamedTuple):
+    """A `camera` with what transforms say of it; `said` in words, empty where they say nothing of it; a `doubt`."""
+
+    camera: Camera
+    said: str = ""
+    doubt: str = ""
+
+    def unsaid(self, by_info: bool) -> str:
+        """What to say of a camera that perhaps a CameraInfo alone describes; empty where all is known."""
+        return self.doubt or (UNSAID_BY_INFO if by_info and not self.said else "")
+
+
+class StaticTransforms:
+    """The last static transform of each frame into its parent."""
+
+    def __init__(self) -> None:
+        self._links: dict[str, tuple[str, Array]] = {}
+
+    def __len__(self) -> int:
+        return len(self._links)
+
+    def add(self, message: Any) -> None:
+        """All transforms of a TFMessage. Raises ValueError for one that cannot be, as `pose_of`."""
+        for each in message.transforms:
+            pose_of(each)
+            at, turn = each.transform.translation, each.transform.rotation
+            if not math.isfinite(at.z) or abs(at.z) > FAR_M * 1e3:
+                raise ImpossiblePose(f"{at.z:.1e} m above its parent")
+            link = np.eye(4)
+            link[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+            link[:3, 3] = at.x, at.y, at.z
+            child = each.child_frame_id.strip("/")
+            if child in self._links or len(self._links) < MAX_FRAMES:
+                self._links[child] = each.header.frame_id.strip("/"), link
+
+    def between(self, base: str, frame: str) -> Array | None:
+        """The pose (4, 4) of a frame in another one; None where no transforms join them."""
+        (root, to_base), (other, to_frame) = self._to_root(base), self._to_root(frame)
+        if not base or not frame or root != other:
+            return None
+        return np.linalg.inv(to_base) @ to_frame
+
+    def _to_root(self, frame: str) -> tuple[str, Array]:
+        pose = np.eye(4)
+        for _ in range(MAX_LINKS):
+            if frame not in self._links:
+                break
+            frame, link = self._links[frame]
+            pose = link @ pose
+        return frame, pose
+
+    def mounted(self, camera: Camera, base: str, frame: str, by_info: bool) -> Mounted:
+        """The camera with its position on the robot where it has none and, where a CameraInfo alone describes it
+        (`by_info`), its yaw and its height over `base_footprint`.
+
+        `base`: the robot's frame as odometry names it. `frame`: the camera's, by REP 103 with x to the right in the
+        image, y down and z along the optical axis.
+        """
+        frame = frame.strip("/")
+        bases = [name for name in (base.strip("/"), *BASES) if self.between(name, frame) is not None]
+        if not bases or (not by_info and camera.position_x is not None):
+            return Mounted(camera)
+        pose = self.between(bases[0], frame)
+        assert pose is not None
+        if np.abs(pose[:2, 3]).max() > FAR_M:
+            return Mounted(camera)
+        x, y = (round(float(value), 6) + 0.0 for value in pose[:2, 3])
+        said = f"x {x:.3f}, y {y:.3f} m in {bases[0]}, by {TF_STATIC}"
+        camera = replace(camera, position_x=x, position_y=y)
+        if not by_info:
+            return Mounted(camera, said)
+        floor = self.between(FLOOR, frame)
+        if floor is not None and floor[2, 3] > 0.0:
+            camera = replace(camera, height=round(float(floor[2, 3]), 6))
+        up, ahead = pose[2, 2] > LEVEL, math.hypot(*pose[:2, 2]) > LEVEL
+        if not up and (camera.ring is not None or not ahead):
+            leans = math.degrees(math.acos(np.clip(pose[2, 2], -1.0, 1.0)))
+            doubt = f"{TF_STATIC} has its axis {leans:.0f} degrees off the vertical, expected one that looks up"
+            return Mounted(camera, said, f"{doubt}; yaw is 0 (else give camera=PATH/camera.yaml)")
+        axis = 0 if up else 2
+        yaw = round(math.atan2(pose[1, axis], pose[0, axis]), 6)
+        return Mounted(replace(camera, yaw=yaw), f"{said}, turned by {math.degrees(yaw):.1f} degrees")
