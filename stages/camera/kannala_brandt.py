@@ -37,13 +37,13 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
         """The direction around the axis, at the polynomial's radius."""
         aside = np.hypot(rays[..., 0], rays[..., 1])
         angle = np.arctan2(aside, rays[..., 2])
-        radius = np.where(angle <= self._largest_angle(), self._radius(angle), np.nan)
+        radius = np.where(angle <= self._max_angle(), self._radius(angle), np.nan)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(rays[..., :2] * np.where(aside > 0.0, radius / aside, 1.0)[..., None])
 
     def from_plane(self, points: Array) -> Array:
         """The angle whose radius this is: between tabled ones, then by Newton's method."""
-        largest, radius = self._largest_angle(), np.hypot(points[..., 0], points[..., 1])
+        largest, radius = self._max_angle(), np.hypot(points[..., 0], points[..., 1])
         angles = np.linspace(0.0, largest, STEPS)
         angle = np.interp(radius, self._radius(angles), angles, right=np.nan)
         derivative = self._radius.deriv()
@@ -58,7 +58,7 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
         k1, k2, k3, k4 = self.distortion
         return np.polynomial.Polynomial([0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4])
 
-    def _largest_angle(self) -> float:
+    def _max_angle(self) -> float:
         """The angle (rad) up to which the radius grows: beyond it, a pixel would show two rays."""
         turning = self._radius.deriv().roots()
         real = turning.real[(np.abs(turning.imag) < 1e-9) & (turning.real > 0.0)]

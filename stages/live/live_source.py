@@ -172,7 +172,7 @@ class LiveSource(Source):
             self._watch(ctx, self._intake)
             if taken is not None:
                 if self._intake.mounted is not None and not position.ticks:
-                    said, unsaid = self._intake.mounted.said, self._intake.mounted.unsaid(self._camera is None)
+                    said, unsaid = self._intake.mounted.in_words, self._intake.mounted.unsaid(self._camera is None)
                     if said:
                         ctx.fact("camera_mounted", said)
                     if unsaid:

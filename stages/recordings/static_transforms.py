@@ -27,22 +27,22 @@ LEVEL = math.cos(math.radians(20.0))
 
 
 class Mounted(NamedTuple):
-    """A `camera` with what transforms say of it; `said` in words, empty where they say nothing of it; a `doubt`."""
+    """A camera with what transforms say of it, also in words (empty: nothing), and a warning where that does not fit."""
 
     camera: Camera
-    said: str = ""
-    doubt: str = ""
+    in_words: str = ""
+    warning: str = ""
 
     def unsaid(self, by_info: bool) -> str:
-        """What to say of a camera that perhaps a CameraInfo alone describes; empty where all is known."""
-        return self.doubt or (UNSAID_BY_INFO if by_info and not self.said else "")
+        """The sentence on what is not known of a camera, which a CameraInfo alone may describe; empty where all is."""
+        return self.warning or (UNSAID_BY_INFO if by_info and not self.in_words else "")
 
 
 class StaticTransforms:
     """The last static transform of each frame into its parent."""
 
     def __init__(self) -> None:
-        self._links: dict[str, tuple[str, Array]] = {}
+        self._links: dict[str, tuple[str, list[float], list[float]]] = {}
 
     def __len__(self) -> int:
         return len(self._links)
@@ -54,12 +54,9 @@ class StaticTransforms:
             at, turn = each.transform.translation, each.transform.rotation
             if not math.isfinite(at.z) or abs(at.z) > FAR_M * 1e3:
                 raise ImpossiblePose(f"{at.z:.1e} m above its parent")
-            link = np.eye(4)
-            link[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
-            link[:3, 3] = at.x, at.y, at.z
-            child = each.child_frame_id.strip("/")
+            child, parent = (name.strip("/") for name in (each.child_frame_id, each.header.frame_id))
             if child in self._links or len(self._links) < MAX_FRAMES:
-                self._links[child] = each.header.frame_id.strip("/"), link
+                self._links[child] = parent, [at.x, at.y, at.z], [turn.x, turn.y, turn.z, turn.w]
 
     def between(self, base: str, frame: str) -> Array | None:
         """The pose (4, 4) of a frame in another one; None where no transforms join them."""
@@ -73,7 +70,9 @@ class StaticTransforms:
         for _ in range(MAX_LINKS):
             if frame not in self._links:
                 break
-            frame, link = self._links[frame]
+            frame, place, quaternion = self._links[frame]
+            link = np.eye(4)
+            link[:3, :3], link[:3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
             pose = link @ pose
         return frame, pose
 
@@ -93,18 +92,18 @@ class StaticTransforms:
         if np.abs(pose[:2, 3]).max() > FAR_M:
             return Mounted(camera)
         x, y = (round(float(value), 6) + 0.0 for value in pose[:2, 3])
-        said = f"x {x:.3f}, y {y:.3f} m in {bases[0]}, by {TF_STATIC}"
+        where = f"x {x:.3f}, y {y:.3f} m in {bases[0]}, by {TF_STATIC}"
         camera = replace(camera, position_x=x, position_y=y)
         if not by_info:
-            return Mounted(camera, said)
+            return Mounted(camera, where)
         floor = self.between(FLOOR, frame)
         if floor is not None and floor[2, 3] > 0.0:
             camera = replace(camera, height=round(float(floor[2, 3]), 6))
         up, ahead = pose[2, 2] > LEVEL, math.hypot(*pose[:2, 2]) > LEVEL
         if not up and (camera.ring is not None or not ahead):
             leans = math.degrees(math.acos(np.clip(pose[2, 2], -1.0, 1.0)))
-            doubt = f"{TF_STATIC} has its axis {leans:.0f} degrees off the vertical, expected one that looks up"
-            return Mounted(camera, said, f"{doubt}; yaw is 0 (else give camera=PATH/camera.yaml)")
+            leaning = f"{TF_STATIC} has its axis {leans:.0f} degrees off the vertical, expected one that looks up"
+            return Mounted(camera, where, f"{leaning}; yaw is 0 (else give camera=PATH/camera.yaml)")
         axis = 0 if up else 2
         yaw = round(math.atan2(pose[1, axis], pose[0, axis]), 6)
-        return Mounted(replace(camera, yaw=yaw), f"{said}, turned by {math.degrees(yaw):.1f} degrees")
+        return Mounted(replace(camera, yaw=yaw), f"{where}, turned by {math.degrees(yaw):.1f} degrees")

@@ -119,7 +119,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     )
     told = set_back(found[image_topic]) if len(files) == 1 else ""
     unsaid = mounted.unsaid(by_info)
-    recording.mounted = mounted.said
+    recording.mounted = mounted.in_words
     recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)
     return recording
 
