@@ -27,7 +27,7 @@ LEVEL = math.cos(math.radians(20.0))
 
 
 class Mounted(NamedTuple):
-    """A camera with what transforms say of it, also in words (empty: nothing), and a warning where that does not fit."""
+    """A camera, what transforms say of it in words (empty: nothing), and a warning where that does not fit."""
 
     camera: Camera
     in_words: str = ""
