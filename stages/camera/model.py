@@ -135,6 +135,11 @@ class Camera(Value, ABC):
         return np.array([self.position_x or 0.0, self.position_y or 0.0, self.yaw])
 
     @property
+    def placed(self) -> bool:
+        """Whether its description has a position on the robot."""
+        return self.position_x is not None or self.position_y is not None
+
+    @property
     def delay_ns(self) -> int:
         """The described delay of its images, ns."""
         return round((self.delay or 0.0) * 1e9)

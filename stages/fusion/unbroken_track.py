@@ -114,7 +114,9 @@ class UnbrokenTrack(Stage):
         left_out, surely = np.zeros(0 if fix is None else len(fix), np.bool_), False
         if features is not None:
             landmarks = None if map is None else map.landmarks
-            mount = np.zeros(3) if landmarks is None or camera is None else landmarks.mounted(camera.mount)
+            mount = np.zeros(3)
+            if landmarks is not None and camera is not None:
+                mount = landmarks.mounted(camera.mount, camera.placed)
             left_out, surely = self._judged(state, belief, features, fix, unit, mount)
         holds = state.against < state.confirmed
         if holds and belief.recovery_particles:

@@ -270,7 +270,7 @@ class Intake:
 
     def _wants_transforms(self) -> bool:
         """Whether static transforms may say where the camera sits: until the first tick, if its file does not."""
-        told = isinstance(self.camera, Camera) and self.camera.position_x is not None
+        told = isinstance(self.camera, Camera) and self.camera.placed
         return not self._used_any and not told
 
     def _awaits_transforms(self, now: float) -> bool:

@@ -85,7 +85,7 @@ class StaticTransforms:
         """
         frame = frame.strip("/")
         bases = [name for name in (base.strip("/"), *BASES) if self.between(name, frame) is not None]
-        if not bases or (not by_info and camera.position_x is not None):
+        if not bases or (not by_info and camera.placed):
             return Mounted(camera)
         pose = self.between(bases[0], frame)
         assert pose is not None

@@ -111,7 +111,7 @@ class LandmarkPose(Stage):
                 break
         if best is None or camera is None:
             return self.Out(fix=best)
-        mount, late = landmarks.mounted(camera.mount), landmarks.late_by(camera.delay or 0.0)
+        mount, late = landmarks.mounted(camera.mount, camera.placed), landmarks.late_by(camera.delay)
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
         if late and motion is not None and seconds > 0.0:

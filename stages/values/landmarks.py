@@ -54,16 +54,21 @@ class Landmarks(Value):
             return None
         return f"'words' are of descriptors of {other} numbers, those of the landmarks have {one}"
 
-    def mounted(self, described: Array) -> Array:
+    def mounted(self, described: Array, placed: bool) -> Array:
         """Pose (3,) on the robot of the frame that bearings are in, of a camera whose description puts it at (3,).
 
-        One that is described as the tour's was sits where the tour's images showed it.
+        One that is described as the tour's was sits where the tour's images showed it, and so does one of which no
+        position is described (`placed`).
         """
+        if not placed:
+            described = np.array([*self.described[:2], described[2]])
         x, y, yaw = self.mount if np.array_equal(described, self.described) else described
         return np.array([x, y, yaw - described[2]])
 
-    def late_by(self, described_s: float) -> float:
-        """Time (s) by which images are later than a description says that gives this delay, as `mounted`."""
+    def late_by(self, described_s: float | None) -> float:
+        """Time (s) by which images are later than a description with this delay (None: without one) says."""
+        if described_s is None:
+            return self.delay_s
         return self.delay_s - described_s if described_s == self.described_delay_s else 0.0
 
     @property

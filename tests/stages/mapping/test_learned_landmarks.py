@@ -164,6 +164,9 @@ def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside)
     landmarks = out.map.landmarks
     assert landmarks.late_by(0.05) == pytest.approx(0.15, abs=0.01)
     assert landmarks.late_by(0.2) == 0.0  # another description is believed
+    assert landmarks.late_by(None) == pytest.approx(0.2, abs=0.01)  # and none leaves it to the tour
+    assert landmarks.mounted(np.array([1.0, 0.0, 0.0]), True) == pytest.approx([1.0, 0.0, 0.0])
+    assert landmarks.mounted(np.array([0.0, 0.0, camera.yaw]), False) == pytest.approx([beside, 0.0, 0.0], abs=0.02)
     assert landmarks.mount == pytest.approx([beside, 0.0, 0.0], abs=0.02)
     assert np.median(np.hypot(*(out.map.poses - swinging(stamps - 0.15))[:, :2].T)) < 0.04
     assert parse_camera(landmarks.camera, "camera.yaml").delay == pytest.approx(0.2, abs=0.01)
@@ -210,7 +213,7 @@ def test_a_mount_that_is_described_is_believed_and_nothing_is_said() -> None:
 def test_a_camera_that_is_as_it_is_described_is_mounted_so_to_the_last_bit() -> None:
     poses, camera = tour_poses(), replace(CAMERA, yaw=0.3)
     _, out = learned(poses, "truth", seen_along(poses), camera=camera)
-    assert not out.map.landmarks.mounted(camera.mount).any()
+    assert not out.map.landmarks.mounted(camera.mount, True).any()
 
 
 def test_motion_that_was_seen_in_the_images_tells_no_mount() -> None:
