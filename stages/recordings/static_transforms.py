@@ -20,6 +20,8 @@ FLOOR = "base_footprint"
 """Frame of a robot on its floor."""
 MAX_LINKS = 100
 """Largest number of transforms between a frame and the root of its tree."""
+MAX_Z_M = 20_000.0
+"""Largest height of a frame over its parent, m."""
 MAX_FRAMES = 10_000
 """Largest number of frames that are kept."""
 LEVEL = math.cos(math.radians(20.0))
@@ -48,15 +50,22 @@ class StaticTransforms:
         return len(self._links)
 
     def add(self, message: Any) -> None:
-        """All transforms of a TFMessage. Raises ValueError for one that cannot be, as `pose_of`."""
+        """All transforms of a TFMessage. Raises ValueError where one of them cannot be, once the others are added."""
+        problem = None
         for each in message.transforms:
-            pose_of(each)
             at, turn = each.transform.translation, each.transform.rotation
-            if not math.isfinite(at.z) or abs(at.z) > FAR_M * 1e3:
-                raise ImpossiblePose(f"{at.z:.1e} m above its parent")
+            try:
+                pose_of(each)
+                if not abs(at.z) <= MAX_Z_M:
+                    raise ImpossiblePose(f"it is {at.z:.1e} m above its parent")
+            except ValueError as error:
+                problem = error
+                continue
             child, parent = (name.strip("/") for name in (each.child_frame_id, each.header.frame_id))
             if child in self._links or len(self._links) < MAX_FRAMES:
                 self._links[child] = parent, [at.x, at.y, at.z], [turn.x, turn.y, turn.z, turn.w]
+        if problem is not None:
+            raise problem
 
     def between(self, base: str, frame: str) -> Array | None:
         """The pose (4, 4) of a frame in another one; None where no transforms join them."""
@@ -85,7 +94,7 @@ class StaticTransforms:
         """
         frame = frame.strip("/")
         bases = [name for name in (base.strip("/"), *BASES) if self.between(name, frame) is not None]
-        if not bases or (not by_info and camera.placed):
+        if not bases or frame in bases or (not by_info and camera.placed):
             return Mounted(camera)
         pose = self.between(bases[0], frame)
         assert pose is not None
@@ -97,7 +106,7 @@ class StaticTransforms:
         if not by_info:
             return Mounted(camera, where)
         floor = self.between(FLOOR, frame)
-        if floor is not None and floor[2, 3] > 0.0:
+        if floor is not None and 0.0 < floor[2, 3] <= FAR_M:
             camera = replace(camera, height=round(float(floor[2, 3]), 6))
         up, ahead = pose[2, 2] > LEVEL, math.hypot(*pose[:2, 2]) > LEVEL
         if not up and (camera.ring is not None or not ahead):

@@ -160,10 +160,21 @@ def test_a_lens_that_looks_ahead_is_doubted_and_loops_and_unknown_frames_say_not
         log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
         assert (log.camera.position_x, log.camera.yaw) == (x, 0.0)
         assert words in log.assumed[0]
-    made = chain(
-        [fisheye_info("eye"), fixed_frames(in_frame("base_link", "eye", math.nan, 0, 0, 0, 0, 0, 1))], messages()
-    )
-    assert open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None))).dropped["bad_message"] == 1
+    made = chain([fisheye_info("base_link"), fixed_frames(PLATE, UP)], messages())  # a driver that names no frame
+    assert not open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None))).camera.placed
+
+
+def test_a_transform_that_cannot_be_is_counted_and_the_others_hold(tmp_path: Path) -> None:
+    unset = in_frame("plate", "lidar", 0, 0, 0, 0, 0, 0, 0)
+    for broken in (
+        unset,
+        in_frame("plate", "lidar", math.nan, 0, 0, 0, 0, 0, 1),
+        in_frame("a", "b", 0, 0, 1e9, 0, 0, 0, 1),
+    ):
+        made = chain([fisheye_info("eye"), fixed_frames(broken, PLATE, UP)], messages())
+        log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
+        assert log.dropped["bad_message"] == 1
+        assert log.camera.position_x == pytest.approx(0.3)
 
 
 def test_a_camera_yaml_that_says_no_position_has_that_of_the_transforms_and_keeps_its_yaw(tmp_path: Path) -> None:
