@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring
+from .model import MAX_SIDE, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring
 from .rays import normalised, turned
 
 
@@ -25,7 +25,7 @@ class CalibratedLens(Camera):
     centre_y: CentreY
     _: KW_ONLY
     outer_radius_px: OuterRadius | None = None
-    """The image is used out to here; if left out, as far as it and the model go all around the axis."""
+    """The image is used out to here; if left out, as far as image and model go all around the axis."""
     inner_radius_px: InnerRadius = 0.0
     looks: Literal["up", "down"] = "up"
     """Direction of the image's centre: up through a lens, or down by way of a mirror above the camera."""
@@ -33,7 +33,8 @@ class CalibratedLens(Camera):
     def __post_init__(self) -> None:
         if self.outer_radius_px is None:
             x, y = self.centre_x, self.centre_y
-            radii = np.arange(1.0, max(2.0, min(x, self.width - 1 - x, y, self.height_px - 1 - y) + 1.0))
+            room = min(x, self.width - 1 - x, y, self.height_px - 1 - y, MAX_SIDE)
+            radii = np.arange(1.0, max(2.0, room + 1.0))
             known = self.unproject(np.stack([x + radii, np.full_like(radii, y)], axis=-1))[1]
             object.__setattr__(self, "outer_radius_px", float(radii[known].max(initial=1.0)))
         super().__post_init__()

@@ -12,7 +12,11 @@ from omninav.stages.geometry.arrays import Array
 from .calibrated_lens import CalibratedLens
 from .model import Key
 
-Coefficient = Annotated[float, Bounds(ge=-100, le=100)]
+MAX_COEFFICIENT = 100.0
+"""Largest coefficient of a distortion, either way."""
+Coefficient = Annotated[float, Bounds(ge=-MAX_COEFFICIENT, le=MAX_COEFFICIENT)]
+NOTHING = 1e-12
+"""Largest last coefficient of a polynomial that counts as none."""
 STEPS = 1024
 """Angles between which the polynomial is inverted before Newton's method refines them."""
 
@@ -60,7 +64,7 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
 
     def _max_angle(self) -> float:
         """The angle (rad) up to which the radius grows: beyond it, a pixel would show two rays."""
-        turning = self._radius.deriv().roots()
+        turning = self._radius.deriv().trim(NOTHING).roots()
         real = turning.real[(np.abs(turning.imag) < 1e-9) & (turning.real > 0.0)]
         return float(min(real.min(initial=math.pi), math.pi))
 
@@ -72,6 +76,6 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
         """Camera of ROS's model "equidistant"; it looks up, all of the circle that fits the image is used."""
-        if model != "equidistant" or len(d) != 4:
+        if model != "equidistant" or len(d) != 4 or max(map(abs, d)) > MAX_COEFFICIENT:
             return None
         return cls(*size, k[0], k[4], k[2], k[5], tuple(d))

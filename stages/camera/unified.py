@@ -8,7 +8,7 @@ from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .calibrated_lens import CalibratedLens
-from .kannala_brandt import Coefficient
+from .kannala_brandt import NOTHING, Coefficient
 from .model import Key
 
 ROUNDS = 12
@@ -60,7 +60,7 @@ class Unified(CalibratedLens, projection="unified"):
     def _grows(self, points: Array) -> Bools:
         """Which points (..., 2) lie within the radius up to which radial distortion keeps their order."""
         k1, k2 = self.distortion[:2]
-        turning = np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]).roots()
+        turning = np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]).trim(NOTHING).roots()
         squares = turning.real[(np.abs(turning.imag) < 1e-12) & (turning.real > 0.0)]
         inside: Bools = (points**2).sum(axis=-1) < squares.min(initial=np.inf)
         return inside

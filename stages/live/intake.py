@@ -238,10 +238,10 @@ class Intake:
 
     def _newest(self) -> Taken | None:
         """Of the images that odometry has reached, the newest sound one; older ones are overtaken by it."""
-        track, now = self.drive.odometry, time.monotonic()
-        if self.camera is None or self._awaits_transforms(now):
+        if self.camera is None:
             self._images.clear()
             return None
+        track, now = self.drive.odometry, time.monotonic()
         reached = [one for one in self._images if track is None or (track.last is not None and one.stamp <= track.last)]
         for one in sorted(reached, key=lambda one: one.stamp, reverse=True):
             if self._awaits_truth(one, now):
@@ -273,9 +273,10 @@ class Intake:
         told = isinstance(self.camera, Camera) and self.camera.placed
         return not self._used_any and not told
 
-    def _awaits_transforms(self, now: float) -> bool:
-        waits = TF_STATIC not in self._received and now - self._since <= self.patience_s
-        return waits and self._wants_transforms() and TF_STATIC in self.transport.offered()
+    def _awaits_transforms(self) -> bool:
+        """Whether static transforms that join the camera to the robot may still come."""
+        waits = self._wants_transforms() and time.monotonic() - self._since <= self.patience_s
+        return waits and self.transport.offered().get(TF_STATIC) == TRANSFORMS_TYPE
 
     def _use(self, image: _Pending, camera: Camera | str) -> Taken | None:
         where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
@@ -310,15 +311,20 @@ class Intake:
         if whole is None:
             self._drop("no_ring_in_image", f"{where} shows no mirror's ring; give centre and mask in camera.yaml")
             return None
+        self.camera = whole
+        mounted = Mounted(whole)
         if not self._used_any:
             own = self._info_frame or message.header.frame_id
-            self.mounted = self._fixed.mounted(whole, self._base, own, self._by_info)
-            whole = self.mounted.camera
-        self.camera = whole
+            mounted = self._fixed.mounted(whole, self._base, own, self._by_info)
+            if not mounted.in_words and self._awaits_transforms():
+                return None
         made = self.drive.frame(image.stamp)
         if made is None:
             self._drop("outside_odometry", f"{where}: odometry begins later")
             return None
+        if not self._used_any:
+            self.mounted = mounted
+        self.camera = mounted.camera
         frame, scans = made
         self._without_scan = frame.scan is None
         arrivals = [*self.recordable(), *scans, image.arrival]

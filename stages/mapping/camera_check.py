@@ -101,13 +101,11 @@ class CameraCheck(NamedTuple):
             values["yaw_beside_deg"] = abs(math.degrees(by["yaw"]))
         return {"camera": values}
 
-    def told(
-        self, ctx: Context, camera: Camera | None, corrections: Array, mount: Array, late_s: float, obeyed: bool
-    ) -> str:
+    def told(self, ctx: Context, camera: Camera | None, corrections: Array, mount: Array, late_s: float) -> str:
         """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is.
 
         `mount` (3,), `late_s`: how the camera sits on the robot, and how late its images are, otherwise than described
-        (m, m, rad; s). `obeyed`: a described delay is obeyed. Nothing in a camera.yaml says that a camera leans.
+        (m, m, rad; s). Nothing in a camera.yaml says that a camera leans.
         """
         if camera is None:
             return ""
@@ -129,14 +127,9 @@ class CameraCheck(NamedTuple):
             x, y = (round(float(value), 3) + 0.0 for value in camera.mount[:2] + mount[:2])
             right = replace(right, position_x=x, position_y=y)
             parts.append(f"it sits at x = {x:z.2f}, y = {y:z.2f} m on the robot (forward, left)")
-        late = f"stamped {abs(late_s):.2f} s too {'late' if late_s > 0.0 else 'early'}"
-        if late_s and obeyed:
+        if late_s:
             right = replace(right, delay=round((right.delay or 0.0) + late_s, 3) + 0.0)
-            parts.append(f"its images are {late}")
-        elif late_s:
-            ctx.warn(
-                f"the tour's images are {late} against its poses. Landmarks allow for it; correct one of the clocks"
-            )
+            parts.append(f"its images are stamped {abs(late_s):.2f} s too {'late' if late_s > 0.0 else 'early'}")
         if not parts:
             return ""
         return _told(ctx, "; ".join(parts), harm, right)

@@ -127,7 +127,7 @@ class LearnLandmarks(Stage):
             words,
             left_out.found_rate,
             # Poses as they came: those adjusted to a wrong horizon were bent by it.
-            check.told(ctx, camera, adjusted.camera, mount - mounted, late, any(pose is not None for pose in odometry))
+            check.told(ctx, camera, adjusted.camera, mount - mounted, late)
             or check.elevations_told(ctx, camera, views, matches, camera_poses(map.poses, mount)),
             left_out.variance_factor,
             described,

@@ -55,13 +55,15 @@ class StaticTransforms:
         for each in message.transforms:
             at, turn = each.transform.translation, each.transform.rotation
             try:
+                child, parent = (name.strip("/") for name in (each.child_frame_id, each.header.frame_id))
+                if not child or not parent or child == parent:
+                    raise ImpossiblePose(f"a transform of {child!r:.80} in {parent!r:.80}")
                 pose_of(each)
                 if not abs(at.z) <= MAX_Z_M:
                     raise ImpossiblePose(f"it is {at.z:.1e} m above its parent")
             except ValueError as error:
                 problem = error
                 continue
-            child, parent = (name.strip("/") for name in (each.child_frame_id, each.header.frame_id))
             if child in self._links or len(self._links) < MAX_FRAMES:
                 self._links[child] = parent, [at.x, at.y, at.z], [turn.x, turn.y, turn.z, turn.w]
         if problem is not None:
@@ -70,15 +72,17 @@ class StaticTransforms:
     def between(self, base: str, frame: str) -> Array | None:
         """The pose (4, 4) of a frame in another one; None where no transforms join them."""
         (root, to_base), (other, to_frame) = self._to_root(base), self._to_root(frame)
-        if not base or not frame or root != other:
+        if not root or root != other:
             return None
         return np.linalg.inv(to_base) @ to_frame
 
     def _to_root(self, frame: str) -> tuple[str, Array]:
-        pose = np.eye(4)
-        for _ in range(MAX_LINKS):
-            if frame not in self._links:
-                break
+        """The root of a frame's tree and its pose there; "" for one that is its own ancestor."""
+        pose, passed = np.eye(4), set[str]()
+        while frame in self._links:
+            if frame in passed or len(passed) == MAX_LINKS:
+                return "", pose
+            passed.add(frame)
             frame, place, quaternion = self._links[frame]
             link = np.eye(4)
             link[:3, :3], link[:3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
@@ -111,8 +115,9 @@ class StaticTransforms:
         up, ahead = pose[2, 2] > LEVEL, math.hypot(*pose[:2, 2]) > LEVEL
         if not up and (camera.ring is not None or not ahead):
             leans = math.degrees(math.acos(np.clip(pose[2, 2], -1.0, 1.0)))
-            leaning = f"{TF_STATIC} has its axis {leans:.0f} degrees off the vertical, expected one that looks up"
-            return Mounted(camera, where, f"{leaning}; yaw is 0 (else give camera=PATH/camera.yaml)")
+            looks = "up" if camera.ring is not None else "ahead"
+            leaning = f"by {TF_STATIC} its axis is {leans:.0f} degrees off the vertical, expected a camera that looks"
+            return Mounted(camera, where, f"{leaning} {looks}; its yaw is taken to be 0: give camera=PATH/camera.yaml")
         axis = 0 if up else 2
         yaw = round(math.atan2(pose[1, axis], pose[0, axis]), 6)
         return Mounted(replace(camera, yaw=yaw), f"{where}, turned by {math.degrees(yaw):.1f} degrees")

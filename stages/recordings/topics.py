@@ -57,7 +57,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
                 continue
             if record.topic in poses:
                 message = feed.decode(record.topic, record.data)
-                base = base or getattr(message, "child_frame_id", "")
+                if record.topic == topics.odometry and not base:
+                    base = str(getattr(message, "child_frame_id", ""))
                 poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name, message))
                 continue
             if record.topic == TF_STATIC:
@@ -88,7 +89,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     width, height = _first_size(name, timed or range(len(frames)), fetch_image)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
     by_info = options.camera is None and "camera.yaml" not in feed.attachments and not camera_files
-    mounted = fixed.mounted(view, base, _camera_frame(feed, frames[0], infos) if fixed else "", by_info)
+    mounted = fixed.mounted(
+        view, base, _camera_frame(feed, frames[0], infos if by_info else ()) if fixed else "", by_info
+    )
     view = mounted.camera
     if (width, height) != (view.width, view.height_px):
         hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
@@ -157,10 +160,11 @@ def _camera(
 
 
 def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
-    """The camera's frame, by its CameraInfo or an image; empty where neither can be read."""
+    """The camera's frame, by its CameraInfo or else an image; empty where neither names it."""
+    if infos and infos[0].header.frame_id:
+        return str(infos[0].header.frame_id)
     try:
-        message = infos[0] if infos else feed.decode(image.topic, feed.fetch(image.location))
-        return str(message.header.frame_id)
+        return str(feed.decode(image.topic, feed.fetch(image.location)).header.frame_id)
     except BadMessage:
         return ""
 
@@ -170,7 +174,7 @@ def _add_transforms(feed: Feed, name: str, add: Callable[[Any], None], record: R
         return  # where it is needed, that is said once the log has been gone through
     try:
         add(feed.decode(record.topic, record.data))
-    except ValueError as error:
+    except (ValueError, AttributeError, TypeError) as error:  # a log may define the type otherwise
         feed.drop("bad_message", f"{name}: a message on {record.topic}: {error}")
 
 

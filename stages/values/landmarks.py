@@ -60,10 +60,10 @@ class Landmarks(Value):
         One that is described as the tour's was sits where the tour's images showed it, and so does one of which no
         position is described (`placed`).
         """
-        if not placed:
-            described = np.array([*self.described[:2], described[2]])
-        x, y, yaw = self.mount if np.array_equal(described, self.described) else described
-        return np.array([x, y, yaw - described[2]])
+        as_the_tours = described == self.described
+        same = as_the_tours[2] and (as_the_tours.all() or not placed)
+        x, y = self.mount[:2] if same or not placed else described[:2]
+        return np.array([x, y, self.mount[2] - described[2] if same else 0.0])
 
     def late_by(self, described_s: float | None) -> float:
         """Time (s) by which images are later than a description with this delay (None: without one) says."""

@@ -356,6 +356,8 @@ def test_static_transforms_say_where_the_camera_sits_and_the_record_keeps_it(wir
     assert drive.intake.camera is None
     wire.there["/tf_static"] = kind  # it is waited for
     wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    elsewhere = {**fixed, "header": {"frame_id": "base_footprint"}, "child_frame_id": "base_link"}
+    wire.inbox.put(told._replace(data=encode(kind, {"transforms": [elsewhere]})))  # says nothing of the camera
     drive.feed(wire, said()[:60])
     assert not drive.outs
     wire.inbox.put(told)

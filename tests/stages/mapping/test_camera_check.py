@@ -42,7 +42,7 @@ def corrections(check, world):
 
 
 def told(ctx, check, found):
-    return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]), 0.0, obeyed=True)
+    return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]), 0.0)
 
 
 def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):

@@ -166,7 +166,8 @@ def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside)
     assert landmarks.late_by(0.2) == 0.0  # another description is believed
     assert landmarks.late_by(None) == pytest.approx(0.2, abs=0.01)  # and none leaves it to the tour
     assert landmarks.mounted(np.array([1.0, 0.0, 0.0]), True) == pytest.approx([1.0, 0.0, 0.0])
-    assert landmarks.mounted(np.array([0.0, 0.0, camera.yaw]), False) == pytest.approx([beside, 0.0, 0.0], abs=0.02)
+    for yaw in (camera.yaw, camera.yaw + 0.5):
+        assert landmarks.mounted(np.array([0.0, 0.0, yaw]), False) == pytest.approx([beside, 0.0, 0.0], abs=0.02)
     assert landmarks.mount == pytest.approx([beside, 0.0, 0.0], abs=0.02)
     assert np.median(np.hypot(*(out.map.poses - swinging(stamps - 0.15))[:, :2].T)) < 0.04
     assert parse_camera(landmarks.camera, "camera.yaml").delay == pytest.approx(0.2, abs=0.01)
@@ -179,14 +180,11 @@ def test_true_poses_that_are_late_are_not_taken_for_early_images() -> None:
     ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
     odometry, late = ([Pose(*pose) for pose in swinging(stamps - by).tolist()] for by in (0.0, 0.15))
     for measured, delay in ((odometry, 0.0), ([None] * len(ticks), -0.15)):
-        ctx, out = learned(
+        _, out = learned(
             swinging(stamps - 0.15), "truth", seen_along(swinging(stamps)),
             camera=CAMERA, ticks=ticks, odometry=measured, truth=late,
         )  # fmt: skip
         assert out.map.landmarks.delay_s == pytest.approx(delay, abs=0.01)
-        said = "images are stamped 0.15 s too early against its poses"  # no camera.yaml can say it of a folder
-        assert any(said in warning for warning in ctx.warnings) == bool(delay)
-        assert "delay" not in out.map.landmarks.camera
 
 
 def test_the_images_of_several_logs_and_of_a_way_with_gaps_are_taken_to_be_in_time() -> None:

@@ -4,6 +4,7 @@ import math
 import os
 import random
 import sqlite3
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from itertools import chain, combinations
@@ -151,7 +152,8 @@ def test_a_lens_that_looks_ahead_is_doubted_and_loops_and_unknown_frames_say_not
     ahead = in_frame("plate", "eye", 0.1, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5)
     loop = in_frame("plate", "base_link", 0.2, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0)
     for links, x, words in (
-        ((PLATE, ahead), 0.3, "its axis 90 degrees off the vertical"),
+        ((PLATE, ahead), 0.3, "its axis is 90 degrees off the vertical"),
+        ((PLATE, loop, UP), None, "neither CameraInfo nor /tf_static"),
         ((PLATE, loop), None, "neither CameraInfo nor /tf_static"),
         ((UP,), None, "neither CameraInfo nor /tf_static"),
         ((PLATE, in_frame("plate", "eye", 100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), None, "neither CameraInfo nor"),
@@ -170,6 +172,8 @@ def test_a_transform_that_cannot_be_is_counted_and_the_others_hold(tmp_path: Pat
         unset,
         in_frame("plate", "lidar", math.nan, 0, 0, 0, 0, 0, 1),
         in_frame("a", "b", 0, 0, 1e9, 0, 0, 0, 1),
+        in_frame("", "eye", 9, 0, 0, 0, 0, 0, 1),
+        in_frame("plate", "plate", 9, 0, 0, 0, 0, 0, 1),
     ):
         made = chain([fisheye_info("eye"), fixed_frames(broken, PLATE, UP)], messages())
         log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
@@ -178,7 +182,13 @@ def test_a_transform_that_cannot_be_is_counted_and_the_others_hold(tmp_path: Pat
 
 
 def test_a_camera_yaml_that_says_no_position_has_that_of_the_transforms_and_keeps_its_yaw(tmp_path: Path) -> None:
-    made = chain([fisheye_info("eye"), fixed_frames(PLATE, UP)], messages())
+    def framed(made: Made) -> Iterator[Made]:
+        if made.topic == IMAGE:
+            made.content.header.frame_id = "eye"
+        yield made
+
+    front = in_frame("base_link", "front", 1.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0)  # another camera's CameraInfo
+    made = chain([fisheye_info("front"), fixed_frames(PLATE, UP, front)], messages(framed))
     path = write_mcap(tmp_path / "log.mcap", made)
     assert open_recording(str(path)).camera.mount == pytest.approx([0.3, -0.05, 0.0])
     (tmp_path / "own.yaml").write_bytes(CAMERA + b"position: {x: 0.0, y: 0.0}\n")
