@@ -93,7 +93,10 @@ def camera_from_info(info: Any, where: str) -> Camera:
             f"{where}: its focal length is {k[0]:g}: not calibrated; give camera=PATH/camera.yaml"
         )
     for model in camera_models().values():
-        camera = model.from_camera_info(info.distortion_model, (int(info.width), int(info.height)), k, d)
+        try:
+            camera = model.from_camera_info(info.distortion_model, (int(info.width), int(info.height)), k, d)
+        except ValueError as error:
+            raise UnreadableRecording(f"{where}: {error}") from None
         if camera is not None:
             return camera_from(camera_section(camera), where)  # within the limits of a camera.yaml
     raise UnreadableRecording(

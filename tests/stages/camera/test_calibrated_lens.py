@@ -1,5 +1,7 @@
 """Calibrated lenses against OpenCV, against numbers worked by hand, and at the limits of their models."""
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,7 +10,8 @@ from omninav.stages.camera.kannala_brandt import KannalaBrandt
 from omninav.stages.camera.model import require_sight
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.camera.unified import Unified
-from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
+from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
+from omninav.stages.recordings.recording import UnreadableRecording
 
 BENT = (-0.012, 0.004, -0.003, 0.0006)
 
@@ -66,3 +69,15 @@ def test_a_wrong_number_of_coefficients_is_refused() -> None:
         assert write_camera(parse_camera(text, "camera.yaml")) == text
         with pytest.raises(Exception, match="'D' has 3 numbers, expected 4"):
             parse_camera(text.replace("- 0.0006\n", ""), "camera.yaml")
+
+
+def test_numbers_that_no_lens_has_are_no_reason_to_fail() -> None:
+    k = [150.0, 0.0, 320.0, 0.0, 150.0, 240.0, 0.0, 0.0, 1.0]
+    assert KannalaBrandt.from_camera_info("equidistant", (640, 480), k, [1e308] * 4) is None
+    assert KannalaBrandt.from_camera_info("plumb_bob", (640, 480), k, [0.0] * 4) is None
+    tiny = KannalaBrandt.from_camera_info("equidistant", (640, 480), k, [0.0, 0.0, 0.0, 1e-320])
+    assert tiny.elevations == pytest.approx((np.pi / 2, np.pi / 2 - 239.0 / 150.0))
+    far = [150.0, 0.0, 2e9, 0.0, 150.0, 2e9, 0.0, 0.0, 1.0]
+    huge = {"width": 4 * 10**9, "height": 4 * 10**9, "k": far, "d": [0.0] * 4, "distortion_model": "equidistant"}
+    with pytest.raises(UnreadableRecording, match="pixels"):
+        camera_from_info(SimpleNamespace(**huge), "log")
