@@ -1,15 +1,38 @@
 """A calibrated lens or mirror: a projection of directions to a plane, then the matrix K."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import KW_ONLY
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
+from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .model import MAX_SIDE, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring
 from .rays import normalised, turned
+
+MAX_COEFFICIENT = 100.0
+"""Largest coefficient of a distortion, either way."""
+Coefficient = Annotated[float, Bounds(ge=-MAX_COEFFICIENT, le=MAX_COEFFICIENT)]
+NOTHING = 1e-12
+"""Largest last coefficient of a polynomial that counts as none."""
+REAL = 1e-9
+"""Largest imaginary part of a root that counts as real."""
+
+
+def require_all(distortion: Sequence[float], names: str) -> None:
+    """Raise ValueError where there are not as many coefficients as `names`, which are separated by commas."""
+    expected = len(names.split(","))
+    if len(distortion) != expected:
+        raise ValueError(f"'D' has {len(distortion)} numbers, expected {expected}: [{names}]")
+
+
+def smallest_root(polynomial: np.polynomial.Polynomial) -> float:
+    """The smallest positive root; infinite where there is none."""
+    roots = polynomial.trim(NOTHING).roots()
+    return float(roots.real[(np.abs(roots.imag) < REAL) & (roots.real > 0.0)].min(initial=np.inf))
 
 
 class CalibratedLens(Camera):

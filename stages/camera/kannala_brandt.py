@@ -6,17 +6,11 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
-from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array
 
-from .calibrated_lens import CalibratedLens
+from .calibrated_lens import MAX_COEFFICIENT, CalibratedLens, Coefficient, require_all, smallest_root
 from .model import Key
 
-MAX_COEFFICIENT = 100.0
-"""Largest coefficient of a distortion, either way."""
-Coefficient = Annotated[float, Bounds(ge=-MAX_COEFFICIENT, le=MAX_COEFFICIENT)]
-NOTHING = 1e-12
-"""Largest last coefficient of a polynomial that counts as none."""
 STEPS = 1024
 """Angles between which the polynomial is inverted before Newton's method refines them."""
 
@@ -33,8 +27,7 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
     """k1, k2, k3, k4."""
 
     def __post_init__(self) -> None:
-        if len(self.distortion) != 4:
-            raise ValueError(f"'D' has {len(self.distortion)} numbers, expected 4: [k1, k2, k3, k4]")
+        require_all(self.distortion, "k1, k2, k3, k4")
         super().__post_init__()
 
     def onto_plane(self, rays: Array) -> Array:
@@ -64,9 +57,7 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
 
     def _max_angle(self) -> float:
         """The angle (rad) up to which the radius grows: beyond it, a pixel would show two rays."""
-        turning = self._radius.deriv().trim(NOTHING).roots()
-        real = turning.real[(np.abs(turning.imag) < 1e-9) & (turning.real > 0.0)]
-        return float(min(real.min(initial=math.pi), math.pi))
+        return min(smallest_root(self._radius.deriv()), math.pi)
 
     def camera_info(self) -> dict[str, Any]:
         """K and D of ROS's model "equidistant"."""

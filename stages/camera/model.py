@@ -136,7 +136,7 @@ class Camera(Value, ABC):
 
     @property
     def placed(self) -> bool:
-        """Whether its description has a position on the robot."""
+        """True where its description has a position on the robot."""
         return self.position_x is not None or self.position_y is not None
 
     @property

@@ -7,8 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
-from .calibrated_lens import CalibratedLens
-from .kannala_brandt import NOTHING, Coefficient
+from .calibrated_lens import CalibratedLens, Coefficient, require_all, smallest_root
 from .model import Key
 
 ROUNDS = 12
@@ -31,8 +30,7 @@ class Unified(CalibratedLens, projection="unified"):
     """k1, k2, p1, p2: radial, then tangential."""
 
     def __post_init__(self) -> None:
-        if len(self.distortion) != 4:
-            raise ValueError(f"'D' has {len(self.distortion)} numbers, expected 4: [k1, k2, p1, p2]")
+        require_all(self.distortion, "k1, k2, p1, p2")
         super().__post_init__()
 
     def onto_plane(self, rays: Array) -> Array:
@@ -60,9 +58,8 @@ class Unified(CalibratedLens, projection="unified"):
     def _grows(self, points: Array) -> Bools:
         """Which points (..., 2) lie within the radius up to which radial distortion keeps their order."""
         k1, k2 = self.distortion[:2]
-        turning = np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]).trim(NOTHING).roots()
-        squares = turning.real[(np.abs(turning.imag) < 1e-12) & (turning.real > 0.0)]
-        inside: Bools = (points**2).sum(axis=-1) < squares.min(initial=np.inf)
+        turning = smallest_root(np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]))
+        inside: Bools = (points**2).sum(axis=-1) < turning
         return inside
 
     def _distorted(self, points: Array) -> tuple[Array, tuple[Array, Array, Array]]:

@@ -269,12 +269,12 @@ class Intake:
         return speaks and truth.last is not None and truth.last < image.stamp
 
     def _wants_transforms(self) -> bool:
-        """Whether static transforms may say where the camera sits: until the first tick, if its file does not."""
+        """True until the first tick, if no file says where the camera sits: static transforms may."""
         told = isinstance(self.camera, Camera) and self.camera.placed
         return not self._used_any and not told
 
     def _awaits_transforms(self) -> bool:
-        """Whether static transforms that join the camera to the robot may still come."""
+        """True while static transforms that join the camera to the robot may still come."""
         waits = self._wants_transforms() and time.monotonic() - self._since <= self.patience_s
         return waits and self.transport.offered().get(TF_STATIC) == TRANSFORMS_TYPE
 

@@ -1,4 +1,4 @@
-"""Where `/tf_static` says that a camera sits on its robot."""
+"""Static transforms (`/tf_static`), and the position of a camera on its robot by them."""
 
 import math
 from dataclasses import replace
@@ -96,16 +96,15 @@ class StaticTransforms:
         `base`: the robot's frame as odometry names it. `frame`: the camera's, by REP 103 with x to the right in the
         image, y down and z along the optical axis.
         """
-        frame = frame.strip("/")
-        bases = [name for name in (base.strip("/"), *BASES) if self.between(name, frame) is not None]
-        if not bases or frame in bases or (not by_info and camera.placed):
+        frame, bases = frame.strip("/"), (base.strip("/"), *BASES)
+        joined = [(name, pose) for name in bases if (pose := self.between(name, frame)) is not None]
+        if not joined or frame in bases or (not by_info and camera.placed):
             return Mounted(camera)
-        pose = self.between(bases[0], frame)
-        assert pose is not None
+        name, pose = joined[0]
         if np.abs(pose[:2, 3]).max() > FAR_M:
             return Mounted(camera)
         x, y = (round(float(value), 6) + 0.0 for value in pose[:2, 3])
-        where = f"x {x:.3f}, y {y:.3f} m in {bases[0]}, by {TF_STATIC}"
+        where = f"x {x:.3f}, y {y:.3f} m in {name}, by {TF_STATIC}"
         camera = replace(camera, position_x=x, position_y=y)
         if not by_info:
             return Mounted(camera, where)

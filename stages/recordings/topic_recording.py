@@ -85,7 +85,7 @@ class TopicRecording:
     ) -> None:
         self.unmeasured_s = unmeasured_s
         self.mounted = ""
-        """Where `/tf_static` says that its camera sits; empty where it says nothing new."""
+        """Position of its camera by `/tf_static`, in words; empty where that says nothing new."""
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
         self._feed, self._images, self._files, self._scans = feed, DecodeAhead(fetch_image), files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
