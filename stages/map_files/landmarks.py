@@ -54,6 +54,9 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         mount=given[0].mount,
         described_delay_s=given[0].described_delay_s,
         delay_s=given[0].delay_s,
+        pose_sigmas=np.concatenate(
+            [np.zeros((len(each.starts) - 1, 3)) if each.pose_sigmas is None else each.pose_sigmas for each in parts]
+        ),
     )
 
 

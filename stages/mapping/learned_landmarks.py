@@ -33,7 +33,7 @@ from omninav.stages.geometry.landmarks.map_making import (
     widely_seen,
 )
 from omninav.stages.geometry.plane.image_delay import RobotPath, found_delay
-from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
+from omninav.stages.geometry.plane.mount import camera_poses, robot_covariances, robot_poses
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.landmarks import Landmarks, stored_descriptors
 from omninav.stages.values.length_scale import DEFAULT_M
@@ -50,6 +50,7 @@ QUANTITIES = {
     "landmarks.sigma_deg": Quantity(title="Standard deviation of a bearing", unit="deg", context=True),
     "landmarks.found_rate": Quantity(title="Map's own images found by landmarks", unit="%", context=True),
     "landmarks.variance_factor": Quantity(title="Errors of poses squared, over what bearings say", context=True),
+    "landmarks.pose_sigma_m": Quantity(title="Standard deviation of the map's own poses, median", context=True),
     "landmarks.moved_median_m": Quantity(title="References moved by, median", context=True),
     "landmarks.moved_max_m": Quantity(title="References moved by, largest", context=True),
     **CAMERA_QUANTITIES,
@@ -134,6 +135,7 @@ class LearnLandmarks(Stage):
             mount + described * [0.0, 0.0, 1.0],
             described_delay,
             described_delay + late,
+            _sigmas(adjusted, poses, mount),
         )
         ctx.fact("landmarks", len(landmarks))
         poses = robot_poses(poses, mount)
@@ -146,6 +148,8 @@ class LearnLandmarks(Stage):
             "found_rate": left_out.found_rate,
             "variance_factor": left_out.variance_factor,
         }
+        if landmarks.pose_sigmas is not None and landmarks.pose_sigmas.any():
+            values["pose_sigma_m"] = float(np.median(np.hypot(*landmarks.pose_sigmas[:, :2].T)))
         if not adjusted.problem:
             values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}
         metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted, late)}, QUANTITIES)
@@ -198,6 +202,15 @@ def _robot(
     poses = np.array([(pose.x, pose.y, pose.heading) for pose in driven if pose is not None])
     taken = [event is not None for event in events]
     return RobotPath(poses[taken] if measured is None else measured, times[taken], poses, times)
+
+
+def _sigmas(adjusted: AdjustedMap, poses: Array, mount: Array) -> Array | None:
+    """Standard deviations (R, 3) of the robot's poses, of those (R, 3) of its camera; None where none was adjusted."""
+    if adjusted.covariances is None:
+        return None
+    covariances = robot_covariances(adjusted.covariances, poses, mount)
+    variances = np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0)  # rounding may leave less
+    return np.asarray(np.sqrt(variances))
 
 
 def _candidates(words: VisualWords) -> list[Ints]:

@@ -40,8 +40,9 @@ class WidenCovariance(Stage):
     scale, squared, is added to both variances of the position. While the estimate is more probably wrong than right,
     the robot may be anywhere in the map: the covariance is that of the map's references about the estimate, and of any
     heading. Where landmarks gave the pose, the filter's covariance is correct, and nothing is added. From there on,
-    odometry's drift since that pose is added, until it exceeds the share. Evaluation and choice of the share:
-    docs/experiments/confidence.md.
+    odometry's drift since that pose is added, until it exceeds the share. The variances of the nearest reference's own
+    pose are added always: where odometry measured the map, it is bent, which neither landmarks nor particles show.
+    Evaluation and choice of the share: docs/experiments/confidence.md.
     """
 
     floor: Annotated[float, Bounds(ge=0)] = 0.6
@@ -76,6 +77,9 @@ class WidenCovariance(Stage):
         covariance = estimate.covariance.copy()
         covariance[0, 0] += variance
         covariance[1, 1] += variance
+        if map.landmarks is not None and map.landmarks.pose_sigmas is not None and len(map):
+            away = map.poses[:, :2] - [estimate.pose.x, estimate.pose.y]
+            covariance += np.diag(map.landmarks.pose_sigmas[np.argmin((away**2).sum(axis=1))] ** 2)
         if confidence.probability < self.min_confidence:
             covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))

@@ -28,6 +28,8 @@ class Landmarks(Value):
     `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings say.
     `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description says and as its
     images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
+    `pose_sigmas` (R, 3): standard deviations of the references' poses in the map frame (m, m, rad), 0 where they were
+    given and the images confirm them; None where nothing was adjusted.
     """
 
     points: Annotated[Floats, Shape("L", 3)]
@@ -43,6 +45,7 @@ class Landmarks(Value):
     mount: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
     described_delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
     delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
+    pose_sigmas: Annotated[Array | None, Shape("R", 3), Bounds(ge=0, le=1e9)] = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -86,7 +89,7 @@ class Landmarks(Value):
     def of_references(self, rows: Ints) -> "Landmarks":
         """Those that some references (N,) see, for a map of these in this order; what none of them sees goes.
 
-        A reference that a map has learned since sees none.
+        A reference that a map has learned since sees none, and its pose is as uncertain as theirs in the mean.
         """
         sizes = np.append(np.diff(self.starts), 0)
         own = np.minimum(rows, self.references)
@@ -95,6 +98,9 @@ class Landmarks(Value):
         first = np.append(self.starts[:-1], 0)[own]
         seen = self.seen[np.repeat(first - starts[:-1], counts) + np.arange(starts[-1])]
         kept, renumbered = np.unique(seen, return_inverse=True)
+        sigmas = self.pose_sigmas
+        if sigmas is not None:
+            sigmas = np.vstack([sigmas, sigmas.mean(axis=0) if len(sigmas) else np.zeros(3)])[own]
         return replace(
             self,
             points=self.points[kept],
@@ -102,6 +108,7 @@ class Landmarks(Value):
             starts=starts,
             seen=renumbered.astype(np.int32),
             words=self.words.of_views(own),
+            pose_sigmas=sigmas,
         )
 
     def moved(self, before: Array, after: Array) -> "Landmarks":

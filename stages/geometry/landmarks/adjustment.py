@@ -18,6 +18,8 @@ LAST_SCALE = 3.0
 """Scale of the loss at the end (in sigmas)."""
 INLIER_SIGMAS = 4.0
 """Sigmas up to which a bearing counts as right."""
+WRONG_WEIGHT = 1e-3
+"""Weight of a wrong bearing in covariances, beside 1 of a right one: without any its landmark has no place."""
 CONVERGED = 1e-4
 """Relative decrease of the cost at which it ends."""
 FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-4, 1e-9, 1e6
@@ -26,6 +28,9 @@ FIXED, FREE = 1e-6, 1e4
 """Standard deviations (m, rad, or in the unit of a camera's parameter) of what stays and of what is free."""
 DIFFERENCE = 1e-5
 """Change of a camera's parameter (pixels, rad) by which bearings are differentiated."""
+COVARIANCES, AT_ONCE = 200, 50
+"""References whose covariances are computed, evenly spaced, where there are more, and how many of them in one solve:
+those of neighbours are alike."""
 
 
 class Motions(NamedTuple):
@@ -51,7 +56,9 @@ class Lens(NamedTuple):
 class Adjusted(NamedTuple):
     """Poses (R, 3 or 5), points (L, 3), and what the camera's parameters are corrected by (K,).
 
-    `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad).
+    `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad). `covariances` (R, 3, 3) of
+    x, y and heading, if asked for: where nothing but the first pose is held, of the poses in the frame that fits all
+    of them best.
     """
 
     poses: Array
@@ -59,6 +66,7 @@ class Adjusted(NamedTuple):
     camera: Array
     inliers: Bools
     rms: float
+    covariances: Array | None = None
 
 
 def adjusted(
@@ -72,6 +80,7 @@ def adjusted(
     motions: Motions | None = None,
     max_steps: int = 100,
     given: Array | None = None,
+    sigma_factor: float | None = None,
 ) -> Adjusted:
     """Adjust poses and landmarks, and a camera's parameters, to all bearings at once, of which some are wrong.
 
@@ -81,7 +90,8 @@ def adjusted(
     in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
     (R, 3 or 5): standard deviations of the poses as they are `given`, 0 for one that stays and infinite for one that is
     free; None: the first stays, and all others are free. `given` (R, 3 or 5): None for `poses`, where it begins.
-    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma.
+    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma. `sigma_factor`: of
+    `sigma` for the poses' covariances, more than 1 as errors of neighbouring bearings are alike; None: not computed.
 
     Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
     dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale
@@ -99,6 +109,7 @@ def adjusted(
     used = used[np.lexsort((references[used], landmarks[used]))]
     seen, starts = np.unique(landmarks[used], return_index=True)
     visibility = Visibility(references[used].astype(np.int64), np.append(starts, len(used)))
+    floating = pose_sigmas is None
     if pose_sigmas is None:
         pose_sigmas = np.full(poses.shape, math.inf)
         pose_sigmas[0] = 0.0
@@ -111,13 +122,28 @@ def adjusted(
     rms = sigma * math.sqrt(squares[agreeing].mean()) if agreeing.any() else math.nan
     beyond = np.abs(state.poses[:, 2]) > math.pi
     state.poses[beyond, 2] = wrap(state.poses[beyond, 2])
-    return Adjusted(state.poses, points, state.camera, inliers, rms)
+    spread = None if sigma_factor is None else problem.covariances(state, sigma_factor, floating)
+    return Adjusted(state.poses, points, state.camera, inliers, rms, spread)
 
 
 class _State(NamedTuple):
     poses: Array
     points: Array
     camera: Array
+
+
+class _Normal(NamedTuple):
+    # Factors of the matrix of the poses; the camera's columns beside it, the same solved, and what remains of its own.
+    factors: Any
+    border: Array
+    through: Array
+    corner: Array
+
+    def solved(self, right: Array) -> Array:
+        """The inverse of the matrix, with the camera eliminated, times (F R, N)."""
+        alone = self.factors.solve(right)
+        found: Array = alone + self.through @ np.linalg.solve(self.corner, self.border.T @ alone)
+        return found
 
 
 class _Problem:
@@ -150,52 +176,87 @@ class _Problem:
         self, state: _State, squares: Array, scale: float, cost: float, damping: float
     ) -> tuple[_State | None, float]:
         """A state of smaller cost, and the damping to begin with the next time; None where there is none."""
-        weights = (scale / (scale + squares)) ** 2 / self.sigma**2
-        bearings, derivatives = self.lens.bearings(state.camera)[self.used], self.derivatives(state.camera)
         while damping < MAX_DAMPING:
-            frames = _frames(state.poses)
-            system = eliminate(
-                frames, state.points, self.visibility, bearings, derivatives, weights, damping, self.pattern
-            )
-            steps, camera = self.steps(state, system, damping)
-            tried = _State(
-                state.poses + steps,
-                state.points + landmark_steps(system, self.visibility, steps, camera),
-                state.camera + camera,
-            )
+            steps, camera, points = self.steps(state, squares, scale, damping)
+            tried = _State(state.poses + steps, state.points + points, state.camera + camera)
             if self.cost(tried, self.squares(tried), scale) < cost:
                 return tried, max(MIN_DAMPING, damping / 10.0)
             damping *= 10.0
         return None, FIRST_DAMPING
 
-    def steps(self, state: _State, system: Eliminated, damping: float) -> tuple[Array, Array]:
-        """Steps of the poses (R, F) and of the camera (K,)."""
+    def steps(self, state: _State, squares: Array, scale: float, damping: float) -> tuple[Array, Array, Array]:
+        """Steps of the poses (R, F), of the camera (K,) and of the landmarks (L, 3)."""
+        system, normal = self.normal(state, (scale / (scale + squares)) ** 2, damping)
+        right = system.right + self.held * (state.poses - self.given)
+        if self.motions is not None:
+            right += (self.slopes(state).T @ self.missed(state).ravel()).reshape(right.shape)
+        alone = normal.factors.solve(right.ravel())
+        gradient = system.right_camera + self.held_camera * state.camera - normal.border.T @ alone
+        camera = -np.linalg.solve(normal.corner, gradient)
+        steps = -(alone + normal.through @ camera).reshape(right.shape)
+        return steps, camera, landmark_steps(system, self.visibility, steps, camera)
+
+    def normal(self, state: _State, weights: Array, damping: float) -> tuple[Eliminated, "_Normal"]:
+        """The landmarks eliminated, and the normal equations that remain; `weights` (O,) of the sightings."""
         from scipy import sparse  # slow to import, and seldom needed
         from scipy.sparse.linalg import splu
 
+        weights = weights / self.sigma**2
+        bearings, derivatives = self.lens.bearings(state.camera)[self.used], self.derivatives(state.camera)
+        frames = _frames(state.poses)
+        system = eliminate(frames, state.points, self.visibility, bearings, derivatives, weights, damping, self.pattern)
         number, freedoms = state.poses.shape
         size, diagonal = number * freedoms, np.arange(freedoms)
         blocks = system.diagonal.copy()
         blocks[:, diagonal, diagonal] += damping * system.curvature + self.held
-        right = system.right + self.held * (state.poses - self.given)
         off, rows = sparse.bsr_array((system.upper, *self.pattern[::-1]), shape=(size, size)), np.arange(number + 1)
         matrix: Any = sparse.bsr_array((blocks, rows[:-1], rows), shape=(size, size)) + off + off.T
         if self.motions is not None:
-            edges, _, sigmas = self.motions
-            jacobian = motion_jacobian(state.poses[:, :3], edges, 1.0 / sigmas, freedoms)
-            matrix = matrix + jacobian.T @ jacobian
-            right += (jacobian.T @ self.missed(state).ravel()).reshape(right.shape)
+            slopes = self.slopes(state)
+            matrix = matrix + slopes.T @ slopes
         factors = splu(
             matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
         # The camera's few parameters touch all references: they are eliminated last.
         corner = system.corner + np.diag(damping * system.curvature_camera + self.held_camera)
         border = system.border.reshape(size, -1)
-        through = factors.solve(np.column_stack([right.ravel(), border]))
-        alone, bordered = through[:, 0], through[:, 1:]
-        gradient = system.right_camera + self.held_camera * state.camera - border.T @ alone
-        camera = -np.linalg.solve(corner - border.T @ bordered, gradient)
-        return -(alone + bordered @ camera).reshape(number, freedoms), camera
+        through = factors.solve(border)
+        return system, _Normal(factors, border, through, corner - border.T @ through)
+
+    def covariances(self, state: _State, sigma_factor: float, floating: bool) -> Array:
+        """Covariances (R, 3, 3) of the poses; `floating`: in the frame that fits all of them best, as no pose holds it.
+
+        The latter is the inner constraint of a free network: positions are fitted to each other by least squares
+        (Triggs, McLauchlan, Hartley & Fitzgibbon 2000, section 9.2).
+        """
+        weights = np.where(self.squares(state) < INLIER_SIGMAS**2, 1.0, WRONG_WEIGHT) / sigma_factor**2
+        _, normal = self.normal(state, weights, 0.0)
+        number, freedoms = state.poses.shape
+        rows = np.unique(np.linspace(0, number - 1, min(COVARIANCES, number)).astype(np.int64))
+        found = np.empty((len(rows), 3, 3))
+        for low in range(0, len(rows), AT_ONCE):
+            some = rows[low : low + AT_ONCE]
+            units = np.zeros((number, freedoms, len(some), 3))
+            units[some[:, None], np.arange(3), np.arange(len(some))[:, None], np.arange(3)] = 1.0
+            solved = normal.solved(units.reshape(number * freedoms, -1)).reshape(units.shape)
+            found[low : low + AT_ONCE] = solved[some, :3, np.arange(len(some))]
+        if floating:
+            moves, fit = _rigid_motions(state.poses)
+            shared = normal.solved(fit.T)
+            moved, with_all = (
+                moves.reshape(number, freedoms, 3)[rows, :3],
+                shared.reshape(number, freedoms, 3)[rows, :3],
+            )
+            cross = with_all @ moved.transpose(0, 2, 1)
+            found += moved @ (fit @ shared) @ moved.transpose(0, 2, 1) - cross - cross.transpose(0, 2, 1)
+        nearest = np.searchsorted((rows[1:] + rows[:-1]) / 2.0, np.arange(number))
+        return found[nearest]
+
+    def slopes(self, state: _State) -> Any:
+        """Derivatives (3 E, F R) of the motions between the poses, in sigmas."""
+        assert self.motions is not None
+        edges, _, sigmas = self.motions
+        return motion_jacobian(state.poses[:, :3], edges, 1.0 / sigmas, state.poses.shape[1])
 
     def squares(self, state: _State) -> Array:
         """Squared angles (O,) in sigmas."""
@@ -237,6 +298,16 @@ def _frames(poses: Array) -> Frames:
         axes += [tilted[:, :, 0], turns[:, :, 1]]
         turns = tilted @ rotations_about(poses[:, 3], 0)
     return Frames(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
+
+
+def _rigid_motions(poses: Array) -> tuple[Array, Array]:
+    # Derivatives (F R, 3) of all poses by a motion of their frame, and the motion (3, F R) that fits changes of places.
+    moves, places = np.zeros((*poses.shape, 3)), poses[:, :2] - poses[:, :2].mean(axis=0)
+    moves[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    moves[:, 0, 2], moves[:, 1, 2] = -places[:, 1], places[:, 0]
+    seen = moves.copy()
+    seen[:, 2:] = 0.0
+    return moves.reshape(-1, 3), np.linalg.pinv(seen.reshape(-1, 3))
 
 
 def rotations_about(angles: Array, axis: int) -> Array:

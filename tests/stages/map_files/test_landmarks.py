@@ -47,13 +47,15 @@ def test_what_no_reference_of_a_part_sees_is_gone() -> None:
 
 def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
     one, other = mapped_room(), other_room()
-    sure = replace(one.landmarks, sigma_rad=0.01, found_rate=0.5, variance_factor=2.0)
-    vague = replace(other.landmarks, sigma_rad=0.03, found_rate=0.25, variance_factor=3.0)
+    sigmas = np.linspace(0.0, 0.3, 3 * len(one)).reshape(-1, 3)
+    sure = replace(one.landmarks, sigma_rad=0.01, found_rate=0.5, variance_factor=2.0, pose_sigmas=sigmas)
+    vague = replace(other.landmarks, sigma_rad=0.03, found_rate=0.25, variance_factor=3.0, pose_sigmas=None)
     both = joined_references([replace(one, landmarks=sure), replace(other, landmarks=vague)], "truth")
     assert violation(both) is None
     share = (len(sure) + 1) / (len(sure) + len(vague) + 2)
     assert both.landmarks.sigma_rad**2 == pytest.approx(0.0001 * share + 0.0009 * (1 - share))
     assert (both.landmarks.found_rate, both.landmarks.variance_factor) == (0.25, 3.0)
+    assert (both.landmarks.pose_sigmas == np.concatenate([sigmas, np.zeros((len(other), 3))])).all()
     assert len(both.landmarks) == len(mapped_room().landmarks) + len(other_room().landmarks)
     assert found_in(both) == pytest.approx(POSE, abs=1e-3)
     assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
@@ -89,3 +91,11 @@ def test_landmarks_of_other_descriptors_do_not_join() -> None:
     short = replace(map, landmarks=replace(map.landmarks, descriptors=map.landmarks.descriptors[:, :64].copy()))
     with pytest.raises(BadInput, match="descriptors of their landmarks have 64 and 128 numbers"):
         joined_references([map, short], "truth")
+
+
+def test_references_learned_since_are_as_uncertain_as_the_others_in_the_mean() -> None:
+    map = mapped_room()
+    sigmas = np.linspace(0.0, 0.3, 3 * len(map)).reshape(-1, 3)
+    landmarks = replace(map.landmarks, pose_sigmas=sigmas)
+    taken = landmarks.of_references(np.array([3, len(map), 1]))
+    assert taken.pose_sigmas == pytest.approx(np.array([sigmas[3], sigmas.mean(axis=0), sigmas[1]]))

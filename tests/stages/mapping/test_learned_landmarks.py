@@ -96,6 +96,9 @@ def test_references_of_wrong_poses_come_to_where_they_were_with_their_landmarks(
     assert np.median(gap) < 0.06
     assert ctx.facts["map_adjusted"].startswith("poses and landmarks together, by 0.")
     assert out.metrics.values["landmarks"]["moved_median_m"] > 0.05
+    assert out.map.landmarks.pose_sigmas.shape == (len(poses), 3)
+    assert (out.map.landmarks.pose_sigmas > 0.0).all()
+    assert 0.0005 < out.metrics.values["landmarks"]["pose_sigma_m"] < 0.1
 
 
 def test_a_tour_by_odometry_is_straightened_from_how_it_was_driven() -> None:
@@ -110,6 +113,7 @@ def test_a_tour_by_odometry_is_straightened_from_how_it_was_driven() -> None:
     assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.1
     assert out.map.poses[0] == pytest.approx(poses[0], abs=1e-5)
     assert "odometry's scale" in ctx.facts["map_adjusted"]
+    assert 0.002 < np.median(out.map.landmarks.pose_sigmas[:, :2]) < 0.05  # as odometry could have it
 
 
 def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
@@ -118,6 +122,7 @@ def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
         ctx, out = learned(poses, source, [NOTHING] * len(poses))
         assert (out.map.poses == poses).all()
         assert ctx.facts["map_adjusted"].startswith("no: ")
+        assert out.map.landmarks.pose_sigmas is None
 
 
 CAMERA = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_bottom=-math.pi / 2)

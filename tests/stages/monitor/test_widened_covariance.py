@@ -1,10 +1,11 @@
 """What leaves the system is as wide as errors are, and as wide as the map where the estimate is probably wrong."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from landmark_tour import graph_of
+from landmark_tour import graph_of, mapped_room
 
 import omninav
 from omninav.pipeline import Context, Tick
@@ -84,3 +85,19 @@ def test_a_pose_by_landmarks_keeps_its_own_covariance_until_odometry_has_drifted
     assert variance(None, 0.0, 0.0, first=True) == pytest.approx(1e-4 + 0.09)
     assert variance(there, 0.99, 0.0) == pytest.approx(1e-4)
     assert variance(None, 0.0, 50.0) == pytest.approx(1e-4 + 0.09)
+
+
+def test_the_nearest_references_own_errors_are_added_where_the_map_knows_them():
+    room = mapped_room()
+    sigmas = np.linspace(0.01, 0.4, len(room))[:, None] * [1.0, 2.0, 0.5]
+    bent = replace(room, landmarks=replace(room.landmarks, pose_sigmas=sigmas))
+    x, y, _ = room.poses[7] + [0.02, 0.01, 0.0]
+    estimate = PoseEstimate(Pose(x, y, 0.0), OWN, 0.9, POSE)
+    stage, told = WidenCovariance(floor=0.0), PoseConfidence(0.9)
+
+    def covariance(map):
+        return stage.step(Context("wide"), estimate, told, LengthScale(0.5), map, WidenCovarianceState()).estimate
+
+    unknown = replace(room, landmarks=replace(room.landmarks, pose_sigmas=None))
+    assert covariance(unknown).covariance == pytest.approx(OWN)
+    assert covariance(bent).covariance == pytest.approx(OWN + np.diag(sigmas[7] ** 2))

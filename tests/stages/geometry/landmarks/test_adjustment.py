@@ -2,10 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from landmark_world import NOISE, POSE_SIGMAS, displaced, driven, house, misplaced, triangulated
+from landmark_world import NOISE, POSE_SIGMAS, displaced, driven, house, misplaced, rotations, triangulated
 
 from omninav.stages.geometry.landmarks.adjustment import Lens, Motions, adjusted
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
+from omninav.stages.geometry.plane.se2 import between
 
 
 def seen(world, poses, **options):
@@ -137,3 +138,54 @@ def test_without_anything_seen_twice_nothing_changes(world, sightings):
     assert (found.points == world.points).all()
     assert not found.inliers.any()
     assert math.isnan(found.rms)
+
+
+def drawn_again(world, rng):
+    """The bearings of a house without wrong ones, with other noise."""
+    poses, points = world.poses[world.references], world.points[world.landmarks]
+    rays = points - np.column_stack([poses[:, :2], np.zeros(len(poses))])
+    bearings = np.einsum("oji,oj->oi", rotations(world.poses)[world.references], rays)
+    bearings = bearings / np.linalg.norm(bearings, axis=1)[:, None] + rng.normal(0.0, NOISE, bearings.shape)
+    return bearings / np.linalg.norm(bearings, axis=1)[:, None]
+
+
+def fitted_errors(poses, truth):
+    """Errors (R, 3) of poses in the frame that fits their places best."""
+    one, two = ((each[:, 0] + 1j * each[:, 1]) - each[:, :2].mean(axis=0) @ [1, 1j] for each in (poses, truth))
+    turn = (one.conj() * two).sum()
+    turn /= abs(turn)
+    away = turn * one - two
+    headings = np.angle(np.exp(1j * (poses[:, 2] - truth[:, 2])) * turn)
+    return np.column_stack([away.real, away.imag, headings])
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_covariances_are_those_of_the_errors_over_many_draws(held):
+    world, rng = house(np.random.default_rng(0), 40, 300, 0.0), np.random.default_rng(1)
+    steps = between(world.poses[:-1], world.poses[1:])
+    edges, sigmas = np.column_stack([np.arange(39), np.arange(1, 40)]), odometry_sigmas(steps)
+    told, errors = [], []
+    for _ in range(40):
+        measured = world._replace(bearings=drawn_again(world, rng))
+        if held:
+            given = world.poses + rng.normal(size=(40, 3)) * POSE_SIGMAS
+            options = {"pose_sigmas": np.tile(POSE_SIGMAS, (40, 1)), "given": given}
+        else:
+            options = {"motions": Motions(edges, steps + rng.normal(size=steps.shape) * sigmas, sigmas)}
+        found = seen(measured, world.poses, sigma_factor=1.0, **options)
+        told.append(np.diagonal(found.covariances, axis1=1, axis2=2))
+        errors.append(found.poses - world.poses if held else fitted_errors(found.poses, world.poses))
+    ratio = (np.square(errors).mean(axis=0) / np.mean(told, axis=0)).mean(axis=0)
+    assert ratio == pytest.approx([1.0, 1.0, 1.0], abs=0.35)
+
+
+def test_of_many_references_the_covariance_is_that_of_the_nearest_computed_one(world, wrong_poses, monkeypatch):
+    sigmas = np.tile(POSE_SIGMAS, (len(wrong_poses), 1))
+    every = seen(world, wrong_poses, pose_sigmas=sigmas, sigma_factor=1.0).covariances
+    monkeypatch.setattr("omninav.stages.geometry.landmarks.adjustment.COVARIANCES", 5)
+    some = seen(world, wrong_poses, pose_sigmas=sigmas, sigma_factor=1.0).covariances
+    assert every.shape == some.shape == (120, 3, 3)
+    rows = np.linspace(0, 119, 5).astype(int)
+    nearest = rows[np.abs(np.arange(120)[:, None] - rows).argmin(axis=1)]
+    assert some == pytest.approx(every[nearest], rel=1e-6)
+    assert seen(world, wrong_poses, pose_sigmas=sigmas).covariances is None
