@@ -10,7 +10,8 @@ import numpy as np
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
-from .model import MAX_SIDE, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring
+from .intrinsic_matrix import IntrinsicMatrix
+from .model import MAX_SIDE, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring, Skew
 from .rays import normalised, turned
 
 MAX_COEFFICIENT = 100.0
@@ -35,14 +36,14 @@ def smallest_root(polynomial: np.polynomial.Polynomial) -> float:
     return float(roots.real[(np.abs(roots.imag) < REAL) & (roots.real > 0.0)].min(initial=np.inf))
 
 
-class CalibratedLens(Camera):
+class CalibratedLens(IntrinsicMatrix, Camera):
     """A camera whose optical axis is the robot's z; a subclass says how its lens or mirror projects.
 
     u runs along the camera's x and v along its y, so a pixel's bearing is atan2(v - cy, u - cx) + yaw.
     """
 
     focal_x: FocalX
-    """Pixels; with the next three the matrix K."""
+    """Pixels; with the next three and `skew` the matrix K."""
     focal_y: FocalY
     centre_x: CentreX
     centre_y: CentreY
@@ -50,6 +51,7 @@ class CalibratedLens(Camera):
     outer_radius_px: OuterRadius | None = None
     """The image is used out to here; if left out, as far as image and model go all around the axis."""
     inner_radius_px: InnerRadius = 0.0
+    skew: Skew = 0.0
     looks: Literal["up", "down"] = "up"
     """Direction of the image's centre: up through a lens, or down by way of a mirror above the camera."""
 
@@ -77,15 +79,12 @@ class CalibratedLens(Camera):
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
         """p = K m, of the point m of the plane."""
-        points = self.onto_plane(normalised(turned(rays, -self.yaw)) * self._upward)
-        with np.errstate(over="ignore"):
-            pixels = points * [self.focal_x, self.focal_y] + [self.centre_x, self.centre_y]
+        pixels = self.pixels_of(self.onto_plane(normalised(turned(rays, -self.yaw)) * self._upward))
         return pixels, self.shows(pixels)
 
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
         """The ray of m = K^-1 p."""
-        points = (pixels - [self.centre_x, self.centre_y]) / [self.focal_x, self.focal_y]
-        rays = turned(normalised(self.from_plane(points)) * self._upward, self.yaw)
+        rays = turned(normalised(self.from_plane(self.points_of(pixels))) * self._upward, self.yaw)
         return rays, np.asarray(np.isfinite(rays).all(axis=-1))
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
+from .intrinsic_matrix import IntrinsicMatrix
 from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, Key, OuterRadius, Ring, Skew
 from .rays import normalised, turned
 
@@ -17,7 +18,7 @@ HalfAxis = Bounds(ge=1e-5, le=1e5)
 millimetres."""
 
 
-class HyperbolicMirror(Camera, projection="hyperbolic"):
+class HyperbolicMirror(IntrinsicMatrix, Camera, projection="hyperbolic"):
     """A hyperbolic mirror over a perspective camera, by closed forms (Svoboda & Pajdla; erratum 33, docs/papers.md).
 
     Mirror frame: origin at the mirror's focus, z up along the axis; image u runs along mirror x and image v along
@@ -60,15 +61,13 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
             scale = np.where(denominator > 0.0, self.b * self.b / denominator, np.nan)
             depth = scale * rays[..., 2] + 2.0 * e
             qx, qy = scale * rays[..., 0] / depth, scale * rays[..., 1] / depth
-        u = self.focal_x * qx + self.skew * qy + self.centre_x
-        pixels = np.stack([u, self.focal_y * qy + self.centre_y], axis=-1)
+        pixels = self.pixels_of(np.stack([qx, qy], axis=-1))
         return pixels, self.shows(pixels)
 
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
         """q = K^-1 p, F = b^2 / (e - a |q|), ray = F q + t_c, valid iff |q| < e / a."""
         e = math.hypot(self.a, self.b)
-        qy = (pixels[..., 1] - self.centre_y) / self.focal_y
-        qx = (pixels[..., 0] - self.centre_x - self.skew * qy) / self.focal_x
+        qx, qy = np.moveaxis(self.points_of(pixels), -1, 0)
         denominator = e - self.a * np.sqrt(qx * qx + qy * qy + 1.0)
         looks: Bools = denominator > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -78,8 +77,7 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
 
     def camera_info(self) -> dict[str, Any]:
         """K, and the mirror's half axes as D."""
-        k = [self.focal_x, self.skew, self.centre_x, 0.0, self.focal_y, self.centre_y, 0.0, 0.0, 1.0]
-        return {"k": k, "distortion_model": "hyperbolic_mirror", "d": [self.a, self.b]}
+        return {"k": self.k, "distortion_model": "hyperbolic_mirror", "d": [self.a, self.b]}
 
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:

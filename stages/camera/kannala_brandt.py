@@ -61,12 +61,11 @@ class KannalaBrandt(CalibratedLens, projection="kannala_brandt"):
 
     def camera_info(self) -> dict[str, Any]:
         """K and D of ROS's model "equidistant"."""
-        k = [self.focal_x, 0.0, self.centre_x, 0.0, self.focal_y, self.centre_y, 0.0, 0.0, 1.0]
-        return {"distortion_model": "equidistant", "k": k, "d": list(self.distortion)}
+        return {"distortion_model": "equidistant", "k": self.k, "d": list(self.distortion)}
 
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
         """Camera of ROS's model "equidistant"; it looks up, all of the circle that fits the image is used."""
         if model != "equidistant" or len(d) != 4 or max(map(abs, d)) > MAX_COEFFICIENT:
             return None
-        return cls(*size, k[0], k[4], k[2], k[5], tuple(d))
+        return cls(*size, k[0], k[4], k[2], k[5], tuple(d), skew=k[1])

@@ -8,11 +8,12 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools
 
+from .intrinsic_matrix import IntrinsicMatrix
 from .model import Camera, CentreX, CentreY, FocalX, FocalY, Skew
 from .rays import normalised, turned
 
 
-class Perspective(Camera, projection="perspective"):
+class Perspective(IntrinsicMatrix, Camera, projection="perspective"):
     """A pinhole camera without distortion, looking along the robot's forward turned by `yaw`."""
 
     focal_x: FocalX
@@ -28,14 +29,12 @@ class Perspective(Camera, projection="perspective"):
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = np.where(ahead[..., 0] > 0.0, ahead[..., 0], np.nan)
             right, down = -ahead[..., 1] / depth, -ahead[..., 2] / depth
-        u = self.focal_x * right + self.skew * down + self.centre_x
-        pixels = np.stack([u, self.focal_y * down + self.centre_y], axis=-1)
+        pixels = self.pixels_of(np.stack([right, down], axis=-1))
         return pixels, self.shows(pixels)
 
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
         """K^-1 p; every pixel looks somewhere."""
-        down = (pixels[..., 1] - self.centre_y) / self.focal_y
-        right = (pixels[..., 0] - self.centre_x - self.skew * down) / self.focal_x
+        right, down = np.moveaxis(self.points_of(pixels), -1, 0)
         rays = np.stack([np.ones_like(down), -right, -down], axis=-1)
         return turned(normalised(rays), self.yaw), np.ones(down.shape, np.bool_)
 
@@ -47,7 +46,7 @@ class Perspective(Camera, projection="perspective"):
 
     def camera_info(self) -> dict[str, Any]:
         """K."""
-        return {"k": [self.focal_x, self.skew, self.centre_x, 0.0, self.focal_y, self.centre_y, 0.0, 0.0, 1.0]}
+        return {"k": self.k}
 
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:

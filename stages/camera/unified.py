@@ -11,7 +11,9 @@ from .calibrated_lens import CalibratedLens, Coefficient, require_all, smallest_
 from .model import Key
 
 ROUNDS = 12
-"""Rounds of Newton's method in which distortion is undone."""
+"""Largest number of rounds of Newton's method in which distortion is undone."""
+UNDONE = 1e-12
+"""Largest step of Newton's method after which nothing is left to undo, focal lengths."""
 SAME = 1e-9
 """Largest distance of an undone point, distorted again, from the one that was seen, focal lengths."""
 
@@ -48,7 +50,10 @@ class Unified(CalibratedLens, projection="unified"):
             for _ in range(ROUNDS):
                 seen, (xx, xy, yy) = self._distorted(plain)
                 (x, y), determinant = np.moveaxis(points - seen, -1, 0), xx * yy - xy * xy
-                plain = plain + np.stack([yy * x - xy * y, xx * y - xy * x], axis=-1) / determinant[..., None]
+                step = np.stack([yy * x - xy * y, xx * y - xy * x], axis=-1) / determinant[..., None]
+                plain = plain + step
+                if not (np.abs(step) > UNDONE).any():
+                    break
             undone = np.abs(self._distorted(plain)[0] - points).max(axis=-1) < SAME
             square = (plain**2).sum(axis=-1)
             scale = (self.xi + np.sqrt(1.0 + (1.0 - self.xi**2) * square)) / (1.0 + square)
@@ -56,10 +61,11 @@ class Unified(CalibratedLens, projection="unified"):
         return np.concatenate([scale[..., None] * plain, (scale - self.xi)[..., None]], axis=-1)
 
     def _grows(self, points: Array) -> Bools:
-        """Which points (..., 2) lie within the radius up to which radial distortion keeps their order."""
+        """Which points (..., 2) lie where distortion neither folds the plane nor turns the order of radii round."""
         k1, k2 = self.distortion[:2]
         turning = smallest_root(np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]))
-        inside: Bools = (points**2).sum(axis=-1) < turning
+        _, (xx, xy, yy) = self._distorted(points)
+        inside: Bools = ((points**2).sum(axis=-1) < turning) & (xx * yy - xy * xy > 0.0)
         return inside
 
     def _distorted(self, points: Array) -> tuple[Array, tuple[Array, Array, Array]]:

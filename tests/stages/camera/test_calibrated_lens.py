@@ -17,11 +17,17 @@ BENT = (-0.012, 0.004, -0.003, 0.0006)
 
 
 def test_a_fisheye_projects_as_opencv_does() -> None:
-    camera = KannalaBrandt(1280, 960, 350.0, 348.0, 640.0, 480.0, BENT)
+    camera = KannalaBrandt(1280, 960, 350.0, 348.0, 640.0, 480.0, BENT, skew=7.0)
     rays = unit_vectors(np.linspace(-3.0, 3.0, 500), np.linspace(0.05, 1.57, 500))
     k = np.array([[350.0, 0.0, 640.0], [0.0, 348.0, 480.0], [0.0, 0.0, 1.0]])
-    expected, _ = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), k, np.array(BENT))
+    expected, _ = cv2.fisheye.projectPoints(
+        rays[:, None], np.zeros(3), np.zeros(3), k, np.array(BENT), alpha=7.0 / 350.0
+    )
     np.testing.assert_allclose(camera.project(rays)[0], expected[:, 0], atol=1e-9)
+    np.testing.assert_allclose(camera.unproject(expected[:, 0])[0], rays, atol=1e-9)
+    assert parse_camera(write_camera(camera), "camera.yaml").skew == 7.0
+    info = SimpleNamespace(width=1280, height=960, **camera.camera_info())
+    assert camera_from_info(info, "log").skew == 7.0
 
 
 def test_the_unified_model_worked_by_hand() -> None:
@@ -60,6 +66,17 @@ def test_what_lies_beyond_the_model_is_not_shown_and_the_mask_ends_there(camera)
     assert not camera.project(unit_vectors(0.3, bottom - 0.1))[1]
     assert "outer_radius_px" in write_camera(camera)  # what was found stands in the file
     assert not camera.unproject(np.array([camera.centre_x + camera.outer_radius_px + 15.0, camera.centre_y]))[1]
+
+
+def test_a_ray_beyond_a_fold_of_tangential_distortion_is_not_shown() -> None:
+    camera = Unified(640, 480, 300.0, 300.0, 320.0, 240.0, 0.8, (0.0, 0.0, 0.0, 0.1), outer_radius_px=235.0)
+    azimuths, elevations = np.meshgrid(np.linspace(-np.pi, np.pi, 90), np.linspace(-1.0, 1.57, 120))
+    rays = unit_vectors(azimuths.ravel(), elevations.ravel())
+    pixels, shown = camera.project(rays)
+    back, known = camera.unproject(pixels[shown])
+    assert 0.2 < shown.mean() < 0.9
+    assert known.all()
+    np.testing.assert_allclose(back, rays[shown], atol=1e-6)
 
 
 def test_a_wrong_number_of_coefficients_is_refused() -> None:
