@@ -77,9 +77,10 @@ class WidenCovariance(Stage):
         covariance = estimate.covariance.copy()
         covariance[0, 0] += variance
         covariance[1, 1] += variance
-        if map.landmarks is not None and map.landmarks.pose_sigmas is not None and len(map):
-            away = map.poses[:, :2] - [estimate.pose.x, estimate.pose.y]
-            covariance += np.diag(map.landmarks.pose_sigmas[np.argmin((away**2).sum(axis=1))] ** 2)
+        sigmas = None if map.landmarks is None else map.landmarks.pose_sigmas
+        if sigmas is not None and len(sigmas):
+            away = map.poses[: len(sigmas), :2] - [estimate.pose.x, estimate.pose.y]  # later ones are learned since
+            covariance += np.diag(sigmas[np.argmin((away**2).sum(axis=1))] ** 2)
         if confidence.probability < self.min_confidence:
             covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))

@@ -230,7 +230,7 @@ class _Problem:
         (Triggs, McLauchlan, Hartley & Fitzgibbon 2000, section 9.2).
         """
         weights = np.where(self.squares(state) < INLIER_SIGMAS**2, 1.0, WRONG_WEIGHT) / sigma_factor**2
-        _, normal = self.normal(state, weights, 0.0)
+        _, normal = self.normal(state, weights, MIN_DAMPING)
         number, freedoms = state.poses.shape
         rows = np.unique(np.linspace(0, number - 1, min(COVARIANCES, number)).astype(np.int64))
         found = np.empty((len(rows), 3, 3))

@@ -98,6 +98,10 @@ def test_the_nearest_references_own_errors_are_added_where_the_map_knows_them():
     def covariance(map):
         return stage.step(Context("wide"), estimate, told, LengthScale(0.5), map, WidenCovarianceState()).estimate
 
+    few = replace(room.landmarks.of_references(np.arange(5)), pose_sigmas=sigmas[:5])
+    nearest = np.argmin(np.hypot(*(room.poses[:5, :2] - [x, y]).T))
+    learned_since = replace(room, landmarks=few)
+    assert covariance(learned_since).covariance == pytest.approx(OWN + np.diag(sigmas[nearest] ** 2))
     unknown = replace(room, landmarks=replace(room.landmarks, pose_sigmas=None))
     assert covariance(unknown).covariance == pytest.approx(OWN)
     assert covariance(bent).covariance == pytest.approx(OWN + np.diag(sigmas[7] ** 2))
