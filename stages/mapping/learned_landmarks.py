@@ -208,7 +208,7 @@ def _sigmas(adjusted: AdjustedMap, poses: Array, mount: Array) -> Array | None:
     """Standard deviations (R, 3) of the robot's poses, of those (R, 3) of its camera; None where none was adjusted."""
     if adjusted.covariances is None:
         return None
-    covariances = robot_covariances(adjusted.covariances, poses, mount)
+    covariances = robot_covariances(adjusted.covariances(), poses, mount)
     variances = np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0)  # rounding may leave less
     return np.asarray(np.sqrt(variances))
 

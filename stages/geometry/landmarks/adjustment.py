@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,9 +29,9 @@ FIXED, FREE = 1e-6, 1e4
 """Standard deviations (m, rad, or in the unit of a camera's parameter) of what stays and of what is free."""
 DIFFERENCE = 1e-5
 """Change of a camera's parameter (pixels, rad) by which bearings are differentiated."""
-COVARIANCES, AT_ONCE = 200, 50
-"""References whose covariances are computed, evenly spaced, where there are more, and how many of them in one solve:
-those of neighbours are alike."""
+MAX_COVARIANCES, BATCH = 200, 50
+"""Largest number of references whose covariances are computed, evenly spaced: the others have nearly those of the
+nearest one. And how many are solved for together."""
 
 
 class Motions(NamedTuple):
@@ -56,9 +57,10 @@ class Lens(NamedTuple):
 class Adjusted(NamedTuple):
     """Poses (R, 3 or 5), points (L, 3), and what the camera's parameters are corrected by (K,).
 
-    `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad). `covariances` (R, 3, 3) of
-    x, y and heading, if asked for: where nothing but the first pose is held, of the poses in the frame that fits all
-    of them best.
+    `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad). `covariances`: a
+    function that gives those of x, y and heading (R, 3, 3), infinite where nothing was adjusted. Its argument is the
+    factor of a bearing's standard deviation, above 1 where neighbouring bearings have correlated errors. Where nothing
+    but the first pose is held, they are of the poses in the frame that fits all of them best.
     """
 
     poses: Array
@@ -66,7 +68,7 @@ class Adjusted(NamedTuple):
     camera: Array
     inliers: Bools
     rms: float
-    covariances: Array | None = None
+    covariances: Callable[[float], Array]
 
 
 def adjusted(
@@ -80,7 +82,6 @@ def adjusted(
     motions: Motions | None = None,
     max_steps: int = 100,
     given: Array | None = None,
-    sigma_factor: float | None = None,
 ) -> Adjusted:
     """Adjust poses and landmarks, and a camera's parameters, to all bearings at once, of which some are wrong.
 
@@ -90,8 +91,7 @@ def adjusted(
     in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
     (R, 3 or 5): standard deviations of the poses as they are `given`, 0 for one that stays and infinite for one that is
     free; None: the first stays, and all others are free. `given` (R, 3 or 5): None for `poses`, where it begins.
-    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma. `sigma_factor`: of
-    `sigma` for the poses' covariances, more than 1 as errors of neighbouring bearings are alike; None: not computed.
+    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma.
 
     Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
     dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale
@@ -105,7 +105,8 @@ def adjusted(
     several = np.bincount(landmarks, minlength=len(points)) > 1
     used = np.flatnonzero((several & np.isfinite(points).all(axis=1))[landmarks])
     if not len(used):
-        return Adjusted(poses, points, np.zeros(len(lens.sigmas)), inliers, math.nan)
+        unknown = np.full((len(poses), 3, 3), math.inf)
+        return Adjusted(poses, points, np.zeros(len(lens.sigmas)), inliers, math.nan, lambda _: unknown)
     used = used[np.lexsort((references[used], landmarks[used]))]
     seen, starts = np.unique(landmarks[used], return_index=True)
     visibility = Visibility(references[used].astype(np.int64), np.append(starts, len(used)))
@@ -122,14 +123,20 @@ def adjusted(
     rms = sigma * math.sqrt(squares[agreeing].mean()) if agreeing.any() else math.nan
     beyond = np.abs(state.poses[:, 2]) > math.pi
     state.poses[beyond, 2] = wrap(state.poses[beyond, 2])
-    spread = None if sigma_factor is None else problem.covariances(state, sigma_factor, floating)
-    return Adjusted(state.poses, points, state.camera, inliers, rms, spread)
+    covariances = partial(problem.covariances, state, floating)
+    return Adjusted(state.poses, points, state.camera, inliers, rms, covariances)
 
 
 class _State(NamedTuple):
     poses: Array
     points: Array
     camera: Array
+
+
+class _Looking(NamedTuple):
+    # Bearings (O, 3), and their derivatives (O, 3, K) with respect to the camera's parameters.
+    bearings: Array
+    derivatives: Array
 
 
 class _Normal(NamedTuple):
@@ -176,17 +183,18 @@ class _Problem:
         self, state: _State, squares: Array, scale: float, cost: float, damping: float
     ) -> tuple[_State | None, float]:
         """A state of smaller cost, and the damping to begin with the next time; None where there is none."""
+        weights, looking = (scale / (scale + squares)) ** 2, self.looking(state.camera)
         while damping < MAX_DAMPING:
-            steps, camera, points = self.steps(state, squares, scale, damping)
+            steps, camera, points = self.steps(state, looking, weights, damping)
             tried = _State(state.poses + steps, state.points + points, state.camera + camera)
             if self.cost(tried, self.squares(tried), scale) < cost:
                 return tried, max(MIN_DAMPING, damping / 10.0)
             damping *= 10.0
         return None, FIRST_DAMPING
 
-    def steps(self, state: _State, squares: Array, scale: float, damping: float) -> tuple[Array, Array, Array]:
+    def steps(self, state: _State, looking: "_Looking", weights: Array, damping: float) -> tuple[Array, Array, Array]:
         """Steps of the poses (R, F), of the camera (K,) and of the landmarks (L, 3)."""
-        system, normal = self.normal(state, (scale / (scale + squares)) ** 2, damping)
+        system, normal = self.normal(state, looking, weights, damping)
         right = system.right + self.held * (state.poses - self.given)
         if self.motions is not None:
             right += (self.slopes(state).T @ self.missed(state).ravel()).reshape(right.shape)
@@ -196,15 +204,15 @@ class _Problem:
         steps = -(alone + normal.through @ camera).reshape(right.shape)
         return steps, camera, landmark_steps(system, self.visibility, steps, camera)
 
-    def normal(self, state: _State, weights: Array, damping: float) -> tuple[Eliminated, "_Normal"]:
+    def normal(
+        self, state: _State, looking: "_Looking", weights: Array, damping: float
+    ) -> tuple[Eliminated, "_Normal"]:
         """The landmarks eliminated, and the normal equations that remain; `weights` (O,) of the sightings."""
         from scipy import sparse  # slow to import, and seldom needed
         from scipy.sparse.linalg import splu
 
-        weights = weights / self.sigma**2
-        bearings, derivatives = self.lens.bearings(state.camera)[self.used], self.derivatives(state.camera)
-        frames = _frames(state.poses)
-        system = eliminate(frames, state.points, self.visibility, bearings, derivatives, weights, damping, self.pattern)
+        frames, weights = _frames(state.poses), weights / self.sigma**2
+        system = eliminate(frames, state.points, self.visibility, *looking, weights, damping, self.pattern)
         number, freedoms = state.poses.shape
         size, diagonal = number * freedoms, np.arange(freedoms)
         blocks = system.diagonal.copy()
@@ -223,23 +231,23 @@ class _Problem:
         through = factors.solve(border)
         return system, _Normal(factors, border, through, corner - border.T @ through)
 
-    def covariances(self, state: _State, sigma_factor: float, floating: bool) -> Array:
+    def covariances(self, state: _State, floating: bool, sigma_factor: float) -> Array:
         """Covariances (R, 3, 3) of the poses; `floating`: in the frame that fits all of them best, as no pose holds it.
 
         The latter is the inner constraint of a free network: positions are fitted to each other by least squares
         (Triggs, McLauchlan, Hartley & Fitzgibbon 2000, section 9.2).
         """
         weights = np.where(self.squares(state) < INLIER_SIGMAS**2, 1.0, WRONG_WEIGHT) / sigma_factor**2
-        _, normal = self.normal(state, weights, MIN_DAMPING)
+        _, normal = self.normal(state, self.looking(state.camera), weights, MIN_DAMPING)
         number, freedoms = state.poses.shape
-        rows = np.unique(np.linspace(0, number - 1, min(COVARIANCES, number)).astype(np.int64))
+        rows = np.unique(np.linspace(0, number - 1, min(MAX_COVARIANCES, number)).astype(np.int64))
         found = np.empty((len(rows), 3, 3))
-        for low in range(0, len(rows), AT_ONCE):
-            some = rows[low : low + AT_ONCE]
+        for low in range(0, len(rows), BATCH):
+            some = rows[low : low + BATCH]
             units = np.zeros((number, freedoms, len(some), 3))
             units[some[:, None], np.arange(3), np.arange(len(some))[:, None], np.arange(3)] = 1.0
             solved = normal.solved(units.reshape(number * freedoms, -1)).reshape(units.shape)
-            found[low : low + AT_ONCE] = solved[some, :3, np.arange(len(some))]
+            found[low : low + BATCH] = solved[some, :3, np.arange(len(some))]
         if floating:
             moves, fit = _rigid_motions(state.poses)
             shared = normal.solved(fit.T)
@@ -279,15 +287,15 @@ class _Problem:
         total += float((self.held_camera * state.camera**2).sum())
         return total if self.motions is None else total + float((self.missed(state) ** 2).sum())
 
-    def derivatives(self, camera: Array) -> Array:
-        """Derivatives (O, 3, K) of the bearings with respect to the camera's parameters."""
+    def looking(self, camera: Array) -> "_Looking":
+        """The bearings, and their derivatives with respect to the camera's parameters."""
         out = np.empty((len(self.used), 3, len(camera)))
         for k in range(len(camera)):
             step = np.zeros(len(camera))
             step[k] = DIFFERENCE
             ahead, back = self.lens.bearings(camera + step), self.lens.bearings(camera - step)
             out[:, :, k] = (ahead - back)[self.used] / (2.0 * DIFFERENCE)
-        return out
+        return _Looking(self.lens.bearings(camera)[self.used], out)
 
 
 def _frames(poses: Array) -> Frames:

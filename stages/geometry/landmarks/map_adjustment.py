@@ -51,9 +51,9 @@ MIN_CLOSURES = 3
 MOUNT_ROUNDS = 5
 """Largest number of adjustments that a mount and a delay are found from; each begins with those of the one before."""
 SIGMA_FACTOR = 3.5
-"""Factor of a bearing's standard deviation for the covariances of poses, since errors of neighbouring bearings are
-alike: the geometric mean over eight development maps of odometry of the squared errors of their positions, over these
-covariances, is 2.5, where 2 is right, and 9.2 without (docs/experiments/landmarks.md)."""
+"""Factor of a bearing's standard deviation for the covariances of poses, as neighbouring bearings have correlated
+errors: over eight development maps of odometry the geometric mean of the positions' NEES is 2.5 with it, where 2 is
+right, and 10.7 without (docs/experiments/landmarks.md)."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
@@ -64,8 +64,8 @@ class AdjustedMap(NamedTuple):
     `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
     `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
     `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
-    images measured any. `covariances` (R, 3, 3): of the poses, 0 where images confirm given ones; None where nothing
-    was adjusted.
+    images measured any. `covariances`: a function that gives those (R, 3, 3) of the poses, 0 where images confirm given
+    ones; None where nothing was adjusted.
     """
 
     poses: Array
@@ -74,7 +74,7 @@ class AdjustedMap(NamedTuple):
     closures: int = 0
     scale: float | None = None
     seen: Array | None = None
-    covariances: Array | None = None
+    covariances: Callable[[], Array] | None = None
 
 
 def found_with_mount(
@@ -114,14 +114,13 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     as they were given, but for single ones that are off: images that show little bend poses and fit them no better.
     """
     sigmas, found = np.tile(GIVEN_SIGMAS, (len(poses), 1)), _Found(poses, None)
-    rounds = zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), (False, False, True), strict=True)
-    for miss, off_plane, last in rounds:
+    for miss, off_plane in zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), strict=True):
         fits = fitting_matches(_looking(views, seen, found.camera), matches, found.poses, off_plane)
         if found.camera is None and len(fits) and fits.mean() < MIN_FIT:
             return AdjustedMap(
                 poses, np.empty(0), "what the images show contradicts the poses: check both and the camera"
             )
-        again = _bundled(views, tracks_of(views, matches, fits), found, seen, miss, sigmas, None, poses, last)
+        again = _bundled(views, tracks_of(views, matches, fits), found, seen, miss, sigmas, None, poses)
         if again is None:
             return AdjustedMap(poses, np.empty(0), "too few landmarks are seen")
         moved = again.poses - poses
@@ -137,10 +136,14 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     confirmed = np.median(away) < CONFIRMED_M or agreed.sum() < MIN_GAIN * given.sum()
     # A single pose is off where its own matches say so by three standard deviations of their number.
     exact = confirmed & ((away < OUTLYING_M) | (agreed < MIN_GAIN * given + 3.0 * np.sqrt(given)))
-    assert found.covariances is not None
-    spread = np.where(exact[:, None, None], 0.0, found.covariances)
+    covariances = found.covariances
+    assert covariances is not None
+
+    def uncertain() -> Array:
+        return np.where(exact[:, None, None], 0.0, covariances(SIGMA_FACTOR))
+
     kept = _wrapped(np.where(exact[:, None], poses, found.poses))
-    return AdjustedMap(kept, found.camera, seen=found.poses, covariances=spread)
+    return AdjustedMap(kept, found.camera, seen=found.poses, covariances=uncertain)
 
 
 def _fitting(views: LocalViews, matches: PairMatches, poses: Array) -> Ints:
@@ -179,12 +182,13 @@ def adjusted_drive(
     motions = Motions(np.column_stack([along[:-1], along[1:]]), steps, looseness * odometry_sigmas(steps))
     found = _Found(straightened_drive(odometry, verified), None)
     for miss in MISSES:
-        again = _bundled(views, tracks, found, seen, miss, None, motions, None, miss == MISSES[-1])
+        again = _bundled(views, tracks, found, seen, miss, None, motions, None)
         if again is None:
             return AdjustedMap(odometry, np.empty(0), "too few landmarks are seen")
         found = again
+    covariances = found.covariances
     assert found.camera is not None
-    assert found.covariances is not None
+    assert covariances is not None
     depth = None
     if height:
         seen_by = found.references, found.landmarks
@@ -200,19 +204,22 @@ def adjusted_drive(
     units = np.array([scale or 1.0, scale or 1.0, 1.0])
     # Motion that was seen in the images is the camera's, and tells nothing of the robot under it.
     measured = None if seen_motion else poses
-    spread = found.covariances * np.outer(units, units)
-    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=measured, covariances=spread)
+
+    def uncertain() -> Array:
+        return covariances(SIGMA_FACTOR) * np.outer(units, units)
+
+    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=measured, covariances=uncertain)
 
 
 class _Found(NamedTuple):
     # Poses and what the camera is corrected by; the landmarks, and of each sighting its reference and its landmark; the
-    # poses' covariances, of the last round alone.
+    # poses' covariances by the factor of a bearing's standard deviation.
     poses: Array
     camera: Array | None
     points: Array = np.empty((0, 3))
     references: Ints = np.empty(0, np.int64)
     landmarks: Ints = np.empty(0, np.int64)
-    covariances: Array | None = None
+    covariances: Callable[[float], Array] | None = None
 
 
 def _bundled(
@@ -224,7 +231,6 @@ def _bundled(
     sigmas: Array | None,
     motions: Motions | None,
     given: Array | None,
-    last: bool,
 ) -> _Found | None:
     # None where too few references see enough of the landmarks.
     centres, bearings = in_map_frame(_looking(views, seen, before.camera), before.poses)
@@ -238,16 +244,7 @@ def _bundled(
     start = np.zeros(len(lens.sigmas)) if before.camera is None else before.camera
     onwards = Lens(lambda corrections: lens.bearings(start + corrections), lens.sigmas)
     out = adjusted(
-        before.poses,
-        made.points[there],
-        references,
-        landmarks,
-        onwards,
-        SIGMA,
-        sigmas,
-        motions,
-        given=given,
-        sigma_factor=SIGMA_FACTOR if last else None,
+        before.poses, made.points[there], references, landmarks, onwards, SIGMA, sigmas, motions, given=given
     )
     references, landmarks = references[out.inliers], landmarks[out.inliers]
     enough = np.bincount(references, minlength=len(before.poses)) >= MIN_SIGHTINGS

@@ -138,6 +138,7 @@ def test_without_anything_seen_twice_nothing_changes(world, sightings):
     assert (found.points == world.points).all()
     assert not found.inliers.any()
     assert math.isnan(found.rms)
+    assert np.isinf(found.covariances(1.0)).all()
 
 
 def drawn_again(world, rng):
@@ -172,8 +173,8 @@ def test_covariances_are_those_of_the_errors_over_many_draws(held):
             options = {"pose_sigmas": np.tile(POSE_SIGMAS, (40, 1)), "given": given}
         else:
             options = {"motions": Motions(edges, steps + rng.normal(size=steps.shape) * sigmas, sigmas)}
-        found = seen(measured, world.poses, sigma_factor=1.0, **options)
-        told.append(np.diagonal(found.covariances, axis1=1, axis2=2))
+        found = seen(measured, world.poses, **options)
+        told.append(np.diagonal(found.covariances(1.0), axis1=1, axis2=2))
         errors.append(found.poses - world.poses if held else fitted_errors(found.poses, world.poses))
     ratio = (np.square(errors).mean(axis=0) / np.mean(told, axis=0)).mean(axis=0)
     assert ratio == pytest.approx([1.0, 1.0, 1.0], abs=0.35)
@@ -181,11 +182,10 @@ def test_covariances_are_those_of_the_errors_over_many_draws(held):
 
 def test_of_many_references_the_covariance_is_that_of_the_nearest_computed_one(world, wrong_poses, monkeypatch):
     sigmas = np.tile(POSE_SIGMAS, (len(wrong_poses), 1))
-    every = seen(world, wrong_poses, pose_sigmas=sigmas, sigma_factor=1.0).covariances
-    monkeypatch.setattr("omninav.stages.geometry.landmarks.adjustment.COVARIANCES", 5)
-    some = seen(world, wrong_poses, pose_sigmas=sigmas, sigma_factor=1.0).covariances
+    every = seen(world, wrong_poses, pose_sigmas=sigmas).covariances(1.0)
+    monkeypatch.setattr("omninav.stages.geometry.landmarks.adjustment.MAX_COVARIANCES", 5)
+    some = seen(world, wrong_poses, pose_sigmas=sigmas).covariances(1.0)
     assert every.shape == some.shape == (120, 3, 3)
     rows = np.linspace(0, 119, 5).astype(int)
     nearest = rows[np.abs(np.arange(120)[:, None] - rows).argmin(axis=1)]
     assert some == pytest.approx(every[nearest], rel=1e-6)
-    assert seen(world, wrong_poses, pose_sigmas=sigmas).covariances is None
