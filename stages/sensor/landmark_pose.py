@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Annotated
 
 import numpy as np
@@ -17,12 +17,13 @@ from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched,
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.geometry.plane.stamp_jitter import StampJitter, in_map
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.visual_words import VisualWords
 
 WORD_REFERENCES = (10, 80)
@@ -42,6 +43,10 @@ that repeats itself, so that of 40 landmarks that agree on a wrong pose all lie 
 that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
+SURE = 0.95
+"""Probability of a pose from which on it tells how much stamps jitter."""
+SAID_JITTER_S = 0.01
+"""Standard deviation of stamps from which on the run is told of it, s."""
 MAX_MOTIONS = 5.0
 """Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
@@ -52,9 +57,24 @@ WITHOUT_LANDMARKS = (
 
 
 class LandmarkPoseState(State):
-    """Stamp of the last image (ns)."""
+    """Stamp of the last image (ns), and the fields of `jitter`; `told`: whether the run was told of it."""
 
     stamp: int = 0
+    pose: Array = field(default_factory=lambda: StampJitter.unknown().pose)
+    covariance: Array = field(default_factory=lambda: StampJitter.unknown().covariance)
+    velocity: Array = field(default_factory=lambda: StampJitter.unknown().velocity)
+    along: Array = field(default_factory=lambda: StampJitter.unknown().along)
+    hypotheses: Array = field(default_factory=lambda: StampJitter.unknown().hypotheses)
+    told: bool = False
+
+    @property
+    def jitter(self) -> StampJitter:
+        """How much stamps jitter."""
+        return StampJitter(self.pose, self.covariance, self.velocity, self.along, self.hypotheses)
+
+    @jitter.setter
+    def jitter(self, new: StampJitter) -> None:
+        self.pose, self.covariance, self.velocity, self.along, self.hypotheses = new
 
 
 class LandmarkPose(Stage):
@@ -67,7 +87,8 @@ class LandmarkPose(Stage):
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
     landmarks. Where the tour showed that images are stamped late, the pose is moved on by the robot's motion over that
-    time. Raises BadInput for features of another kind than the map's.
+    time; where stamps jitter, its covariance allows for the motion over their standard deviation. Raises BadInput for
+    features of another kind than the map's.
     """
 
     min_inliers: Annotated[int, Bounds(ge=4)] = 8
@@ -91,6 +112,7 @@ class LandmarkPose(Stage):
     ) -> Out:
         """Find the pose of the robot that took one image; `motion`: since the last one."""
         seconds, state.stamp = (ctx.tick.stamp - state.stamp) / 1e9, ctx.tick.stamp
+        jitter, state.jitter = state.jitter, state.jitter.interrupted()
         landmarks = map.landmarks
         if landmarks is None:
             ctx.warn(WITHOUT_LANDMARKS)
@@ -114,10 +136,28 @@ class LandmarkPose(Stage):
         mount, late = landmarks.mounted(camera.mount, camera.placed), landmarks.late_by(camera.delay)
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
-        if late and motion is not None and seconds > 0.0:
-            share = min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS)
-            poses = compose(poses, share * np.array([motion.x, motion.y, motion.turn]))
+        if motion is None or seconds <= 0.0:
+            return self.Out(fix=replace(best, poses=poses, covariances=covariances))
+        moved = np.array([motion.x, motion.y, motion.turn])
+        if late:
+            poses = compose(poses, min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS) * moved)
+        if best.probabilities[0] >= SURE and not isinstance(motion, AssumedMotion):  # seen motion has the same stamps
+            jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)
+        variance = jitter.variance()
+        if variance > 0.0:
+            along = in_map(np.broadcast_to(moved / seconds, poses.shape), poses[:, 2])
+            covariances = covariances + variance * along[:, :, None] * along[:, None, :]
+            self._say_jitter(ctx, state, math.sqrt(variance))
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
+
+    def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
+        if sigma < SAID_JITTER_S or state.told:
+            return
+        state.told = True
+        ctx.warn(
+            f"the images' time stamps jitter by some {1e3 * sigma:.0f} ms against odometry's, for which covariances of "
+            "poses allow; stamp images when they are taken, by the camera's clock or its trigger"
+        )
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:
         theirs = restored_descriptors(landmarks.descriptors[rows])

@@ -26,7 +26,7 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Motion
+from omninav.stages.values.pose import AssumedMotion, Motion
 
 FIRST = np.array([3.1, 2.9, 0.4])
 AWAY = np.array([40.0, 0.0, 0.0])
@@ -236,3 +236,26 @@ def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion()
     assert at(10**9) == pytest.approx(compose(FIRST, [0.1, 0.0, 0.05]), abs=1e-3)
     assert at(3 * 10**9) == pytest.approx(compose(FIRST, [0.05, 0.0, 0.025]), abs=1e-3)
     assert at(4 * 10**9, replace(camera, delay=0.35)) == pytest.approx(FIRST, abs=1e-3)
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_covariances_allow_for_stamps_that_jitter_but_not_where_images_showed_the_motion(seen: bool) -> None:
+    camera = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5)
+    state, ctx, rng, map = LandmarkPoseState(), Context("landmark_pose"), np.random.default_rng(1), mapped_room()
+    late = rng.normal(0.0, 0.05, 30)
+    for number, place in enumerate(0.1 * np.arange(30) + 0.5 * late):
+        ctx.tick = Tick(number, 200_000_000 * (number + 1), first_of_log=number == 0)
+        features = seen_from(room(), compose(FIRST, [place, 0.0, 0.0]))
+        motion = AssumedMotion(0.1, 0.0, 0.0, 0.1, 0.1) if seen else Motion(0.1, 0.0, 0.0)
+        found = LandmarkPose().step(ctx, state, features, map, camera=camera, motion=motion).fix
+    ahead = np.array([math.cos(FIRST[2]), math.sin(FIRST[2]), 0.0])
+    sigma = math.sqrt(ahead @ found.covariances[0] @ ahead)
+    if seen:
+        assert sigma < 0.003
+        assert not ctx.warnings
+        return
+    assert 0.5 * 0.05 * 0.5 < sigma < 0.5 * 0.05 * 1.5
+    aside = np.array([-ahead[1], ahead[0], 0.0])
+    assert math.sqrt(aside @ found.covariances[0] @ aside) < 0.003
+    assert len(ctx.warnings) == 1
+    assert "time stamps jitter by some" in ctx.warnings[0]
