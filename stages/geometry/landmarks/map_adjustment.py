@@ -16,6 +16,7 @@ from .adjustment import Lens, Motions, adjusted
 from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
 from .floor import floor_depth, lowest_plane
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
+from .pair_lengths import Steps, driven_steps, pair_lengths
 from .tracks import Tracks, joined_matches
 from .triangulation import triangulated_tracks
 
@@ -65,7 +66,8 @@ class AdjustedMap(NamedTuple):
     `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
     `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
     images measured any. `covariances`: a function that gives those (R, 3, 3) of the poses, 0 where images confirm given
-    ones; None where nothing was adjusted.
+    ones; None where nothing was adjusted. `slipped` (S,): references after which odometry had another length than the
+    images show, up to the next one.
     """
 
     poses: Array
@@ -75,6 +77,7 @@ class AdjustedMap(NamedTuple):
     scale: float | None = None
     seen: Array | None = None
     covariances: Callable[[], Array] | None = None
+    slipped: Ints = np.empty(0, np.int64)
 
 
 def found_with_mount(
@@ -175,12 +178,17 @@ def adjusted_drive(
     closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())
     if closures < MIN_CLOSURES:
         return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")
+    lengths = pair_lengths(views.bearings, verified, odometry)
+    sigmas = odometry_sigmas(steps)
+    if seen_motion:
+        driven_by = Steps(steps, np.array(SEEN_LOOSENESS) * sigmas, np.empty(0, np.int64))
+    else:
+        driven_by = driven_steps(steps, sigmas, verified, lengths)
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
-    looseness = np.array(SEEN_LOOSENESS) if seen_motion else np.ones(3)
-    motions = Motions(np.column_stack([along[:-1], along[1:]]), steps, looseness * odometry_sigmas(steps))
-    found = _Found(straightened_drive(odometry, verified), None)
+    motions = Motions(np.column_stack([along[:-1], along[1:]]), driven_by.motions, driven_by.sigmas)
+    found = _Found(straightened_drive(odometry[0], driven_by.motions, driven_by.sigmas, verified, lengths), None)
     for miss in MISSES:
         again = _bundled(views, tracks, found, seen, miss, None, motions, None)
         if again is None:
@@ -208,7 +216,7 @@ def adjusted_drive(
     def uncertain() -> Array:
         return covariances(SIGMA_FACTOR) * np.outer(units, units)
 
-    return AdjustedMap(poses, found.camera, closures=closures, scale=scale, seen=measured, covariances=uncertain)
+    return AdjustedMap(poses, found.camera, "", closures, scale, measured, uncertain, driven_by.slipped)
 
 
 class _Found(NamedTuple):

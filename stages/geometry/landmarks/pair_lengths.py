@@ -1,0 +1,144 @@
+"""Lengths of the motions between pairs of images, by the depths of the features that pairs have in common."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from omninav.stages.geometry.arrays import Array, Ints
+
+from .closures import FAR_M, LENGTH_SIGMA, LENGTH_SIGMA_M, TURN_SIGMA, VerifiedPairs
+
+MIN_PARALLAX = math.radians(0.7)
+"""Smallest angle between the bearings of a match whose depth counts (rad)."""
+MIN_COMMON, MAX_APART = 3, 12
+"""Features in common with which two pairs are compared, and the pairs of one feature among which each is compared with
+the next ones."""
+DEPTH_SIGMA = 0.15
+"""Standard deviation of the logarithm of a ratio of two depths."""
+ODOMETRY_SIGMA, ODOMETRY_SIGMA_M = 0.2, 0.01
+"""Standard deviation of a length by odometry, a part of it, and m: pairs that overlap share their errors."""
+MIN_LENGTH_M = 0.05
+"""Smallest length by odometry that counts, m."""
+MIN_SLIP, MIN_SLIP_M, COMPARED = 0.12, 0.05, 5
+"""Smallest difference of a length by odometry that tells that wheels slipped, a part of the greater length, and m; and
+motions over which lengths are compared. In a house without slip the largest such part is 0.08."""
+FIRST_SCALE, LAST_SCALE, ROUNDS = 100.0, 1.0, 15
+"""Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of so many rounds."""
+FREE = 1e3
+"""Standard deviation of the logarithm of a length of which nothing is known."""
+
+
+class Steps(NamedTuple):
+    """Motions (R - 1, 3) of a drive from reference to reference, with their standard deviations (R - 1, 3).
+
+    `slipped` (S,): those for which odometry has another length than the images show; their motion is what these show.
+    """
+
+    motions: Array
+    sigmas: Array
+    slipped: Ints
+
+
+def pair_lengths(bearings: Array, pairs: VerifiedPairs, odometry: Array) -> Array:
+    """Lengths (P,), m, of the motions of verified pairs; NaN where nothing tells.
+
+    `bearings` (N, 3): of all features; `odometry` (R, 3): poses of the references, wrong where wheels slipped. A match
+    has its depth in lengths of the pair's motion, so that a feature of two pairs gives the ratio of their lengths. Most
+    of odometry's lengths and these ratios agree: least squares of logarithms with Cauchy's loss.
+    """
+    from scipy import sparse  # slow to import, and seldom needed
+    from scipy.sparse.linalg import splu
+
+    measured = _measured(pairs, odometry)
+    one, other, ratios, sigmas = _ratios(bearings, pairs)
+    known, number = np.flatnonzero(np.isfinite(measured)), len(measured)
+    weights = 1.0 / np.concatenate([sigmas, ODOMETRY_SIGMA + ODOMETRY_SIGMA_M / measured[known]])
+    links, signs = np.arange(len(one)), np.repeat([-1.0, 1.0], [len(one), len(one) + len(known)])
+    rows = np.concatenate([links, links, len(one) + np.arange(len(known))])
+    columns = np.concatenate([one, other, known])
+    slopes = sparse.csr_array((signs * weights[rows], (rows, columns)), shape=(len(weights), number))
+    right = np.concatenate([ratios, np.log(measured[known])]) * weights
+    lengths, trusted = np.zeros(number), np.ones(len(right))
+    for scale in np.geomspace(FIRST_SCALE, LAST_SCALE, ROUNDS):
+        weighted = slopes.T * trusted
+        normal = (weighted @ slopes + FREE**-2 * sparse.eye_array(number)).tocsc()
+        lengths = splu(normal, permc_spec="MMD_AT_PLUS_A").solve(weighted @ right)
+        trusted = 1.0 / (1.0 + ((slopes @ lengths - right) / scale) ** 2)
+    return np.where(np.bincount(columns, minlength=number) > 0, np.exp(lengths), np.nan)
+
+
+def driven_steps(steps: Array, sigmas: Array, pairs: VerifiedPairs, lengths: Array) -> Steps:
+    """Motions from reference to reference by odometry, `steps` (R - 1, 3), and by the images where wheels slipped.
+
+    `sigmas` (R - 1, 3): standard deviations of odometry; `lengths` (P,): of the pairs.
+    """
+    next_to = np.flatnonzero((np.diff(pairs.pairs, axis=1)[:, 0] == 1) & np.isfinite(lengths))
+    next_to = next_to[np.argsort(pairs.pairs[next_to, 0])]
+    rows, length = pairs.pairs[next_to, 0], lengths[next_to]
+    seen, driven = (np.convolve(each, np.ones(COMPARED)) for each in (length, np.hypot(steps[rows, 0], steps[rows, 1])))
+    slips = np.abs(seen - driven) > np.maximum(MIN_SLIP * np.maximum(seen, driven), MIN_SLIP_M)
+    wrong = np.convolve(slips, np.ones(COMPARED), "valid") > 0.0
+    rows, length, direction = rows[wrong], length[wrong], pairs.directions[next_to[wrong]]
+    motions, spreads = steps.copy(), sigmas.copy()
+    motions[rows] = np.column_stack(
+        [length * np.cos(direction), length * np.sin(direction), pairs.turns[next_to[wrong]]]
+    )
+    spreads[rows, :2] = LENGTH_SIGMA_M + LENGTH_SIGMA * length[:, None]
+    spreads[rows, 2] = TURN_SIGMA
+    return Steps(motions, spreads, rows)
+
+
+def _measured(pairs: VerifiedPairs, odometry: Array) -> Array:
+    """Lengths (P,) of the pairs by odometry, m; NaN where these are too short, or too far apart along the drive."""
+    one, other = pairs.pairs.T
+    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(odometry[:, :2], axis=0).T))])
+    lengths = np.hypot(*(odometry[other] - odometry[one])[:, :2].T)
+    return np.where((driven[other] - driven[one] < FAR_M) & (lengths > MIN_LENGTH_M), lengths, np.nan)
+
+
+def _ratios(bearings: Array, pairs: VerifiedPairs) -> tuple[Ints, Ints, Array, Array]:
+    """Pairs that have features in common, one and the other (C,), the logarithm of the other's length over the one's
+    (C,), and its standard deviation (C,)."""
+    here, there = _depths(bearings, pairs)
+    features, depths = np.concatenate([pairs.first, pairs.second]), np.concatenate([here, there])
+    owners = np.concatenate([pairs.owners, pairs.owners])
+    order = np.lexsort((owners, features))
+    order = order[np.isfinite(depths[order])]
+    features, depths, owners = features[order], np.log(depths[order]), owners[order]
+    keys, values = [], []
+    for apart in range(1, MAX_APART):
+        same = features[apart:] == features[:-apart]
+        keys.append((owners[:-apart] * len(pairs.pairs) + owners[apart:])[same])
+        values.append((depths[:-apart] - depths[apart:])[same])
+    key, value = np.concatenate(keys), np.concatenate(values)
+    key, starts, value, counts = _grouped(key, value)
+    median = value[starts + counts // 2]
+    _, _, off, _ = _grouped(np.repeat(key, counts), np.abs(value - np.repeat(median, counts)))
+    spread = 1.25 * np.maximum(1.4826 * off[starts + counts // 2], DEPTH_SIGMA)
+    enough = counts >= MIN_COMMON
+    one, other = np.divmod(key[enough], len(pairs.pairs))
+    return one, other, median[enough], (spread / np.sqrt(counts))[enough]
+
+
+def _depths(bearings: Array, pairs: VerifiedPairs) -> tuple[Array, Array]:
+    """Distances (M,) of matched features from the first image and from the second, in lengths of the pair's motion; NaN
+    where they have too little parallax or would lie behind."""
+    turns, directions = pairs.turns[pairs.owners], pairs.directions[pairs.owners]
+    cos, sin = np.cos(turns), np.sin(turns)
+    first, (x, y, z) = bearings[pairs.first], bearings[pairs.second].T
+    second = np.column_stack([cos * x - sin * y, sin * x + cos * y, z])
+    towards = np.column_stack([np.cos(directions), np.sin(directions), np.zeros(len(directions))])
+    between = np.einsum("mi,mi->m", first, second)
+    from_first, from_second = np.einsum("mi,mi->m", first, towards), np.einsum("mi,mi->m", second, towards)
+    square = np.maximum(1.0 - between**2, 1e-12)
+    here, there = (from_first - between * from_second) / square, (between * from_first - from_second) / square
+    tells = (square > math.sin(MIN_PARALLAX) ** 2) & (here > 0.0) & (there > 0.0)
+    return np.where(tells, here, np.nan), np.where(tells, there, np.nan)
+
+
+def _grouped(keys: Ints, values: Array) -> tuple[Ints, Ints, Array, Ints]:
+    """The different keys, where each one's values start, the values (N,), sorted by key and size, and their numbers."""
+    order = np.lexsort((values, keys))
+    different, starts, counts = np.unique(keys[order], return_index=True, return_counts=True)
+    return different, starts, values[order], counts
