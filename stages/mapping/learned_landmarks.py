@@ -138,6 +138,8 @@ class LearnLandmarks(Stage):
             _sigmas(adjusted, poses, mount),
         )
         ctx.fact("landmarks", len(landmarks))
+        if len(adjusted.slipped):
+            ctx.warn(_slipped(adjusted, map.poses if as_driven is None else as_driven.poses))
         poses = robot_poses(poses, mount)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         ctx.fact("map_adjusted", _words(adjusted, float(moved.max(initial=0.0)), given))
@@ -202,6 +204,19 @@ def _robot(
     poses = np.array([(pose.x, pose.y, pose.heading) for pose in driven if pose is not None])
     taken = [event is not None for event in events]
     return RobotPath(poses[taken] if measured is None else measured, times[taken], poses, times)
+
+
+def _slipped(adjusted: AdjustedMap, odometry: Array) -> str:
+    """The sentence on a tour whose odometry (R, 3) slipped."""
+    seen, driven = (
+        float(np.hypot(*(poses[adjusted.slipped + 1] - poses[adjusted.slipped])[:, :2].T).sum())
+        for poses in (adjusted.poses, odometry)
+    )
+    return (
+        f"the tour's odometry has another length than its images show between references {adjusted.slipped[0]} and "
+        f"{adjusted.slipped[-1] + 1}: {driven:.2f} m in place of {seen:.2f}, as of wheels that slip; the map "
+        "has what the images show"
+    )
 
 
 def _sigmas(adjusted: AdjustedMap, poses: Array, mount: Array) -> Array | None:

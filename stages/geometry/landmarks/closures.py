@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.pose_graph import optimised_poses
-from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
 from .map_making import LocalViews, pair_matches
@@ -27,10 +27,11 @@ MAX_FALSE_ALARMS = 1e-6
 """Expected number of motions that as many matches agree on by chance, at most."""
 TURN_SIGMA = math.radians(0.5)
 """Standard deviation of a pair's turn (rad)."""
-LENGTH_SIGMA, LENGTH_SIGMA_M = 0.1, 0.05
-"""Standard deviation of where the second reference of a pair lies: a part of its distance, and m."""
-UNKNOWN_M = 2.0
-"""The same where its distance is not known, m."""
+DISTANCE_SIGMAS_M = (2.0, 0.3, 0.3)
+"""Standard deviations (m) of where the second reference of a pair lies, round by round: the first does not know how far
+away it is, the next have the distance of the round before."""
+MAX_DISTANCE_M = 4.0
+"""Distance of a pair, m, beyond which it is not believed."""
 
 
 class VerifiedPairs(NamedTuple):
@@ -100,25 +101,25 @@ def verified_pairs(views: LocalViews, pairs: Ints, rng: np.random.Generator) -> 
     )
 
 
-def straightened_drive(first: Array, steps: Array, sigmas: Array, verified: VerifiedPairs, lengths: Array) -> Array:
+def straightened_drive(first: Array, steps: Array, sigmas: Array, verified: VerifiedPairs) -> Array:
     """Poses (R, 3) of one drive that agree best with its odometry and with the motions of verified pairs.
 
     `first` (3,): the first pose; `steps` (R - 1, 3): motions from each to the next, with standard deviations `sigmas`
-    (R - 1, 3); `lengths` (P,) of the pairs' motions, m, NaN where they are not known. A pose graph with Cauchy's loss
-    on the pairs.
+    (R - 1, 3). A pose graph with Cauchy's loss on the pairs. How long a pair's motion is, the poses of the round before
+    say: across its direction it is measured, along it each round confirms the last.
     """
-    poses = np.concatenate([first[None], np.empty_like(steps)])
-    for row, step in enumerate(steps):
-        poses[row + 1] = compose(poses[row], step)
-    known = np.isfinite(lengths)
-    distances = np.where(known, lengths, 0.0)
-    towards = distances * np.stack([np.cos(verified.directions), np.sin(verified.directions)])
-    spreads = np.where(known, LENGTH_SIGMA_M + LENGTH_SIGMA * distances, UNKNOWN_M)
-    along = np.arange(len(steps))
-    return optimised_poses(
-        poses,
-        np.concatenate([np.column_stack([along, along + 1]), verified.pairs]),
-        np.concatenate([steps, np.column_stack([*towards, verified.turns])]),
-        np.concatenate([sigmas, np.column_stack([spreads, spreads, np.full(len(spreads), TURN_SIGMA)])]),
-        np.arange(len(steps) + len(spreads)) >= len(steps),
-    )[0]
+    poses = np.concatenate([first[None], compose(first, chain(steps))])
+    along = np.column_stack([np.arange(len(steps)), np.arange(1, len(poses))])
+    (one, other), pairs = verified.pairs.T, len(verified.pairs)
+    edges, distances = np.concatenate([along, verified.pairs]), np.zeros(pairs)
+    for sigma in DISTANCE_SIGMAS_M:
+        towards = distances * np.stack([np.cos(verified.directions), np.sin(verified.directions)])
+        poses, _ = optimised_poses(
+            poses,
+            edges,
+            np.concatenate([steps, np.column_stack([*towards, verified.turns])]),
+            np.concatenate([sigmas, np.tile([sigma, sigma, TURN_SIGMA], (pairs, 1))]),
+            np.arange(len(edges)) >= len(along),
+        )
+        distances = np.minimum(np.hypot(*(poses[other] - poses[one])[:, :2].T), MAX_DISTANCE_M)
+    return poses

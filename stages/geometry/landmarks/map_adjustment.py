@@ -178,17 +178,15 @@ def adjusted_drive(
     closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())
     if closures < MIN_CLOSURES:
         return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")
-    lengths = pair_lengths(views.bearings, verified, odometry)
-    sigmas = odometry_sigmas(steps)
-    if seen_motion:
-        driven_by = Steps(steps, np.array(SEEN_LOOSENESS) * sigmas, np.empty(0, np.int64))
-    else:
-        driven_by = driven_steps(steps, sigmas, verified, lengths)
+    measured, looseness = Steps(steps, odometry_sigmas(steps), np.empty(0, np.int64)), np.array(SEEN_LOOSENESS)
+    if not seen_motion:
+        lengths = pair_lengths(views.bearings, verified, odometry)
+        measured, looseness = driven_steps(steps, measured.sigmas, verified, lengths), np.ones(3)
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
-    motions = Motions(np.column_stack([along[:-1], along[1:]]), driven_by.motions, driven_by.sigmas)
-    found = _Found(straightened_drive(odometry[0], driven_by.motions, driven_by.sigmas, verified, lengths), None)
+    motions = Motions(np.column_stack([along[:-1], along[1:]]), measured.motions, looseness * measured.sigmas)
+    found = _Found(straightened_drive(odometry[0], measured.motions, measured.sigmas, verified), None)
     for miss in MISSES:
         again = _bundled(views, tracks, found, seen, miss, None, motions, None)
         if again is None:
@@ -211,12 +209,12 @@ def adjusted_drive(
     poses = _wrapped(poses)
     units = np.array([scale or 1.0, scale or 1.0, 1.0])
     # Motion that was seen in the images is the camera's, and tells nothing of the robot under it.
-    measured = None if seen_motion else poses
+    shown = None if seen_motion else poses
 
     def uncertain() -> Array:
         return covariances(SIGMA_FACTOR) * np.outer(units, units)
 
-    return AdjustedMap(poses, found.camera, "", closures, scale, measured, uncertain, driven_by.slipped)
+    return AdjustedMap(poses, found.camera, "", closures, scale, shown, uncertain, measured.slipped)
 
 
 class _Found(NamedTuple):

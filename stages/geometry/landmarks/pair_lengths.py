@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
 
-from .closures import FAR_M, LENGTH_SIGMA, LENGTH_SIGMA_M, TURN_SIGMA, VerifiedPairs
+from .closures import FAR_M, TURN_SIGMA, VerifiedPairs
 
 MIN_PARALLAX = math.radians(0.7)
 """Smallest angle between the bearings of a match whose depth counts (rad)."""
@@ -20,9 +20,16 @@ ODOMETRY_SIGMA, ODOMETRY_SIGMA_M = 0.2, 0.01
 """Standard deviation of a length by odometry, a part of it, and m: pairs that overlap share their errors."""
 MIN_LENGTH_M = 0.05
 """Smallest length by odometry that counts, m."""
-MIN_SLIP, MIN_SLIP_M, COMPARED = 0.12, 0.05, 5
-"""Smallest difference of a length by odometry that tells that wheels slipped, a part of the greater length, and m; and
-motions over which lengths are compared. In a house without slip the largest such part is 0.08."""
+COMPARED, MIN_SLIP, MIN_SLIP_M = 5, 0.12, 0.1
+"""Motions over which lengths are compared; and smallest difference that tells that wheels slipped: a part of the
+greater length (in a house without slip it is at most 0.08), and m, as images may be late."""
+MAX_USUAL = 0.06
+"""Median of such differences above which odometry and images have other lengths everywhere, as where the camera's mount
+is not known yet: then none tells anything."""
+ARM_M = 0.2
+"""Distance from the robot's axis, m, that a camera may have beside its described mount, so that turns move it."""
+LENGTH_SIGMA, LENGTH_SIGMA_M = 0.1, 0.05
+"""Standard deviation of a length by images: a part of it, and m."""
 FIRST_SCALE, LAST_SCALE, ROUNDS = 100.0, 1.0, 15
 """Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of so many rounds."""
 FREE = 1e3
@@ -76,9 +83,14 @@ def driven_steps(steps: Array, sigmas: Array, pairs: VerifiedPairs, lengths: Arr
     next_to = np.flatnonzero((np.diff(pairs.pairs, axis=1)[:, 0] == 1) & np.isfinite(lengths))
     next_to = next_to[np.argsort(pairs.pairs[next_to, 0])]
     rows, length = pairs.pairs[next_to, 0], lengths[next_to]
-    seen, driven = (np.convolve(each, np.ones(COMPARED)) for each in (length, np.hypot(steps[rows, 0], steps[rows, 1])))
-    slips = np.abs(seen - driven) > np.maximum(MIN_SLIP * np.maximum(seen, driven), MIN_SLIP_M)
-    wrong = np.convolve(slips, np.ones(COMPARED), "valid") > 0.0
+    if len(rows) < COMPARED:
+        return Steps(steps, sigmas, np.empty(0, np.int64))
+    compared = np.column_stack([length, np.hypot(steps[rows, 0], steps[rows, 1]), ARM_M * np.abs(steps[rows, 2])])
+    seen, driven, swung = (np.convolve(each, np.ones(COMPARED), "valid") for each in compared.T)
+    off, greater = np.abs(seen - driven), np.maximum(seen, driven)
+    slips = off > np.maximum(MIN_SLIP * greater, MIN_SLIP_M) + swung
+    slips &= np.median(off / np.maximum(greater, MIN_LENGTH_M)) < MAX_USUAL
+    wrong = np.convolve(slips, np.ones(COMPARED)) > 0.0
     rows, length, direction = rows[wrong], length[wrong], pairs.directions[next_to[wrong]]
     motions, spreads = steps.copy(), sigmas.copy()
     motions[rows] = np.column_stack(

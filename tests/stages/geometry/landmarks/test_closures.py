@@ -6,6 +6,7 @@ from landmark_world import driven, misplaced
 
 from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
+from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, wrap
 
 
@@ -15,6 +16,11 @@ def verified(world, views, similarity):
     pairs = candidate_pairs(iter(similarity), way)
     apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
     return verified_pairs(views, np.concatenate([pairs, apart]), np.random.default_rng(2))
+
+
+def straightened(odometry, verified):
+    steps = between(odometry[:-1], odometry[1:])
+    return straightened_drive(odometry[0], steps, odometry_sigmas(steps), verified)
 
 
 def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
@@ -28,15 +34,22 @@ def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
     assert np.degrees(np.percentile(np.abs(towards), 95)) < 2.0
 
 
-def test_matches_that_agree_are_of_one_landmark_and_pairs_that_share_nothing_are_left_out(landmarks, verified):
+def test_matches_that_agree_are_of_one_landmark_and_pairs_that_share_nothing_are_left_out(landmarks, views, verified):
     assert (landmarks[verified.first] == landmarks[verified.second]).mean() > 0.97
-    assert len(verified.first) == len(verified.second) == len(verified.ratio) > 12 * len(verified.pairs)
+    assert (
+        len(verified.first)
+        == len(verified.second)
+        == len(verified.ratio)
+        == len(verified.owners)
+        > 12 * len(verified.pairs)
+    )
+    assert (views.owners[verified.first] == verified.pairs[verified.owners, 0]).all()
     assert not {(5, 95), (20, 80)} & set(map(tuple, verified.pairs.tolist()))
 
 
 def test_a_drive_that_odometry_has_bent_is_straightened(world, verified):
     _, odometry = driven(world.poses)
-    straight = straightened_drive(odometry, verified)
+    straight = straightened(odometry, verified)
     assert misplaced(odometry, world.poses)[0] > 0.4
     assert misplaced(straight, world.poses)[0] < 0.06
     assert (straight[0] == odometry[0]).all()
@@ -45,7 +58,7 @@ def test_a_drive_that_odometry_has_bent_is_straightened(world, verified):
 def test_without_a_pair_odometry_stays(world, views):
     nothing = verified_pairs(views, np.zeros((0, 2), np.int64), np.random.default_rng(0))
     _, odometry = driven(world.poses)
-    assert straightened_drive(odometry, nothing) == pytest.approx(odometry, abs=1e-6)
+    assert straightened(odometry, nothing) == pytest.approx(odometry, abs=1e-6)
 
 
 def test_a_reference_without_features_has_no_pairs(views):
@@ -69,6 +82,6 @@ def test_where_a_pair_lies_is_measured_across_its_direction():
     verified = verified_pairs(
         local_views([np.zeros((0, 3))] * 4, []), np.zeros((0, 2), np.int64), np.random.default_rng(0)
     )._replace(pairs=np.array([[0, 3]]), turns=np.array([math.radians(3.0)]), directions=np.zeros(1))  # fmt: skip
-    straight = straightened_drive(odometry, verified)
+    straight = straightened(odometry, verified)
     assert straight[3, 0] == pytest.approx(3.0, abs=0.1)
     assert 0.5 < np.degrees(straight[3, 2]) < 3.1
