@@ -207,14 +207,14 @@ def _robot(
 
 
 def _slipped(adjusted: AdjustedMap, odometry: Array) -> str:
-    """The sentence on a tour whose odometry (R, 3) slipped."""
-    seen, driven = (
-        float(np.hypot(*(poses[adjusted.slipped + 1] - poses[adjusted.slipped])[:, :2].T).sum())
-        for poses in (adjusted.poses, odometry)
-    )
+    """The sentence on a tour whose odometry (R, 3) slipped: of the longest such stretch."""
+    stretch = max(np.split(adjusted.slipped, np.flatnonzero(np.diff(adjusted.slipped) > 1) + 1), key=len)
+    steps = (np.hypot(*(poses[stretch + 1] - poses[stretch])[:, :2].T) for poses in (adjusted.poses, odometry))
+    seen, driven = (float(each.sum()) for each in steps)
+    seen /= adjusted.scale or 1.0
     return (
-        f"the tour's odometry has another length than its images show between references {adjusted.slipped[0]} and "
-        f"{adjusted.slipped[-1] + 1}: {driven:.2f} m in place of {seen:.2f}, as of wheels that slip; the map "
+        f"the tour's odometry has another length than its images show between references {stretch[0]} and "
+        f"{stretch[-1] + 1}: {driven:.2f} m in place of {seen:.2f}, as of wheels that slip; the map "
         "has what the images show"
     )
 

@@ -112,6 +112,8 @@ class LandmarkPose(Stage):
     ) -> Out:
         """Find the pose of the robot that took one image; `motion`: since the last one."""
         seconds, state.stamp = (ctx.tick.stamp - state.stamp) / 1e9, ctx.tick.stamp
+        if ctx.tick.first_of_log:
+            state.jitter, state.told = StampJitter.unknown(), False
         jitter, state.jitter = state.jitter, state.jitter.interrupted()
         landmarks = map.landmarks
         if landmarks is None:
@@ -141,13 +143,15 @@ class LandmarkPose(Stage):
         moved = np.array([motion.x, motion.y, motion.turn])
         if late:
             poses = compose(poses, min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS) * moved)
-        if best.probabilities[0] >= SURE and not isinstance(motion, AssumedMotion):  # seen motion has the same stamps
-            jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)
-        variance = jitter.variance()
-        if variance > 0.0:
-            along = in_map(np.broadcast_to(moved / seconds, poses.shape), poses[:, 2])
-            covariances = covariances + variance * along[:, :, None] * along[:, None, :]
-            self._say_jitter(ctx, state, math.sqrt(variance))
+        if not isinstance(motion, AssumedMotion):  # seen motion has the same stamps
+            if best.probabilities[0] >= SURE:
+                jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)
+            variance = jitter.variance()
+            if variance > 0.0:
+                self._say_jitter(ctx, state, math.sqrt(variance))
+                along = in_map(np.broadcast_to(moved, poses.shape), poses[:, 2] - 0.5 * moved[2])
+                motions = min(variance / seconds**2, MAX_MOTIONS**2)
+                covariances = covariances + motions * along[:, :, None] * along[:, None, :]
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
     def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
@@ -155,8 +159,8 @@ class LandmarkPose(Stage):
             return
         state.told = True
         ctx.warn(
-            f"the images' time stamps jitter by some {1e3 * sigma:.0f} ms against odometry's, for which covariances of "
-            "poses allow; stamp images when they are taken, by the camera's clock or its trigger"
+            f"images are some {1e3 * sigma:.0f} ms off odometry, each by itself, for which covariances allow: their "
+            "time stamps jitter, or poses are less accurate than they say; stamp images when they are taken"
         )
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:

@@ -52,9 +52,11 @@ def pair_lengths(bearings: Array, pairs: VerifiedPairs, odometry: Array) -> Arra
 
     `bearings` (N, 3): of all features; `odometry` (R, 3): poses of the references, wrong where wheels slipped. A match
     has its depth in lengths of the pair's motion, so that a feature of two pairs gives the ratio of their lengths. Most
-    of odometry's lengths and these ratios agree: least squares of logarithms with Cauchy's loss.
+    of odometry's lengths and these ratios agree: least squares of logarithms with Cauchy's loss. Where wheels slipped
+    over half of the pairs that ratios link, as of one room, lengths are wrong.
     """
     from scipy import sparse  # slow to import, and seldom needed
+    from scipy.sparse.csgraph import connected_components
     from scipy.sparse.linalg import splu
 
     measured = _measured(pairs, odometry)
@@ -72,7 +74,10 @@ def pair_lengths(bearings: Array, pairs: VerifiedPairs, odometry: Array) -> Arra
         normal = (weighted @ slopes + FREE**-2 * sparse.eye_array(number)).tocsc()
         lengths = splu(normal, permc_spec="MMD_AT_PLUS_A").solve(weighted @ right)
         trusted = 1.0 / (1.0 + ((slopes @ lengths - right) / scale) ** 2)
-    return np.where(np.bincount(columns, minlength=number) > 0, np.exp(lengths), np.nan)
+    # Pairs that ratios link have one factor in common, which odometry must tell.
+    _, groups = connected_components(sparse.csr_array((np.ones(len(one)), (one, other)), shape=(number, number)))
+    told = np.bincount(groups, np.isfinite(measured)) > 0.0
+    return np.where(told[groups], np.exp(lengths), np.nan)
 
 
 def driven_steps(steps: Array, sigmas: Array, pairs: VerifiedPairs, lengths: Array) -> Steps:

@@ -61,7 +61,7 @@ class StampJitter(NamedTuple):
             return new
         missed = pose - compose(self.pose, moved)
         missed[2] = wrap(missed[2])
-        velocity = in_map(moved / seconds, pose[2])
+        velocity = in_map(moved / seconds, pose[2] - 0.5 * moved[2])
         weighted = np.linalg.solve(covariance + self.covariance, velocity)
         information = float(weighted @ velocity)
         if information < MAX_SIGMA_S**-2:
@@ -94,7 +94,7 @@ class StampJitter(NamedTuple):
 
 
 def in_map(velocities: Array, headings: Array | float) -> Array:
-    """Velocities (..., 3) of robots with headings (...,), rad, from their frames into the map's."""
+    """Velocities (..., 3), of robots with headings (...,), rad, turned from their frames into the map's."""
     cos, sin = np.cos(headings), np.sin(headings)
     x, y, turn = np.moveaxis(velocities, -1, 0)
     return np.stack([cos * x - sin * y, sin * x + cos * y, turn], axis=-1)

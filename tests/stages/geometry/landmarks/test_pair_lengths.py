@@ -58,6 +58,11 @@ def test_pairs_that_nothing_links_have_the_length_of_odometry_or_none(world, vie
     assert np.isnan(far)
 
 
+def test_pairs_that_only_link_to_each_other_have_no_length(world, views, verified):
+    hanging = np.repeat(world.poses[:1], len(world.poses), axis=0)  # odometry that tells no length at all
+    assert np.isnan(pair_lengths(views.bearings, verified, hanging)).all()
+
+
 @pytest.mark.parametrize("factor", [0.2, 3.0])
 def test_motions_over_which_wheels_slipped_are_those_of_the_images(world, views, verified, factor: float):
     steps, odometry = slipping(world, factor)
