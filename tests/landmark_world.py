@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 ROOM = np.array([6.0, 5.0])
@@ -97,6 +98,11 @@ def driven(poses):
     motions[:, :2] *= 1.02
     motions[:, 2] += math.radians(0.5) * np.hypot(*motions[:, :2].T)
     return motions, compose(poses[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+
+
+def seen_in(views):
+    """The lens of a camera that is as described, of any of the views' features."""
+    return lambda features: Lens(lambda _: views.bearings[features], np.empty(0))
 
 
 def misplaced(poses, truth):

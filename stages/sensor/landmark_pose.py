@@ -16,8 +16,8 @@ from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
-from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.geometry.plane.stamp_jitter import StampJitter, in_map
+from omninav.stages.geometry.plane.se2 import compose, turned
+from omninav.stages.geometry.plane.stamp_jitter import StampJitter
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
@@ -69,7 +69,7 @@ class LandmarkPoseState(State):
 
     @property
     def jitter(self) -> StampJitter:
-        """How much stamps jitter."""
+        """Likelihoods of how much stamps jitter."""
         return StampJitter(self.pose, self.covariance, self.velocity, self.along, self.hypotheses)
 
     @jitter.setter
@@ -149,7 +149,7 @@ class LandmarkPose(Stage):
             variance = jitter.variance()
             if variance > 0.0:
                 self._say_jitter(ctx, state, math.sqrt(variance))
-                along = in_map(np.broadcast_to(moved, poses.shape), poses[:, 2] - 0.5 * moved[2])
+                along = turned(np.broadcast_to(moved, poses.shape), poses[:, 2] - 0.5 * moved[2])
                 motions = min(variance / seconds**2, MAX_MOTIONS**2)
                 covariances = covariances + motions * along[:, :, None] * along[:, None, :]
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))

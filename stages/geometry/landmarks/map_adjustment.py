@@ -178,10 +178,12 @@ def adjusted_drive(
     closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())
     if closures < MIN_CLOSURES:
         return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")
-    measured, looseness = Steps(steps, odometry_sigmas(steps), np.empty(0, np.int64)), np.array(SEEN_LOOSENESS)
-    if not seen_motion:
+    sigmas = odometry_sigmas(steps)
+    if seen_motion:
+        measured, looseness = Steps(steps, sigmas, np.empty(0, np.int64)), np.array(SEEN_LOOSENESS)
+    else:
         lengths = pair_lengths(views.bearings, verified, odometry)
-        measured, looseness = driven_steps(steps, measured.sigmas, verified, lengths), np.ones(3)
+        measured, looseness = driven_steps(steps, sigmas, verified, lengths), np.ones(3)
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))

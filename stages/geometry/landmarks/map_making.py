@@ -11,7 +11,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
-from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.plane.se2 import between, turned
 
 from .pair_check import fit_motion
 from .tracks import Tracks, joined_matches
@@ -154,12 +154,8 @@ def tracks_of(views: LocalViews, matches: PairMatches, fits: Bools) -> Tracks:
 def in_map_frame(views: LocalViews, poses: Array) -> tuple[Array, Array]:
     """Camera centres (F, 3) and unit vectors (F, 3) in the map frame, of all features."""
     owners = views.owners
-    cos, sin = np.cos(poses[owners, 2]), np.sin(poses[owners, 2])
-    x, y, z = views.bearings.T
-    return (
-        np.column_stack([poses[owners, :2], np.zeros(len(owners))]),
-        np.column_stack([cos * x - sin * y, sin * x + cos * y, z]),
-    )
+    centres = np.column_stack([poses[owners, :2], np.zeros(len(owners))])
+    return centres, turned(views.bearings, poses[owners, 2])
 
 
 def triangulated(views: LocalViews, tracks: Tracks, poses: Array) -> Sightings:

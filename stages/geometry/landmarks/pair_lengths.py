@@ -6,14 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.geometry.plane.se2 import turned
+from omninav.stages.geometry.two_views.triangulation import angles_between, closest
 
 from .closures import FAR_M, TURN_SIGMA, VerifiedPairs
 
 MIN_PARALLAX = math.radians(0.7)
 """Smallest angle between the bearings of a match whose depth counts (rad)."""
-MIN_COMMON, MAX_APART = 3, 12
-"""Features in common with which two pairs are compared, and the pairs of one feature among which each is compared with
-the next ones."""
+MIN_COMMON, MAX_NEXT = 3, 11
+"""Smallest number of features in common with which two pairs are compared, and largest number of next ones with which a
+pair of a feature is."""
 DEPTH_SIGMA = 0.15
 """Standard deviation of the logarithm of a ratio of two depths."""
 ODOMETRY_SIGMA, ODOMETRY_SIGMA_M = 0.2, 0.01
@@ -107,7 +109,7 @@ def driven_steps(steps: Array, sigmas: Array, pairs: VerifiedPairs, lengths: Arr
 
 
 def _measured(pairs: VerifiedPairs, odometry: Array) -> Array:
-    """Lengths (P,) of the pairs by odometry, m; NaN where these are too short, or too far apart along the drive."""
+    """Lengths (P,) of the pairs by odometry, m; NaN where these are too short, or span too much of the drive."""
     one, other = pairs.pairs.T
     driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(odometry[:, :2], axis=0).T))])
     lengths = np.hypot(*(odometry[other] - odometry[one])[:, :2].T)
@@ -124,10 +126,10 @@ def _ratios(bearings: Array, pairs: VerifiedPairs) -> tuple[Ints, Ints, Array, A
     order = order[np.isfinite(depths[order])]
     features, depths, owners = features[order], np.log(depths[order]), owners[order]
     keys, values = [], []
-    for apart in range(1, MAX_APART):
-        same = features[apart:] == features[:-apart]
-        keys.append((owners[:-apart] * len(pairs.pairs) + owners[apart:])[same])
-        values.append((depths[:-apart] - depths[apart:])[same])
+    for later in range(1, MAX_NEXT + 1):
+        same = features[later:] == features[:-later]
+        keys.append((owners[:-later] * len(pairs.pairs) + owners[later:])[same])
+        values.append((depths[:-later] - depths[later:])[same])
     key, value = np.concatenate(keys), np.concatenate(values)
     key, starts, value, counts = _grouped(key, value)
     median = value[starts + counts // 2]
@@ -142,15 +144,11 @@ def _depths(bearings: Array, pairs: VerifiedPairs) -> tuple[Array, Array]:
     """Distances (M,) of matched features from the first image and from the second, in lengths of the pair's motion; NaN
     where they have too little parallax or would lie behind."""
     turns, directions = pairs.turns[pairs.owners], pairs.directions[pairs.owners]
-    cos, sin = np.cos(turns), np.sin(turns)
-    first, (x, y, z) = bearings[pairs.first], bearings[pairs.second].T
-    second = np.column_stack([cos * x - sin * y, sin * x + cos * y, z])
+    first, second = bearings[pairs.first], turned(bearings[pairs.second], turns)
     towards = np.column_stack([np.cos(directions), np.sin(directions), np.zeros(len(directions))])
-    between = np.einsum("mi,mi->m", first, second)
-    from_first, from_second = np.einsum("mi,mi->m", first, towards), np.einsum("mi,mi->m", second, towards)
-    square = np.maximum(1.0 - between**2, 1e-12)
-    here, there = (from_first - between * from_second) / square, (between * from_first - from_second) / square
-    tells = (square > math.sin(MIN_PARALLAX) ** 2) & (here > 0.0) & (there > 0.0)
+    along = (np.einsum("mi,mi->m", each, towards) for each in (first, second))
+    here, there = closest(first, second, *along)
+    tells = (angles_between(first, second) > MIN_PARALLAX) & (here > 0.0) & (there > 0.0)
     return np.where(tells, here, np.nan), np.where(tells, there, np.nan)
 
 

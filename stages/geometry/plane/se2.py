@@ -44,6 +44,13 @@ def between(start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
     return _poses(cos * dx + sin * dy, -sin * dx + cos * dy, wrap(end[..., 2] - start[..., 2]))
 
 
+def turned(vectors: Array, angles: Array | float) -> Array:
+    """Vectors (..., 3) turned about z, counter-clockwise by angles (...,), rad."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
+
+
 def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -> Array:
     """Poses at given times between stamped poses, linear in x, y and along the shorter turn in heading.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array
 
-from .se2 import compose, wrap
+from .se2 import compose, turned, wrap
 
 JITTERS_S = np.append(0.0, 0.005 * np.sqrt(2.0) ** np.arange(11))
 """Standard deviations of stamps that are held against each other, s."""
@@ -17,15 +17,15 @@ PRIOR, SHOWN = 0.1, 0.2
 FORGOTTEN = 0.99
 """Factor of the log likelihood of the past at each image."""
 MAX_SIGMA_S, MAX_OFF_S = 0.03, 0.5
-"""Standard deviation of the time that a motion tells, and largest such time, s."""
+"""Largest standard deviation of the time that a motion tells, and largest such time, s."""
 MIN_SHARE = 0.5
-"""Smallest ratio of two consecutive velocities at which a stamp's error changes both motions alike."""
+"""Smallest ratio of two consecutive velocities at which a stamp's error changes both motions by as much."""
 MAX_SQUARE = 16.0
 """Largest squared residual, in its variance, that counts: beyond, a motion is wrong."""
 
 
 class StampJitter(NamedTuple):
-    """How likely each standard deviation of stamps is, by consecutive images with poses that were measured by itself.
+    """Likelihoods of standard deviations of stamps, by consecutive images whose poses were measured one by one.
 
     `pose` (3,), `covariance` (3, 3): of the last image, NaN where it has none. `velocity` (3,): of the last motion, in
     the map's frame, and `along` (3,), factors by which its error gave a time; NaN where it told none. `hypotheses`
@@ -40,17 +40,17 @@ class StampJitter(NamedTuple):
 
     @classmethod
     def unknown(cls) -> "StampJitter":
-        """Nothing was seen yet."""
+        """Gives the likelihoods before any image."""
         nothing = np.full(3, np.nan)
         hypotheses = np.zeros((3, len(JITTERS_S), len(ODOMETRY_S)))
         return cls(nothing, np.full((3, 3), np.nan), nothing, nothing, hypotheses)
 
     def interrupted(self) -> "StampJitter":
-        """After an image without a sure pose."""
+        """Gives them after an image without a sure pose."""
         return self._replace(pose=np.full(3, np.nan), along=np.full(3, np.nan))
 
     def seen(self, pose: Array, covariance: Array, moved: Array, seconds: float) -> "StampJitter":
-        """After an image with a `pose` (3,) of this `covariance` (3, 3); `moved` (3,): by odometry, since the last.
+        """Gives them after an image with `pose` (3,) and `covariance` (3, 3); `moved` (3,): by odometry since the last.
 
         The error of a motion, over its velocity, is the difference of two stamps' errors. So consecutive motions share
         one of them with opposite signs, as they share the error of a pose, whose covariance is known, and none of
@@ -61,7 +61,7 @@ class StampJitter(NamedTuple):
             return new
         missed = pose - compose(self.pose, moved)
         missed[2] = wrap(missed[2])
-        velocity = in_map(moved / seconds, pose[2] - 0.5 * moved[2])
+        velocity = turned(moved / seconds, pose[2] - 0.5 * moved[2])
         weighted = np.linalg.solve(covariance + self.covariance, velocity)
         information = float(weighted @ velocity)
         if information < MAX_SIGMA_S**-2:
@@ -91,10 +91,3 @@ class StampJitter(NamedTuple):
         shares[1:] *= PRIOR / (len(JITTERS_S) - 1)
         shares /= shares.sum()
         return float(shares @ np.square(JITTERS_S)) if shares[0] < 1.0 - SHOWN else 0.0
-
-
-def in_map(velocities: Array, headings: Array | float) -> Array:
-    """Velocities (..., 3), of robots with headings (...,), rad, turned from their frames into the map's."""
-    cos, sin = np.cos(headings), np.sin(headings)
-    x, y, turn = np.moveaxis(velocities, -1, 0)
-    return np.stack([cos * x - sin * y, sin * x + cos * y, turn], axis=-1)

@@ -18,8 +18,12 @@ def depths(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, transla
     (erratum 36 in docs/papers.md). Infinite where the lines are parallel.
     """
     first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64) @ rotation.T
+    return closest(first, second, first @ translation, second @ translation)
+
+
+def closest(first: Array, second: Array, along_first: Array, along_second: Array) -> tuple[Array, Array]:
+    """The same, of bearings in one frame, by their components (N,) along the translation, which may differ."""
     cos = np.einsum("ij,ij->i", first, second)
-    along_first, along_second = first @ translation, second @ translation
     sine = np.linalg.norm(np.cross(first, second), axis=1) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         here = (along_first - cos * along_second) / sine

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-from landmark_world import displaced, driven, misplaced
+from landmark_world import displaced, driven, misplaced, seen_in
 
-from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.landmarks.map_adjustment import (
     AdjustedMap,
     adjusted_drive,
@@ -13,10 +12,6 @@ from omninav.stages.geometry.landmarks.map_making import LocalViews, neighbourin
 from omninav.stages.geometry.plane.image_delay import RobotPath
 from omninav.stages.geometry.plane.mount import camera_poses
 from omninav.stages.geometry.plane.se2 import chain, wrap
-
-
-def seen_in(views):
-    return lambda features: Lens(lambda _: views.bearings[features], np.empty(0))
 
 
 @pytest.fixture
