@@ -25,7 +25,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.camera.cylindrical import Cylindrical
-from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.plane.se2 import distances_along, wrap
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.simulator.config import OdometryNoise
 from omninav.stages.simulator.odometry import draw_bias, odometry
@@ -198,7 +198,7 @@ class Routes:
                 back.append(int(before[back[-1]]))
             cells += back[:0:-1]
         xy = self.metres([*cells, points[-1]])
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        along = distances_along(xy)
         even = np.arange(0.0, along[-1], 0.02)
         dense = np.stack([np.interp(even, along, xy[:, n]) for n in (0, 1)], axis=1)
         return gaussian_filter1d(dense, 0.35 / 0.02, axis=0, mode="nearest")

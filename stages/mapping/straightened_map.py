@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.plane.drive_graph import closure_sigmas, straightened_drives
-from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.plane.se2 import distances_along
 from omninav.stages.values.maps import ReferenceGraph
 
 QUANTITIES = {
@@ -45,8 +45,7 @@ class StraightenMap(Stage):
         if unit is None:
             ctx.fact("map_straightened", "no: a map needs ten views, all around the robot")
             return self.Out(map=map)
-        steps = between(map.poses[:-1], map.poses[1:])
-        driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        driven = distances_along(map.poses)
         closures = closures_by_appearance(map.features[:], map.kind, driven, unit)
         if not len(closures.pairs):
             ctx.fact(

@@ -7,6 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import distances_along
 from omninav.stages.values.drive import Drive, known
 
 THRESHOLDS = {"fine": (0.25, 2.0), "medium": (0.5, 5.0), "coarse": (5.0, 10.0)}
@@ -57,7 +58,7 @@ class LocalisedShare(MetricStage):
 
 def relocalisations(position_m: Array, heading_deg: Array, truth: Array, lost_m: float) -> dict[str, Any]:
     """Times that a robot was lost and what it took to find itself, from its errors (N,) and true poses (N, 3)."""
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
+    path = distances_along(truth)
     frames, metres, begins, never = [], [], 0, 0
     while (lost := np.flatnonzero(position_m[begins:] > lost_m)).size:
         begins += int(lost[0])

@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import position_errors
-from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.plane.se2 import between, distances_along
 from omninav.stages.values.drive import Drive, known
 
 
@@ -86,7 +86,7 @@ def absolute_trajectory_errors(estimate: Array, truth: Array) -> Array:
 
 def pairs_apart(truth: Array, distance_m: float) -> tuple[Ints, Ints]:
     """Starts and ends of pairs: for each frame the first later one at least `distance_m` of path further on."""
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
+    path = distances_along(truth)
     ends = np.searchsorted(path, path + distance_m - 1e-9)
     starts = np.flatnonzero(ends < len(path))
     return starts, ends[starts].astype(np.int64)

@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
-from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.plane.se2 import distances_along, wrap
 
 from .description import Description, Heading
 from .plausibility import MotionLimits, believed
@@ -85,10 +85,10 @@ def headings(description: Description, table: CsvTable, rows: Ints, stamps: Stam
         measured = table.numbers(Angle(heading.column, heading.unit))[rows]
         turned = measured if heading.sense == "counter_clockwise" else -measured
         return wrap(turned + (pi / 2 if heading.zero == "y" else 0.0) + heading.offset)
-    along = (stamps - stamps[0]) / 1e9
+    along, points = (stamps - stamps[0]) / 1e9, np.column_stack([x, y])
     if tangent.unit == "m":
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    return track_directions(along, np.column_stack([x, y]), tangent.window, tangent.lag)
+        along = distances_along(points)
+    return track_directions(along, points, tangent.window, tangent.lag)
 
 
 def _forward(heading: Heading, table: CsvTable, rows: Ints) -> Array:

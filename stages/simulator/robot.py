@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.geometry.plane.se2 import compose, distances_along
 
 from .config import Kidnapping, Robot
 from .obstacles import Obstacles, gather, nearest
@@ -197,7 +197,7 @@ def _legs(waypoints: npt.ArrayLike) -> tuple[Array, Array]:
     points = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
     keep = np.concatenate([[True], (np.diff(points, axis=0) != 0.0).any(axis=1)])
     points = np.ascontiguousarray(points[keep])
-    return points, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    return points, distances_along(points)
 
 
 def _nearest_along(points: Array, ends: Array, at: Array, along: float = 0.0) -> float:

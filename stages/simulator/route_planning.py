@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.plane.se2 import distances_along
 
 from .config import Point, Route
 from .layout import Aisle
@@ -76,7 +77,7 @@ def jittered(world: World, line: Array, spread: float, rng: np.random.Generator)
     than 0.1 m of room. Start and end stay.
     """
     points = _resampled(line, POINT_SPACING_M)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = distances_along(points)
     knots = np.arange(0.0, along[-1] + 2 * JITTER_PERIOD_M, JITTER_PERIOD_M)
     draws = np.clip(rng.normal(0.0, spread, (len(knots), 2)), -2 * spread, 2 * spread)
     drift = np.stack([np.interp(along, knots, draws[:, axis]) for axis in range(2)], axis=1)
@@ -398,7 +399,7 @@ def _cut(points: Array, length: float | None) -> Array:
     """The first `length` m of a line."""
     if length is None:
         return points
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = distances_along(points)
     kept = int(np.searchsorted(along, length))
     if kept == len(points):
         return points

@@ -10,7 +10,7 @@ from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.image_delay import FINE_DELAY_S, RobotPath, found_delay
 from omninav.stages.geometry.plane.mount import camera_poses, found_mount
-from omninav.stages.geometry.plane.se2 import between, compose, wrap
+from omninav.stages.geometry.plane.se2 import between, compose, distances_along, wrap
 
 from .adjustment import Lens, Motions, adjusted
 from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
@@ -172,7 +172,7 @@ def adjusted_drive(
     landmarks show the floor. The first reference stays. Draws from `rng`.
     """
     steps = between(odometry[:-1], odometry[1:])
-    driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    driven = distances_along(odometry)
     pairs = candidate_pairs(similarity, driven)
     verified = verified_pairs(views, pairs, rng)
     closures = int((np.abs(np.diff(driven[verified.pairs], axis=1)) > FAR_M).sum())

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
-from omninav.stages.geometry.plane.se2 import turned
+from omninav.stages.geometry.plane.se2 import distances_along, turned
 from omninav.stages.geometry.two_views.triangulation import angles_between, closest
 
 from .closures import FAR_M, TURN_SIGMA, VerifiedPairs
@@ -111,7 +111,7 @@ def driven_steps(steps: Array, sigmas: Array, pairs: VerifiedPairs, lengths: Arr
 def _measured(pairs: VerifiedPairs, odometry: Array) -> Array:
     """Lengths (P,) of the pairs by odometry, m; NaN where these are too short, or span too much of the drive."""
     one, other = pairs.pairs.T
-    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(odometry[:, :2], axis=0).T))])
+    driven = distances_along(odometry)
     lengths = np.hypot(*(odometry[other] - odometry[one])[:, :2].T)
     return np.where((driven[other] - driven[one] < FAR_M) & (lengths > MIN_LENGTH_M), lengths, np.nan)
 

@@ -51,6 +51,11 @@ def turned(vectors: Array, angles: Array | float) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
 
 
+def distances_along(points: Array) -> Array:
+    """Distance from the first of N points (N, 2 or more) to each along the straight lines between them: (N,)."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+
+
 def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -> Array:
     """Poses at given times between stamped poses, linear in x, y and along the shorter turn in heading.
 

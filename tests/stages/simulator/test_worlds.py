@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 from world_files import WORLDS, world_of
 
 from omninav.pipeline.graph.ports import convert
-from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.plane.se2 import compose, distances_along, wrap
 from omninav.stages.simulator import route_planning, simulated_recording
 from omninav.stages.simulator.config import AisleBlock, Block, Day, Door, LampGrid, Room, Route, WorldConfig
 from omninav.stages.simulator.layout import expand
@@ -127,7 +127,7 @@ def test_laps_begin_where_what_comes_first_has_led() -> None:
 def test_who_builds_a_map_soon_comes_back_to_where_he_has_been(name: str, route: str, farthest: float) -> None:
     """No stretch of new floor, farther than 0.6 m from any place left 6 m of way before, is longer than 30 m."""
     truth = SimulatedRecording(world_of(name), route, 0).truth[:, :2]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth, axis=0).T))])
+    way = distances_along(truth)
     known = np.array([(np.hypot(*(truth[way < way[k] - 6.0] - at).T) < 0.6).any() for k, at in enumerate(truth)])
     returns = way[np.concatenate([np.flatnonzero(known), [len(way) - 1]])]
     assert np.diff(returns).max() < farthest

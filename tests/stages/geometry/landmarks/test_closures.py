@@ -7,12 +7,12 @@ from landmark_world import driven, misplaced
 from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
-from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.geometry.plane.se2 import between, distances_along, wrap
 
 
 @pytest.fixture(scope="module")
 def verified(world, views, similarity):
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(world.poses[:, :2], axis=0).T))])
+    way = distances_along(world.poses)
     pairs = candidate_pairs(iter(similarity), way)
     apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
     return verified_pairs(views, np.concatenate([pairs, apart]), np.random.default_rng(2))

@@ -6,14 +6,14 @@ from omninav.stages.geometry.landmarks.closures import FAR_M, candidate_pairs, v
 from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive
 from omninav.stages.geometry.landmarks.pair_lengths import driven_steps, pair_lengths
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
-from omninav.stages.geometry.plane.se2 import between, chain, compose
+from omninav.stages.geometry.plane.se2 import between, chain, compose, distances_along
 
 SLIPPED = np.arange(32, 39)
 
 
 @pytest.fixture(scope="module")
 def verified(world, views, similarity):
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(world.poses[:, :2], axis=0).T))])
+    way = distances_along(world.poses)
     return verified_pairs(views, candidate_pairs(iter(similarity), way), np.random.default_rng(2))
 
 
