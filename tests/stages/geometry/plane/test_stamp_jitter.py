@@ -116,7 +116,8 @@ def test_likelihoods_are_those_of_a_gaussian_sequence_with_correlated_neighbours
 
 def test_a_residual_counts_as_one_of_four_standard_deviations_at_most() -> None:
     _, off, variance = (hypotheses := straight([0.0, 0.2]).hypotheses)
-    assert (off == pytest.approx(0.4)) and off[0, 0] ** 2 > 17.0 * variance[0, 0]
+    assert off == pytest.approx(0.4)
+    assert off[0, 0] ** 2 > 17.0 * variance[0, 0]
     assert hypotheses[0, 0, 0] == pytest.approx(-0.5 * (np.log(variance[0, 0]) + 16.0))
 
 
