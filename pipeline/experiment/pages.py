@@ -97,10 +97,11 @@ def struck(judged: Judged, source: str) -> list[str]:
 
 
 def counts(judged: Judged, source: str) -> str:
-    """A sentence: how many of a paper's claims are judged, and how."""
-    held = [verdict.holds for *_, verdict in claims_of(judged, source)]
-    holding, failing, undecided = (held.count(each) for each in (True, False, None))
-    return f"Of {len(held)} claims of this paper {holding} hold, {failing} do not, and {undecided} are undecided."
+    """A sentence: how many of a paper's claims are judged, and how; and the same of those about the printed system."""
+    of_paper = list(claims_of(judged, source))
+    held = [verdict.holds for *_, verdict in of_paper]
+    printed = [verdict.holds for _, claim, verdict in of_paper if "as printed" in claim.paper.lower()]
+    return f"Of {len(held)} claims of this paper {_shares(held)}; of {len(printed)} as printed {_shares(printed)}."
 
 
 def by_chance(judged: Judged) -> str:
@@ -110,6 +111,10 @@ def by_chance(judged: Judged) -> str:
         f"Each of the {number} verdicts is on a 95 % interval. Were no figure different from what it is compared with, "
         f"chance would give some {number * TAIL:.0f} that hold and {number * TAIL:.0f} that do not."
     )
+
+
+def _shares(held: Sequence[bool | None]) -> str:
+    return f"{held.count(True)} hold, {held.count(False)} do not, and {held.count(None)} are undecided"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

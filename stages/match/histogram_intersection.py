@@ -16,7 +16,8 @@ from .reference_match import ReferenceMatch
 class HistogramIntersection(ReferenceMatch, Stage):
     """Similarity as the mean intersection of all segments' histograms; no segment is left out.
 
-    The non-selective alternative of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
+    Non-selective, as is the L2 norm, the alternative that Gross & Koenig 2004 name (section 2). Raises BadInput where
+    the map has other features.
     """
 
     def step(  # type: ignore[override]

@@ -218,7 +218,7 @@ def _free_space(world: World) -> "_FreeSpace":
 
 
 class _FreeSpace:
-    """Free cells of a world's floor as a graph: shortest space that mind obstacles, and what can be reached."""
+    """Free cells of a world's floor as a graph: shortest ways around obstacles, and what can be reached."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -339,7 +339,7 @@ class _FreeSpace:
         return looked_up
 
     def distances(self, start: Array) -> Array:
-        """Costs of the space from a point to all cells; infinite where there is none."""
+        """Costs of the shortest ways from a point to all cells; infinite where there is none."""
         from scipy.sparse.csgraph import dijkstra
 
         cost: Array = dijkstra(self._graph, directed=False, indices=self._cell(start))

@@ -29,7 +29,7 @@ FILE = {
     "page": {"rows": [], "columns": "day"},
     "claims": {
         "whole": CLAIM | {"paper": "they say so", "where": "Table 1"},
-        "part": CLAIM | {"statement": "… too", "paper": "and this", "where": "section 2", "quote": "so it is"},
+        "part": CLAIM | {"statement": "… too", "paper": "as printed: so", "where": "section 2", "quote": "so it is"},
         "ours": CLAIM | {"statement": "so we think", "quote": "not said"},
         "unrun": CLAIM | {"paper": "it will", "where": "section 3"},
     },
@@ -58,12 +58,15 @@ def test_each_claim_of_a_paper_stands_with_its_place_verdict_and_figure() -> Non
     text = claims_page(found)
     assert f"| they say so | Table 1 | {link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases" in text
     shown = "Error (cm): 5.25, beside 9 (the limit), difference -1 to 1.50"
-    assert f"| and this | section 2 | {link}: … too | undecided | {shown} |" in text
-    assert counts(found, "A paper 2004") == "Of 2 claims of this paper 0 hold, 1 do not, and 1 are undecided."
+    assert f"| as printed: so | section 2 | {link}: … too | undecided | {shown} |" in text
+    assert counts(found, "A paper 2004") == (
+        "Of 2 claims of this paper 0 hold, 1 do not, and 1 are undecided; "
+        "of 1 as printed 0 hold, 0 do not, and 1 are undecided."
+    )
     assert "so we think" not in text  # no paper says it
     assert "it will" not in text  # no result judges it
     page = str(markdown_page(*found[0])["one.md"])
-    assert "| … too (Error (cm)): **undecided** | and this (section 2): “so it is” | second | 5.2 |" in page
+    assert "| … too (Error (cm)): **undecided** | as printed: so (section 2): “so it is” | second | 5.2 |" in page
     assert "| so we think (Error (cm)): **holds** | not said | first | 1.0 |" in page
 
 
@@ -95,8 +98,11 @@ def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:
     claims = {**FILE["claims"], "part": {**FILE["claims"]["part"], "struck": "the limit is ours"}}
     (_, result), *_ = judged(whole=(case("", True, 3.0),), part=(case("", False, 5.25),))
     found = [(read_experiment(FILE | {"claims": claims}, "full"), result)]
-    assert counts(found, "A paper 2004") == "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided."
-    assert "* and this ([One](one.md)): the limit is ours" in claims_page(found)
+    assert counts(found, "A paper 2004") == (
+        "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided; "
+        "of 0 as printed 0 hold, 0 do not, and 0 are undecided."
+    )
+    assert "* as printed: so ([One](one.md)): the limit is ours" in claims_page(found)
     assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0])["one.md"])
 
 
