@@ -93,7 +93,7 @@ _PLACES = {
     "StageFailed": "pipeline.engine.call",
     "tool": "pipeline.api.tool",
 }
-"""Where names are defined; the others are the framework's own, for authors of stages."""
+"""Modules that define names; the others are the framework's own, for authors of stages."""
 _PLACE_OF = {name: place for names, place in _PLACES.items() for name in names.split()}
 
 

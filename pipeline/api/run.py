@@ -118,7 +118,7 @@ class Run:
         return sorted(file.name.removesuffix(recorded_name("")) for file in self.folder.glob(recorded_name("*")))
 
     def values(self, origin: str) -> Sequence[Any]:
-        """What an output (`match.similarities`) gave in every frame, None where nothing; read as it is looked at.
+        """Values of an output (`match.similarities`) in every frame, None where it gave none; read when looked at.
 
         It was kept where the run was told to: `record=[match.similarities]`.
         """

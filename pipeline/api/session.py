@@ -34,7 +34,7 @@ NOT_PUSHED = {
 
 
 class Step(Mapping[str, Any]):
-    """What the stages gave for a frame; None where one gave nothing.
+    """Outputs of the stages for a frame; None where one gave nothing.
 
     `out["match.similarities"]` is the output of a node, and `out.estimate` the one of that name, whichever node has it.
     Arrays are read-only, since the session goes on with them: `np.array(…)` copies one.
@@ -103,7 +103,7 @@ class Session(AbstractContextManager["Session"]):
 
     @property
     def steps(self) -> int:
-        """How many frames it has had."""
+        """Number of frames that it has had."""
         return self._engine.ticks
 
     def step(self, **frame: Any) -> Step:

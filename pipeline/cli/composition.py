@@ -169,7 +169,7 @@ def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """What every run reads beside its seed."""
+    """Values that every run reads beside its seed."""
 
     runs: str
     cache: str | None
@@ -257,7 +257,7 @@ def _lacks(config: Any, name: str) -> bool:
 
 
 def _name_past_links(config: Any) -> None:
-    """What lies among the runs may be named by way of their link, which will soon point elsewhere."""
+    """Names paths among the runs past their link, which will soon point elsewhere."""
     runs = Path(str(config.get("runs", "runs"))).resolve()
     for key in settings_left_open():
         file = config.get(key)

@@ -200,7 +200,7 @@ def _refuse_search_path(overrides: Sequence[str]) -> None:
 
 
 def _foreign(given: Any, own: Any) -> Iterator[Problem]:
-    """What stands under `hydra.` and is neither omninav's `own` nor of its flags."""
+    """Overrides under `hydra.` that are neither omninav's `own` nor of its flags."""
     free = (*FOLDERS_OF_JOBS, *LAUNCHING, *OF_HYDRA)
     theirs, ours = (_plain(config) for config in (given, own))
     for key in sorted({*theirs, *ours} - {*free}):
@@ -227,7 +227,7 @@ def _plain(config: Any) -> dict[str, Any]:
 
 
 def not_settable(where: str) -> Problem:
-    """What to say of a name under `hydra.`."""
+    """Problem to report of a name under `hydra.`."""
     return Problem(where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(SETTABLE)}")
 
 

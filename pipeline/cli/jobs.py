@@ -45,7 +45,7 @@ class SweepJob:
 
 @dataclass(frozen=True)
 class JobEnd:
-    """How a job ended; plain data."""
+    """End of a job; plain data."""
 
     code: int = 0
     """Its exit code."""
@@ -165,7 +165,7 @@ def no_run_in(folder: Path) -> Path:
 
 
 def _hydra_files(config: Any) -> dict[str, str]:
-    """What Hydra's users look for in the folder of a job."""
+    """Files that Hydra's users look for in the folder of a job."""
     settings = HydraConfig.get()
     return {
         ".hydra/config.yaml": OmegaConf.to_yaml(config),
@@ -175,7 +175,7 @@ def _hydra_files(config: Any) -> dict[str, str]:
 
 
 def _folder() -> Path | None:
-    """Where Hydra puts the job's files; None where nobody has set it."""
+    """Folder into which Hydra puts the job's files; None where nobody has set it."""
     settings = HydraConfig.get()
     chosen = any(str(word).startswith("hydra.run.dir=") for word in settings.overrides.hydra)
     if settings.mode == RunMode.MULTIRUN or chosen or settings.run.dir != NO_FOLDER:

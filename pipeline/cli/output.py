@@ -37,7 +37,7 @@ class _Output(io.RawIOBase):
 
 
 def mend_streams() -> None:
-    """Where output is closed nothing is said, and what its encoding lacks is shown as "?"."""
+    """Says nothing where output is closed, and shows "?" for what its encoding lacks."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -65,6 +65,6 @@ def lost_output() -> OSError | None:
 
 
 def _below(stream: Any) -> Any:
-    """What a stream's bytes go to in the end."""
+    """Stream to which a stream's bytes go in the end."""
     buffer = getattr(stream, "buffer", None)
     return getattr(buffer, "raw", buffer)

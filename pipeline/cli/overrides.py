@@ -133,7 +133,7 @@ def _parse(word: str) -> list[Override]:
 
 
 def _number_of_values(word: Override) -> int:
-    """How many values a word stands for, counted without listing them. Raises `BadInput` where they are too many."""
+    """Number of values that a word stands for, without listing them. Raises `BadInput` where they are too many."""
     value, number = word.value(), 1.0
     if isinstance(value, RangeSweep):
         start, stop, step = (float(edge or 0) for edge in (value.start, value.stop, value.step))
@@ -283,7 +283,7 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
 
 
 def _deepest(config: Mapping[str, Any], path: str) -> tuple[list[str], str | None, Any]:
-    """How far a path leads: the names that exist, the first that does not (None if all do), and what is there."""
+    """Extent of a path: the names that exist, the first that does not (None if all do), and what is there."""
     parents: list[str] = []
     inside: Any = config
     for name in path.split("."):

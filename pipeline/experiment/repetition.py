@@ -228,7 +228,7 @@ def _grows(node: Node) -> bool:
 
 
 def _recordable(graph: Graph, known: CachedPrefix) -> list[str]:
-    """What may have to be shared: all that nodes read of the prefix, but what is too large to keep over a log.
+    """Names that may have to be shared: all that nodes read of the prefix, but what is too large to keep over a log.
 
     Of the part that comes from the cache there is only its frontier.
     """

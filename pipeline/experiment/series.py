@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 Aggregate = Literal["mean", "median", "min", "max", "first", "last", "change", "ratio", "slope", "largest_rise"]
-"""What becomes of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
+"""Figures of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
 line that fits best (per entry), `largest_rise` the largest step upwards from one entry to the next."""
 
 

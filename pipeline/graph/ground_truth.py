@@ -14,7 +14,7 @@ def steering(graph: Graph) -> frozenset[str]:
 
 
 def truth_in_the_loop(graph: Graph) -> Iterator[tuple[str, str, str]]:
-    """Where, what and what to type for every wire that brings truth (see `Truth`) to a stage that steers the source.
+    """Places, problems and advice for every wire that brings truth (see `Truth`) to a stage that steers the source.
 
     Metrics and plots, which no command depends on, may read it. An artifact is taken as it was made before.
     """

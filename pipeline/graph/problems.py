@@ -85,7 +85,7 @@ HINTS = {
     errno.ENXIO: "name a file",
     errno.ESTALE: "the folder is gone; change to another",
 }
-"""What to do where a file or folder cannot be used, by the system's number of the error."""
+"""Advice where a file or folder cannot be used, by the system's number of the error."""
 
 
 def as_bad_input(error: BaseException) -> BadInput | None:

@@ -17,7 +17,7 @@ class Heartbeat:
         self.step(done, total)
 
     def say(self, words: str) -> None:
-        """Of many jobs only the frames are shown."""
+        """Frames alone are shown of many jobs."""
 
     def step(self, done: int, total: int | None = None) -> None:
         """The same, of the only graph there is."""

@@ -29,7 +29,7 @@ message takes more."""
 
 
 class Allowance:
-    """What may still be read of a log, by the size of its file (bytes)."""
+    """Bytes that may still be read of a log, by the size of its file."""
 
     def __init__(self, size: int) -> None:
         self._bytes = MAX_BYTES_IN_ALL + MAX_RATIO_IN_ALL * size

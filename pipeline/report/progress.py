@@ -11,7 +11,7 @@ from typing import TextIO
 from .terminal_text import Uncleaned, plain
 
 SAID_S = 2.5
-"""How long words of a stage stand beside the frames, seconds."""
+"""Longest time for which words of a stage stand beside the frames, seconds."""
 RATED_S = 0.05
 """Shortest time over which frames per second are stated, seconds."""
 

@@ -43,7 +43,7 @@ class Overview:
     seeds: bool
     """Whether the seed varies."""
     constant: tuple[str, ...]
-    """What is set for all jobs alike, as it was typed."""
+    """Overrides of all jobs alike, as they were typed."""
     paths: tuple[str, ...]
     """The figures that one looks for first, but those that are the same in all jobs."""
     heads: tuple[str, ...]

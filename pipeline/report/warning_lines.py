@@ -13,7 +13,7 @@ PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
 
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Of each kind of data that was skipped: `kind`, `count`, and the `first` case as text."""
+    """Kinds of data that were skipped: `kind`, `count`, and the `first` case as text."""
     return [{"kind": words(kind), **entry} for kind, entry in (manifest.get("dropped") or {}).items()]
 
 

@@ -45,7 +45,7 @@ def read_metrics(folder: Path) -> Metrics:
 
 
 def read_timing(folder: Path) -> dict[str, Any]:
-    """How long a run's stages took; nothing where that is not known."""
+    """Durations of a run's stages; nothing where they are not known."""
     file = folder / "timing.json"
     return _read(file) if file.is_file() else {}
 

@@ -24,7 +24,7 @@ parts of these images without a whole ring, panoramas and noise score 0.49 to 0.
 
 
 def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
-    """How much of a circle is an edge, per radius in whole pixels: (radii,) in [0, 1].
+    """Share of a circle that is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
     A ray counts at a radius where the step of brightness across it is large against the steps around it (a tenth of the
     image along the ray, and the rays beside it). So a faint rim between a plain wall and its plain reflection counts

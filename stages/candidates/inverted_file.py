@@ -18,7 +18,7 @@ from omninav.stages.values.reference_index import InvertedLists
 from .appearance_vectors import blocks, principal_axes, sample
 
 SEED = 1
-"""Of the training of centroids and codebooks."""
+"""Seed of the training of centroids and codebooks."""
 TRAINING_SAMPLE = 1 << 16
 """References, evenly over the map, from which centroids and codebooks are learned."""
 MAX_LISTS = 1 << 15

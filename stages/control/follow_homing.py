@@ -65,7 +65,7 @@ class FollowHoming(Stage):
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
     """rad/s."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Of the robot's body."""
+    """Radius of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
     search_s: Annotated[float, Bounds(gt=0)] = 60.0

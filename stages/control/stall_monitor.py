@@ -45,7 +45,7 @@ class StallMonitor(Stage):
     """
 
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Of the robot's body."""
+    """Radius of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides."""
 

@@ -35,7 +35,7 @@ class WallAvoider(Stage):
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
     """rad/s."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Of the robot's body."""
+    """Radius of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.15
     """Room that the robot keeps on all sides."""
     stop_distance_m: Annotated[float, Bounds(gt=0)] = 0.25

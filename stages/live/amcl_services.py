@@ -26,7 +26,7 @@ def serve_restart(transport: Transport, service: str) -> None:
 
 
 def serve_amcl(transport: Transport, node: str, initial_pose: str | None) -> None:
-    """What AMCL answers besides: an update without motion, an initial pose, and its lifecycle.
+    """Serves what AMCL answers besides: an update without motion, an initial pose, and its lifecycle.
 
     `node`: AMCL's name, in the lifecycle services' names. `initial_pose`: the topic that a pose is as good as.
     """

@@ -11,9 +11,9 @@ from .camera_device import MESSAGE, TOPIC, CameraDevice, image_message
 from .transport import Arrival, Transport, opened
 
 QUALITY = 92
-"""Of the JPEGs that are recorded."""
+"""Quality of the JPEGs that are recorded."""
 REOPEN_S = 1.0
-"""How often an unplugged camera is looked for."""
+"""Interval at which an unplugged camera is looked for."""
 
 
 class CameraTransport(Transport):

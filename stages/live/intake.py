@@ -1,4 +1,4 @@
-"""What comes from a robot, put together: the newest image that odometry reaches, and what belongs to it."""
+"""Inputs from a robot, put together: the newest image that odometry reaches, and what belongs to it."""
 
 import time
 from collections import Counter
@@ -34,7 +34,7 @@ TYPES: dict[Role, str] = {
     "goal": POSE_STAMPED,
     "restart": EMPTY,
 }
-"""What each role's topic carries; an image's type follows from its topic."""
+"""Message types of each role's topic; an image's type follows from its topic."""
 SETTINGS = {"image": "topics.image", "odometry": "topics.odometry", "scan": "topics.scan"}
 """Settings that name the topics of sensors."""
 WITHOUT = {
@@ -192,7 +192,7 @@ class Intake:
         return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200})"
 
     def dropped(self) -> Counter[str]:
-        """What was left out so far, by kind."""
+        """Numbers of items left out so far, by kind."""
         tracks = (self.drive.odometry, self.drive.truth)
         found = sum((track.dropped for track in tracks if track is not None), self.counts.copy())
         images = [topic for topic, role in self.header.topics.items() if role == "image"]
@@ -237,7 +237,7 @@ class Intake:
         self.unrecorded += items
 
     def _newest(self) -> Taken | None:
-        """Of the images that odometry has reached, the newest sound one; older ones are overtaken by it."""
+        """The newest sound image that odometry has reached; older ones are overtaken by it."""
         if self.camera is None:
             self._images.clear()
             return None
@@ -334,7 +334,7 @@ class Intake:
         return Taken(image.stamp, pixels, frame, arrivals)
 
     def recordable(self) -> list[Arrival]:
-        """What was consumed since this was last asked."""
+        """Inputs consumed since this was last asked."""
         arrivals, self.unrecorded = self.unrecorded, []
         return arrivals
 

@@ -1,4 +1,4 @@
-"""What a live run tells the robot and whoever watches, every tick."""
+"""Messages of a live run to the robot and to whoever watches, every tick."""
 
 import time
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ class Publish(Publisher, Stage):
     """Topic of the transform `map_frame -> odom_frame`: the estimate over the odometry as the robot reports it, which
     starts over where it is reset."""
     tf_tolerance_s: Annotated[float, Bounds(ge=0)] = 1.0
-    """How far ahead of the image the transform is dated, so that it holds until the next one: as AMCL's."""
+    """Time by which the transform is dated ahead of the image, so that it holds until the next one: as AMCL's."""
     map_frame: str = MAP
     """The map's frame."""
     odom_frame: str = ODOM
@@ -84,7 +84,7 @@ class Publish(Publisher, Stage):
     base_frame: str = BASE
     """The robot's frame, for commands with a header."""
     command: str | None = "/cmd_vel"
-    """Where the robot takes commands."""
+    """Topic on which the robot takes commands."""
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
     """As Nav2 has them since Kilted, or without a header."""
 
@@ -161,7 +161,7 @@ class PublishBelief(Publisher, Stage):
     topic: str | None = "/belief"
     """The belief in few poses; null: it is not published."""
     message: Literal["PoseArray", "ParticleCloud"] = "PoseArray"
-    """What it is published as: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
+    """Type of the message: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
     map_frame: str = MAP
     """The map's frame."""
 
@@ -186,7 +186,7 @@ class PublishMessages(Publisher, Stage):
     """Publishes what else a run shows of each tick, latched: the path, the map, the route (`nodes.messages.topics`)."""
 
     grid: str = "/grid"
-    """What `/grid` is published as: nav2 reads its map on `/map`."""
+    """Topic on which the grid is published: nav2 reads its map on `/map`."""
 
     def step(self, ctx: Context, messages: RosMessages) -> None:
         if self._transport.status.live:

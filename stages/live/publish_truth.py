@@ -1,4 +1,4 @@
-"""What only a simulator knows, as ROS 2 messages."""
+"""Ground truth of a simulator as ROS 2 messages."""
 
 from typing import Annotated, Literal
 

@@ -87,9 +87,9 @@ class RobotDriver(Stage):
     real_time: bool = True
     """A second takes a second, where the computer is fast enough; else ticks follow each other at once."""
     command_topic: str = "/cmd_vel"
-    """Where commands come from."""
+    """Topic from which commands come."""
     camera_file: str | None = None
-    """Where to write the camera's description for `omninav live camera=…`: a mirror does not fit CameraInfo."""
+    """File for the camera's description for `omninav live camera=…`: a mirror does not fit CameraInfo."""
     camera_stops: tuple[CameraStop, ...] = ()
     """When the camera fails, for trials."""
     clock_jumps: tuple[ClockJump, ...] = ()

@@ -1,4 +1,4 @@
-"""How a live run fares: what the terminal and `/diagnostics` say."""
+"""State of a live run as the terminal and `/diagnostics` show it."""
 
 import time
 from collections import Counter, deque
@@ -10,12 +10,12 @@ WINDOW = 1000
 
 
 class LiveStatus:
-    """What stages of a live run have noted; changes no byte of it. `live`: no record is being made again."""
+    """Notes of stages of a live run; they change no byte of it. `live`: no record is being made again."""
 
     def __init__(self) -> None:
         self.troubles: dict[str, str] = {}
         self.left_out: dict[str, str] = {}
-        """What cannot be published or answered in this run, and why: said once, and never tried again."""
+        """Messages that cannot be published or answered in this run, and why: said once, and never tried again."""
         self.sent: set[str] = set()
         """Topics on which this run has published."""
         self._reported: set[str] = set()

@@ -1,4 +1,4 @@
-"""What carries ROS 2 messages to and from a robot: bytes in, bytes out, and who is at the other end."""
+"""Transport of ROS 2 messages to and from a robot: bytes in, bytes out, and who is at the other end."""
 
 import atexit
 import importlib
@@ -75,9 +75,9 @@ class Transport(ABC):
     def __init__(self) -> None:
         self.inbox, self.status = MessageQueue(), LiveStatus()
         self.place = ""
-        """Where it listens, for messages: the transport and its domain."""
+        """Place where it listens, for messages: the transport and its domain."""
         self.farewells: list[Callable[[], None]] = []
-        """What is still to be sent before the transport is closed."""
+        """Messages still to be sent before the transport is closed."""
 
     @abstractmethod
     def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:

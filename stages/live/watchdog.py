@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 
 MIN_TIMEOUT_S = 0.2
-"""Of a fast robot: what a busy computer is late by must not stop it."""
+"""Smallest timeout, of a fast robot, seconds: a busy computer that is late must not stop it."""
 
 
 class Watchdog:

@@ -14,7 +14,7 @@ from omninav.pipeline.mcap.message_types import standard_types
 from .transport import Arrival, Transport, TransportError
 
 ROUTER = "tcp/localhost:7447"
-"""Where rmw_zenoh's sessions look for their router."""
+"""Address at which rmw_zenoh's sessions look for their router."""
 VOLATILE, LATCHED = "::,16:,:,:,,", ":1:,1:,:,:,,"
 """QoS as tokens have it: reliable, volatile and the last 16 messages; transient local and the last one."""
 

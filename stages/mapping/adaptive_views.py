@@ -70,7 +70,7 @@ class AdaptiveViews(Stage):
     beta: Annotated[float, Bounds(gt=0, le=1)] = 0.1
     """Learning rate of the weights."""
     state_covariance: StateCovariance = "first"
-    """How often a state's covariance counts: in the `first` update of a component, or in `every_update` (equation 14 to
+    """Updates in which a state's covariance counts: the `first` of a component, or `every_update` (equation 14 to
     the letter). The state has most of its covariance from the same map, so that with `every_update` covariances grow
     without end and forgetting, which equation 19 divides by them, ceases. With `first` later states add the spread of
     their means and the minimal covariance ("coding a stable and reliable estimation", section 2.2)."""

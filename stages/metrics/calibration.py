@@ -88,7 +88,7 @@ class Calibration(Stage):
 
 
 def covered(drive: Drive) -> dict[str, Any]:
-    """How many true positions lie in the ellipses of 50 and 95 %, and the mean normalised error; empty without any."""
+    """Shares of true positions in the ellipses of 50 and 95 %, and the mean normalised error; empty without any."""
     errors = (drive.estimate - drive.truth)[:, :2]
     squares = squared_mahalanobis(errors, drive.covariance[:, :2, :2])
     squares = squares[np.isfinite(squares)]

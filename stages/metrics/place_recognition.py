@@ -81,7 +81,7 @@ class PlaceRecognition(Stage):
 
 
 def quantities(distance_m: float) -> dict[str, Quantity]:
-    """How the figures are read, of references within a distance (m)."""
+    """Titles of the figures, of references within a distance (m)."""
     recalled = {
         f"place_recognition.recall_at_{rank}": Quantity(
             title=f"Recall@{rank} within {distance_m:g} m", unit="%", better="higher"

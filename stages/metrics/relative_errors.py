@@ -12,7 +12,7 @@ from omninav.stages.values.drive import Drive, known
 
 
 def quantities(distance_m: float) -> dict[str, Quantity]:
-    """How the figures are read; relative errors are those over `distance_m`."""
+    """Titles of the figures; relative errors are those over `distance_m`."""
     return {
         "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
         "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),

@@ -22,7 +22,7 @@ MOST_LOST = 0.05
 
 
 def quantities(lost_m: float) -> dict[str, Quantity]:
-    """How the figures are read; a robot counts as lost above an error of `lost_m`."""
+    """Titles of the figures; a robot counts as lost above an error of `lost_m`."""
     return {
         "position_error_m": Quantity(better="lower"),
         "heading_error_deg": Quantity(better="lower"),

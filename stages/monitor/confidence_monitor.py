@@ -78,7 +78,7 @@ FOUND_AT_FIRST = 0.95
 
 
 class ConfidenceMonitorState(State):
-    """Where the robot would be now if each of the last images had been taken where its best match was: `places` (M, 3),
+    """Places of the robot now if each of the last images had been taken at its best match: `places` (M, 3),
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.

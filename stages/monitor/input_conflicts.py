@@ -246,7 +246,7 @@ MIN_BLIND, BLIND_CORRELATION = 16, 0.15
 SURE_CORRELATION, SURE_TURN = 0.4, math.radians(3.0)
 """Turns are seen where images correlate so much, and above what parallax looks like (rad)."""
 MIN_SEEN_TURN = math.pi / 2.0
-"""What the images must have turned, to either side, before anything is said of turns (rad)."""
+"""Least turning of the images, to either side, before anything is said of turns (rad)."""
 STILL_M, STILL_RAD = 1e-3, 1e-3
 """Odometry that stays below these over all images stands (m, rad)."""
 NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
@@ -373,7 +373,7 @@ def turns_fit(watched: Watched) -> bool:
 
 
 def whose(watched: Watched, length_scale_m: float) -> str:
-    """Who is to blame for turns that are reversed: matches of mirrored images fit no track, reversed or not."""
+    """Cause of turns that are reversed: matches of mirrored images fit no track, reversed or not."""
     odometry, matches = watched.placed
     fits = [track_fit(odometry * sign, matches, TRACK_SCALES * length_scale_m) for sign in REVERSED]
     if all(fit is not None and fit.pairs >= MIN_PAIRS for fit in fits):

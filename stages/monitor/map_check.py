@@ -80,7 +80,7 @@ class CheckMap(Stage):
 
 
 def of_poses(poses: Array) -> str:
-    """What the poses (R, 3) of a map say by themselves; "" where nothing is wrong."""
+    """Sentence on the poses (R, 3) of a map by themselves; "" where nothing is wrong."""
     extent = float(np.hypot(*np.ptp(poses[:, :2], axis=0)))
     if extent < MIN_EXTENT_M:
         return f"all {len(poses)} references of the map lie at one place, within {extent:.3g} m: check its positions"

@@ -89,7 +89,7 @@ def landmarks_of(map: AnyMap | None) -> Array:
 
 
 def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
-    """What is occupied in dark grey and what is unknown in light grey, under everything else."""
+    """Draws occupied cells in dark grey and unknown ones in light grey, under everything else."""
     if grid is None:
         return
     from matplotlib.colors import to_rgba
@@ -101,7 +101,7 @@ def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
 
 
 def grid_extent(grid: OccupancyGrid) -> tuple[float, float, float, float]:
-    """Where a grid lies: x from, x to, y from, y to (m)."""
+    """Extent of a grid: x from, x to, y from, y to (m)."""
     rows, columns = grid.cells.shape
     x, y = grid.origin
     return x, x + columns * grid.resolution, y, y + rows * grid.resolution

@@ -227,7 +227,7 @@ def _ellipses_held(drive: Drive) -> list[str]:
 
 
 def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
-    """Where the best reference was taken. Views that may be forgotten have no one place."""
+    """Place of the best reference. Views that may be forgotten have no one place."""
     reference = int(drive.reference[n])
     if map is None or isinstance(map, ViewMixtures) or not 0 <= reference < len(map):
         return None

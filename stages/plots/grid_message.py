@@ -14,7 +14,7 @@ CELL_M = 0.05
 
 
 def grid_message(plan: FloorPlan | OccupancyGrid, stamp: int) -> Fields:
-    """What stands on the floor is 100, what is free 0, what is not known -1; the frame is the map's."""
+    """Occupied cells are 100, free ones 0, unknown ones -1; the frame is the map's."""
     grid = plan if isinstance(plan, OccupancyGrid) else _drawn(plan)
     values = np.zeros(3, np.int8)
     values[[FREE, OCCUPIED, UNKNOWN]] = 0, 100, -1

@@ -65,7 +65,7 @@ def _draw(field: HomingField, plan: FloorPlan | None) -> bytes:
 
 
 def _spacing(poses: np.ndarray) -> float:
-    """How far apart neighbours typically are."""
+    """Typical distance of neighbours."""
     if len(poses) < 2:
         return 1.0
     apart = np.hypot(*(poses[:, None, :2] - poses[None, :, :2]).transpose(2, 0, 1))

@@ -121,5 +121,5 @@ def _text(stamp: int, number: int, text: str, place: Array) -> Fields:
 
 
 def opacity(weights: Array) -> Array:
-    """How opaque what has these weights is drawn: never so little that it cannot be seen."""
+    """Opacity of what has these weights: never so little that it cannot be seen."""
     return np.clip(weights, 0.1, 1.0)

@@ -64,7 +64,7 @@ class PlaceBeliefOverTime(FigureStage):
 
 
 def with_neighbours(shares: Array, nearest: Ints, map: TopologicalMap) -> tuple[Array, Array]:
-    """Of each tick the belief in a place (N,), and in it with all places that are linked with it; NaN where unknown."""
+    """Belief of each tick in a place (N,), and in it with all places that are linked with it; NaN where unknown."""
     linked = links_between(map.links, len(map)) <= 1
     alone = np.where(nearest >= 0, shares[np.arange(len(shares)), nearest], np.nan)
     return alone, np.where(nearest >= 0, (shares * linked[nearest]).sum(axis=1), np.nan)

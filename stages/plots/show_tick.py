@@ -53,7 +53,7 @@ _ABSENT = {name: (np.nan,) * (ROW[name].itemsize // 8) for name in ROW.names or 
 
 
 class ShownTick(Value):
-    """What is shown of a tick. `numbers`: a row of `ROW`, NaN where there is none.
+    """Values shown of a tick. `numbers`: a row of `ROW`, NaN where there is none.
 
     `belief` (K, 3): poses of the belief; of a mixture with their `covariances`, of places and of a mixture with their
     `weights`. `similar` (M, 3): x, y (m) and similarity of the most similar references, the most similar first.
@@ -208,7 +208,7 @@ class ShowTick(Stage):
 
 
 def _shown_references(found: Similarities | Neighbours | VisualDistances, map: AnyMap) -> tuple[Array | None, float]:
-    """Where the most similar references were taken, with their similarities (M, 3); and the largest similarity.
+    """Places of the most similar references, with their similarities (M, 3); and the largest similarity.
 
     Of `VisualDistances` d the similarity is 1 / (1 + d).
     """

@@ -48,7 +48,7 @@ def target_of(
     start: Array,
     thumbnails: Thumbnails | None,
 ) -> tuple[Array, Pixels | None]:
-    """Where the view that the robot goes to was taken (3,), NaN where it is not known, and its image.
+    """Place (3,) of the view that the robot goes to, NaN where it is not known, and its image.
 
     Without a map that is where the run began, `start` (3,).
     """

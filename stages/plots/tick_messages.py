@@ -47,7 +47,7 @@ Rows = npt.NDArray[np.void]
 
 
 class PathSoFar(State):
-    """What later messages need of earlier ticks: `odometry` (3,) since the log's first frame; `correction` (3,) from
+    """State that later messages need of earlier ticks: `odometry` (3,) since the log's start; `correction` (3,) from
     map to odometry, and whether it is `anchored`; the `path` so far (N, 3) with its `stamps` (N,), every `stride`-th
     tick's; the `ticks` so far.
     """

@@ -67,7 +67,7 @@ class TrueAndEstimatedPlace(FigureStage):
 
 
 def judged(path: Array, believed: Ints, map: TopologicalMap) -> Ints:
-    """Of each image, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
+    """Judges each image, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
     nearest, apart = map.nearest_places(path), links_between(map.links, len(map))
     return np.where(believed == nearest, RIGHT, np.where(apart[believed, nearest] <= 1, BESIDE, WRONG))
 

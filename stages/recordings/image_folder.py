@@ -73,7 +73,7 @@ class ImageFolder(Losses):
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
         self.turned = sum(map(_is_turned, self._paths_kept))
-        """How many of its images are turned as their EXIF orientation says."""
+        """Number of its images that are turned as their EXIF orientation says."""
         self._images = DecodeAhead(lambda frame: partial(self._read, self._paths_kept[frame]))
         self.stamps: Stamps = times[keep]
         self.truth: Array | None = None if truth is None else truth[keep]

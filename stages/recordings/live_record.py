@@ -1,4 +1,4 @@
-"""What a live run consumed, as a recording: an image in it is a tick, made of what lies before it in the file."""
+"""Recording of what a live run consumed: an image in it is a tick, made of what lies before it in the file."""
 
 import json
 from collections import deque
@@ -73,7 +73,7 @@ class Frame(NamedTuple):
 
 
 class OdometryBuffer:
-    """What is known of a drive from the messages that have come, in the order in which they came."""
+    """Knowledge of a drive from the messages that have come, in the order in which they came."""
 
     def __init__(self, header: LiveHeader) -> None:
         roles = header.topics.values()
@@ -111,7 +111,7 @@ class OdometryBuffer:
         return [item]
 
     def frame(self, stamp: int) -> tuple[Frame, list[Any]] | None:
-        """What belongs to an image, and the items of range readings used; None where odometry does not reach it."""
+        """Inputs of an image, and the items of range readings used; None where odometry does not reach it."""
         odometry = None if self.odometry is None else self.odometry.at(stamp)
         if self.odometry is not None and odometry is None:
             return None

@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.se2 import between, compose, interpolate
 from .plausibility import EXCURSION_S, MotionLimits, possible_between, seconds_within
 
 KEPT_S = 30.0
-"""How far back a pose can be asked for."""
+"""Longest time back for which a pose can be asked."""
 MAX_PAUSE_S = 10.0
 """A message that comes later than this after the last tells of a clock that leapt, until others follow it."""
 

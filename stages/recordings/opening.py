@@ -89,7 +89,7 @@ def _with_whole_camera(recording: Recording) -> Recording:
 
 
 def ring_found_in(log: str, ring: Ring, frame: int) -> str:
-    """What is said of a mirror's ring that was found in an image."""
+    """Sentence on a mirror's ring that was found in an image."""
     return (
         f"{log}: its mirror's ring is the one in image {frame}, around column {ring.centre_x:.0f} and row "
         f"{ring.centre_y:.0f}, from {ring.inner:.0f} to {ring.outer:.0f} px (centre and mask in a camera.yaml say "

@@ -51,7 +51,7 @@ class Rosbag(Format):
 
 
 class _Limits:
-    """What rosbags may unpack of a bag, and how long SQLite may work on one question."""
+    """Limits of what rosbags may unpack of a bag, and of SQLite's time for one question."""
 
     def __init__(self, files: Sequence[Path]) -> None:
         self._size = sum(file.stat().st_size for file in files)
@@ -129,7 +129,7 @@ class _Zstd:
 
 
 class _LimitedFile(io.RawIOBase):
-    """What a zstd file unpacks to; OSError where that is beyond all proportion to its size."""
+    """Content of a zstd file; OSError where it is beyond all proportion to the file's size."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._limit = max(MAX_BYTES // 2, MAX_RATIO * file.seek(0, io.SEEK_END))
@@ -153,7 +153,7 @@ class _LimitedFile(io.RawIOBase):
 
 
 def _stated_counts(path: Path) -> dict[str, int]:
-    """How many messages of each topic a folder's metadata states. Raises `BadInput` where it names other files."""
+    """Numbers of messages of each topic by a folder's metadata. Raises `BadInput` where it names other files."""
     found = read_yaml(path / "metadata.yaml")
     stated = found["rosbag2_bagfile_information"]
     for name in stated["relative_file_paths"]:

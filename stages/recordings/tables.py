@@ -53,7 +53,7 @@ MAX_CELL = 100
 MAX_EXPONENT = 40
 """Powers of ten of a number in a cell."""
 _MAX_MAGNITUDE = {"m": Decimal(10**9), "ns": Decimal(2**62), "rad": Decimal(10**6)}
-"""Of a family, by its base unit: a million kilometres, the year 2116 as ROS counts, many turns."""
+"""Largest magnitude of a family, by its base unit: a million kilometres, the year 2116 as ROS counts, many turns."""
 _PLAIN = {
     **{unit: (rf"^-?\d{{1,{9 + power}}}(\.\d{{0,12}})?$", -power) for unit, power in (("cm", 2), ("mm", 3))},
     **dict.fromkeys(("m", "rad"), (r"^-?\d{1,9}(\.\d{0,18})?([eE][-+]?0?\d)?$", 0)),

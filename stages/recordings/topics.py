@@ -128,7 +128,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
 
 
 def set_back(records: Sequence[Record]) -> str:
-    """What to say of a clock that was set back while a file was recorded, by the order of its records; else ""."""
+    """Sentence on a clock that was set back while a file was recorded, by the order of its records; else ""."""
     times = np.array([record.log_time for record in records], dtype=np.int64)
     steps = np.diff(times)
     if not len(steps) or steps.min() > -SET_BACK_S * 1e9:

@@ -43,7 +43,7 @@ COLUMNS = {
     "qz": ("qz", "q_z", "orientation_z", "q_rs_z"),
     "qw": ("qw", "q_w", "orientation_w", "q_rs_w"),
 }
-"""What the columns of a CSV table may be called, in small letters, without units."""
+"""Accepted names of a CSV table's columns, in small letters, without units."""
 QUATERNION = ("qx", "qy", "qz", "qw")
 LIKE_HEADING = re.compile(r"heading|hdg|yaw|theta|(?<![a-z])psi(?![a-z])|azimuth|bearing|orientation|rotation|quat")
 NO_HEADING = re.compile(r"rate|vel|speed|acc|std|sigma|var|cov|err|dot")
@@ -55,7 +55,7 @@ MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
 With w first, headings become tilts, so that a drive in all directions has it in half of them."""
 NO_ROTATION = "whose quaternion is shorter than 0.5 or longer than 2"
 Rows = tuple[Stamps, Array, int, list[str]]
-"""Of a file: times (ns), poses (N, 3), how many of them are impossible, and doubts."""
+"""Content of a file: times (ns), poses (N, 3), how many of them are impossible, and doubts."""
 TANGENT_S = 1.0
 """Standard deviation of the window over which a table without headings is read for the track's direction."""
 

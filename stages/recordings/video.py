@@ -22,7 +22,7 @@ from .recording import Format, OpenOptions, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending
 
 MAX_FRAMES = 2_000_000
-"""Of a video: nine hours at 60 a second."""
+"""Largest accepted number of frames of a video: nine hours at 60 a second."""
 TOLERANCE_NS = 1_000_000
 """Between a frame's time as the container states it, and as the decoder does."""
 CONTAINERS = re.compile(
@@ -30,7 +30,7 @@ CONTAINERS = re.compile(
     rb"|\x00\x00\x01\xba|OggS|FLV\x01",
     re.DOTALL,
 )
-"""How MP4 and MOV, AVI, Matroska and WebM, MPEG-TS and -PS, Ogg and FLV begin: FFmpeg would also follow playlists."""
+"""First bytes of MP4, MOV, AVI, Matroska, WebM, MPEG-TS and -PS, Ogg and FLV: FFmpeg would also follow playlists."""
 
 
 class VideoRecording(Losses):

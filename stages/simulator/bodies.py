@@ -11,7 +11,7 @@ from omninav.stages.geometry.arrays import Array, Ints, Shorts
 
 @dataclass(frozen=True)
 class Tiling:
-    """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
+    """Covering of a face: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
 
     tiles: Ints
     width: float
@@ -19,7 +19,7 @@ class Tiling:
 
 
 Coverings = tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
-"""Of the faces -x, +x, -y, +y, bottom, top of a box, in its own frame."""
+"""Coverings of the faces -x, +x, -y, +y, bottom, top of a box, in its own frame."""
 
 
 @dataclass(frozen=True)

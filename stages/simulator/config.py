@@ -53,17 +53,17 @@ class Block:
     size: Point
     height: Positive
     material: Material = "concrete"
-    """Of its sides."""
+    """Texture of its sides."""
     top: Material = "wood"
     bottom_z: float = 0.0
     """Height of its underside above the floor."""
     yaw: float = 0.0
     bottom: Material | None = None
-    """Of its underside; null: as its top."""
+    """Texture of its underside; null: as its top."""
     look: str = ""
     """Blocks of the same material and look share a texture; empty: a texture of its own."""
     kind: Literal["block", "wall", "door", "furniture", "plant", "roof"] = "block"
-    """How floor plans draw it."""
+    """Style in which floor plans draw it."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Lamp:
     z: float | None = None
     """Height above the floor; null: under the ceiling."""
     name: str = ""
-    """Of its room, or its own; `lamps_off` switches lamps by it."""
+    """Name of its room, or its own; `lamps_off` switches lamps by it."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class AisleBlock:
     aisle: Positive = 2.0
     """Minimum width of an aisle."""
     depth: Positive = 1.0
-    """Of the shelves, as the next three."""
+    """Texture of the shelves, as the next three."""
     height: Positive = 2.0
     levels: Annotated[int, Bounds(ge=1)] = 4
     stock: bool = True
@@ -127,7 +127,7 @@ class AisleBlock:
     pillars: Spread = 0.0
     """Distance between pillars in every other row; 0: none."""
     department: str = ""
-    """Of the goods; empty: a department of its own."""
+    """Department of the goods; empty: one of its own."""
 
 
 Side = Literal["east", "north", "west", "south"]
@@ -165,11 +165,11 @@ class Room:
     walls: bool = True
     wall: Material = "plaster"
     facade: Material | None = None
-    """Of the walls outside, for a room in the open."""
+    """Texture of the walls outside, for a room in the open."""
     floor: Material | None = None
     """null: the hall's."""
     height: float | None = None
-    """Of its own ceiling; null: the hall's."""
+    """Height of its own ceiling; null: the hall's."""
     lamps: Spread = 2.5
     """Distance between its lamps; 0: none."""
 
@@ -183,7 +183,7 @@ class Kidnapping:
     turn: float = 0.0
     """Radians, counter-clockwise, by which it is turned."""
     to: tuple[float, float, float] | None = None
-    """Where it is put down: x, y, heading; null: where it was."""
+    """Pose at which it is put down: x, y, heading; null: the one that it had."""
 
 
 @dataclass(frozen=True)
@@ -198,15 +198,15 @@ class Route:
     through: tuple[str, ...] = ()
     """Names of the aisle blocks or rooms to visit; empty: all."""
     laps: Annotated[int, Bounds(ge=1)] = 1
-    """Of `laps`: times around; of `aisles`: times through each, in alternating directions."""
+    """Repetitions: times around for `laps`; times through each aisle, in alternating directions, for `aisles`."""
     lead_in: tuple[Point, ...] = ()
-    """Of `laps`: points to go through before the first lap."""
+    """Points to go through before the first lap of `laps`."""
     length: Positive | None = None
     """Metres after which it ends; null: the whole path."""
     seed: int = 0
-    """Of random routes."""
+    """Seed of random routes."""
     kidnappings: tuple[Kidnapping, ...] = ()
-    """What happens on each drive along this route."""
+    """Events of each drive along this route."""
     day_duration_s: Positive | None = None
     """Seconds after which lamps, curtains and goods become those of the next day during a drive; null: never."""
 
@@ -317,7 +317,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class CameraErrors:
-    """What camera.yaml does not know of the camera. Signs and directions follow from the seed, the same on all days."""
+    """Errors of the camera beside camera.yaml. Signs and directions follow from the seed, the same on all days."""
 
     tilt_deg: Annotated[float, Bounds(ge=0, le=30)] = 0.0
     """Degrees by which the camera leans; the image of the robot itself stays where it is."""
@@ -371,7 +371,7 @@ class Ranges:
 
 @dataclass(frozen=True)
 class Delivery:
-    """What happens to images on their way into the log."""
+    """Faults of images on their way into the log."""
 
     dropped: Share = 0.0
     """Share that is lost."""
@@ -391,7 +391,7 @@ class WorldConfig:
 
     name: str = "empty"
     seed: int = 1
-    """Of goods, textures, the jitter of each day's path and all noise."""
+    """Seed of goods, textures, the jitter of each day's path and all noise."""
     draw: Annotated[int, Bounds(ge=0)] = 0
     """Which world is drawn: 0 and 7 to 17 are for development, the others for tests. Each has another seed; in draws
     2, 4, 6, … routes that are not `random` are driven the other way round."""
@@ -421,7 +421,7 @@ class WorldConfig:
     robot: Robot = Robot()
     odometry: OdometryNoise = OdometryNoise()
     camera: dict[str, Any] = field(default_factory=mirror)
-    """What a camera.yaml holds, of any projection, with the camera's height."""
+    """Content of a camera.yaml, of any projection, with the camera's height."""
     sensor: Sensor = Sensor()
     timing: Timing = Timing()
     ranges: Ranges = Ranges()

@@ -51,7 +51,7 @@ class Light:
 def lamps_and_windows(
     lamps: Sequence[Lamp], wall_panels: Sequence[WallPanel], config: WorldConfig, number: int
 ) -> list[Light]:
-    """What shines in a world on day `number`: its lamps, then its windows; a closed curtain lets little light in."""
+    """Lights of a world on day `number`: its lamps, then its windows; a closed curtain lets little light in."""
     day = config.day(number)
     lights = [
         Light(
@@ -141,7 +141,7 @@ def light_map(
 
 
 def contact_map(boxes: Array, corner: Array, size: tuple[float, float], step: float) -> Floats:
-    """What bodies that stand on the floor leave of its light (rows, columns): 0.6 beside them, 1 some way off."""
+    """Shares of light that bodies on the floor leave it (rows, columns): 0.6 beside them, 1 some way off."""
     columns, rows = (math.ceil((extent - 2 * c) / step) + 2 for extent, c in zip(size, corner, strict=True))
     distance = np.full((rows, columns), 1e3, dtype=np.float32)
     _near(boxes[boxes[:, 6] < 0.3], corner, step, 6.0 * CONTACT_SHADOW_M, distance)

@@ -1,4 +1,4 @@
-"""What the camera of a simulated robot would see from the same place on another day."""
+"""Views of a simulated robot's camera from the same place on another day."""
 
 from typing import Annotated
 
@@ -26,7 +26,7 @@ class OtherDay(Stage):
     """The other day."""
 
     class Out(Outputs):
-        """Of the camera of the drive."""
+        """Image of the drive's camera."""
 
         image: Image
 

@@ -77,7 +77,7 @@ PARTS = (
 
 
 def coverings(texture: Callable[[str, str], int], look: int) -> tuple[Coverings, ...]:
-    """What covers the parts of people of a look; `texture` gives the number of a texture by material and name."""
+    """Coverings of the parts of people of a look; `texture` gives the number of a texture by material and name."""
     name = f"person {look}"
     trousers, coat, face, hair = (texture(m, name) for m in ("trousers", "coat", "face", "hair"))
 
@@ -176,7 +176,7 @@ class Walker:
 
 
 class Track(NamedTuple):
-    """Where the robot was: times (N,) in seconds, ascending, and poses (N, 3)."""
+    """Track of the robot: times (N,) in seconds, ascending, and poses (N, 3)."""
 
     times: Array
     poses: Array
@@ -195,7 +195,7 @@ class Companion:
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
     def desired_place(self, seconds: float, track: Track, others: Array) -> Array | None:
-        """Where (2,) this person would like to be, from where the robot was up to then; None: no room but `others`'."""
+        """Place (2,) that this person would like, given the robot's up to then; None: no room but `others'`."""
         poses = track.poses[-2000:]
         x, y = poses[-1, :2]
         gait = np.cumsum(np.hypot(*np.diff(poses[::-1, :2], axis=0).T))
@@ -236,7 +236,7 @@ def _back_along(poses: Array, gait: Array, distance: float) -> Array:
 
 
 X, Y, HEADING, WALKED, GONE = range(5)
-"""What the crowd's state (P, 5) holds of each person: place, facing, metres walked, since when (s) it is gone or -1."""
+"""State of the crowd (P, 5), of each person: place, facing, metres walked, since when (s) it is gone or -1."""
 
 
 class Crowd:

@@ -137,7 +137,7 @@ def _trace(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _bearings(boxes: Array, x: float, y: float) -> Array:
-    """Where boxes are seen from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
+    """Directions of boxes from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
     seen = np.empty((len(boxes), 3))
     for b in range(len(boxes)):
         px, py = boxes[b, 0] - x, boxes[b, 1] - y
@@ -529,7 +529,7 @@ def _first_hit_in_column(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _enter(ox: float, oy: float, ux: float, uy: float, length: float, depth: float) -> tuple[float, float, int]:
-    """Where a level ray from (ox, oy) along (ux, uy) enters and leaves a rectangle, and the side; 1e18 if it misses."""
+    """Entry and exit of a level ray from (ox, oy) along (ux, uy) in a rectangle, and the side; 1e18 if it misses."""
     if ux == 0.0:
         if abs(ox) > length:
             return 1e18, -1e18, 0
@@ -639,7 +639,7 @@ def _light(light: Floats, side: int, column: float, row: float) -> tuple[float, 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _contact(contact: Floats, column: float, row: float) -> float:
-    """What bodies beside a point of the floor leave of its light, linear between samples."""
+    """Share of light that bodies beside a point of the floor leave it, linear between samples."""
     column = min(max(column, 0.0), contact.shape[1] - 1.001)
     row = min(max(row, 0.0), contact.shape[0] - 1.001)
     left, below = int(column), int(row)

@@ -22,7 +22,7 @@ from .streams import stream
 
 FOCAL_LENGTHS = ("focal_x", "focal_y", "focal_px")
 CENTRE = ("centre_x", "centre_y")
-"""What cameras call them."""
+"""Parameters of cameras that have the focal length and the centre."""
 
 
 class RobotCamera:
@@ -71,7 +71,7 @@ class RobotCamera:
         return leaning(self._rays, self._slope(float(pose[0]), float(pose[2])))
 
     def _slope(self, x: float, heading: float) -> Array:
-        """How a robot leans on the ramps (3, 3): backwards along x where the floor rises."""
+        """Rotation (3, 3) of a robot on the ramps: it leans backwards along x where the floor rises."""
         ramps = self._world.ramps
         wave = 2.0 * math.sin(2 * math.pi * (x - self._ramps_begin) / ramps.period_m)
         return lean(math.radians(ramps.slope_deg) * max(-1.0, min(1.0, wave)), math.pi - heading)

@@ -105,7 +105,7 @@ CATALOGUE: dict[Furniture, tuple[_Piece, ...]] = {
     "trees": (),
     "park": (),
 }
-"""What stands along the walls of a room of each kind, drawn in this proportion."""
+"""Furniture along the walls of a room of each kind, drawn in this proportion."""
 
 TABLES: dict[Furniture, tuple[Point, Material]] = {
     "meeting": ((2.4, 1.2), "wood"),
@@ -214,7 +214,7 @@ def _on_wall(
 
 
 class Fittings(NamedTuple):
-    """What stands and hangs in a room."""
+    """Boxes that stand and hang in a room."""
 
     blocks: list[Block]
     wall_panels: list[WallPanel]

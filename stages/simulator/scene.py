@@ -16,7 +16,7 @@ from .renderer import Scene
 CELL = 0.5
 """Size (m) of the cells by which boxes are found."""
 MARGIN = 0.25
-"""How far (m) the cells reach beyond the floor, for outer walls."""
+"""Distance (m) to which the cells reach beyond the floor, for outer walls."""
 LIGHT_STEP = 0.2
 CONTACT_STEP = 0.1
 

@@ -155,7 +155,7 @@ class SimulatedRecording:
         return stamps
 
     def _true(self, seconds: Array) -> Array:
-        """Where the robot was, (N, 3), at times (N,); `se2.interpolate` would go through the whole drive each time."""
+        """Poses (N, 3) of the robot at times (N,); `se2.interpolate` would go through the whole drive each time."""
         times, poses = self._stays  # at the end, for ever
         row = np.maximum(times.searchsorted(seconds, side="right") - 1, 0)
         speed = (poses[row + 1] - poses[row]) / (times[row + 1] - times[row])[:, None]

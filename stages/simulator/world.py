@@ -257,7 +257,7 @@ class World:
 
     @cached_property
     def obstacles(self) -> list[Box]:
-        """What a robot cannot drive over or under."""
+        """Boxes that a robot cannot drive over or under."""
         return [box for box in self.boxes if box.high > MAX_DRIVABLE_HEIGHT_M and box.low < HEADROOM_M]
 
     def clearance(self, points: npt.ArrayLike) -> Array:

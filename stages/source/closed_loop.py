@@ -213,7 +213,7 @@ class ClosedLoop(Source):
         return self._people(simulation)
 
     def _people(self, simulation: ClosedLoopState) -> tuple[Person, ...]:
-        """Who is about at the last tick that was made."""
+        """People who are about at the last tick that was made."""
         return self._world.crowd.visible(simulation.crowd, float(simulation.track[-1, 0]))
 
     def _first_pose(self, world: World, rng: np.random.Generator) -> Array:

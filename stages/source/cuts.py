@@ -32,7 +32,7 @@ def remaining_frames(cuts: Sequence[Cut], frames: int) -> Ints:
 
 
 def thinned(frames: Ints, stamps: Ints, rate_hz: float | None) -> Ints:
-    """Of some frames the first in each period of 1 / `rate_hz` seconds, by the `stamps` (ns) of all; None: all.
+    """The first of some frames in each period of 1 / `rate_hz` seconds, by the `stamps` (ns) of all; None: all.
 
     A tenth of a period early is on time, since clocks jitter.
     """

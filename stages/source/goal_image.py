@@ -18,7 +18,7 @@ from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, dec
 from omninav.stages.values.image import Image, Pixels
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
-"""How a goal ends that is an image file."""
+"""Endings of a goal that is an image file."""
 
 
 class GoalImage(Stage):

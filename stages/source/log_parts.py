@@ -71,7 +71,7 @@ def parts_of(
 
 
 def pauses(parts: Sequence[LogPart]) -> list[str]:
-    """What to say of pauses in a recording after which another drive begins: a sentence for each recording."""
+    """Sentences on pauses in a recording after which another drive begins, one for each recording."""
     said: list[str] = []
     for recording, group in groupby(parts, key=lambda part: part.recording):
         ends = [(int(one.frames[-1]), int(other.frames[0])) for one, other in pairwise(group)]

@@ -47,7 +47,7 @@ class OccupancyGridLoader(Stage):
         free: FreeSpace
 
     def inputs_digest(self) -> str | None:
-        """Of the file, where one is read. Raises BadInput where there is a log and no grid, before anything runs."""
+        """Reads the file, if there is one. Raises BadInput where there is a log and no grid, before anything runs."""
         file = self._file()
         if file is None:
             return None

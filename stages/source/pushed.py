@@ -35,14 +35,14 @@ MAX_STAMP_NS = 10**9 << 31
 MAX_NUMBER = 1e8
 """Largest accepted coordinate of a pose (m, rad)."""
 MAX_READINGS = 100_000
-"""Of a ring of ranges."""
+"""Largest accepted number of readings of a ring of ranges."""
 MAX_MOTION_M = 1000.0
 """Largest motion between two images, m: more than any robot drives unseen. A drive that begins elsewhere is a
 `new_log`."""
 
 
 class PushedFrame(NamedTuple):
-    """What came with an image; `rows`: motion, odometry and truth, (3,) each."""
+    """Inputs that came with an image; `rows`: motion, odometry and truth, (3,) each."""
 
     image: Image
     stamp: int | None
@@ -77,7 +77,7 @@ class PushedSource(Source):
     """A camera.yaml, or the name of a camera (equirectangular, fisheye, …), of the images."""
 
     class Out(DriveOutputs):
-        """What is known at an image."""
+        """Inputs known at an image."""
 
     def setup(self, ctx: Context) -> None:
         """Open the camera's file."""

@@ -40,7 +40,7 @@ class CalibrateCamera(Tool):
     projection: Model = "ocamcalib"
     """`ocamcalib`: any mirror, by a polynomial; `hyperbolic`: a hyperbolic mirror; `fisheye`: an equidistant lens."""
     max_images: Annotated[int, Bounds(ge=3, le=500)] = 60
-    """Of a video, so many are looked at, evenly spread."""
+    """Number of a video's images that are looked at, evenly spread."""
     out: str = "camera.yaml"
     """The file to write."""
 

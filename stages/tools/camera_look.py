@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLUMNS = 1440
-"""Of the full circle; of an ordinary camera's image as many as its part of it has."""
+"""Columns of the full circle; an ordinary camera's image has as many as its part of it."""
 
 
 class LookThroughCamera(Tool):

@@ -29,7 +29,7 @@ class RecordCamera(Tool):
     out: str = "camera.mcap"
     """The log to write."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
-    """How long to record; null: until Ctrl-C, or until the camera ends."""
+    """Duration of the recording; null: until Ctrl-C, or until the camera ends."""
     rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] = 10.0
     """Images per second at most."""
     quality: Annotated[int, Bounds(ge=1, le=100)] = 92

@@ -20,7 +20,7 @@ MAX_SCANS = 64
 
 
 EXIF_BYTES = 4096
-"""Of the beginning of a JPEG's EXIF, among which its orientation is looked for."""
+"""Largest part of a JPEG's beginning in which its EXIF orientation is looked for, bytes."""
 _TURNS: dict[int, Callable[[npt.NDArray[Any]], npt.NDArray[Any]]] = {
     2: lambda pixels: pixels[:, ::-1],
     3: lambda pixels: pixels[::-1, ::-1],
@@ -30,7 +30,7 @@ _TURNS: dict[int, Callable[[npt.NDArray[Any]], npt.NDArray[Any]]] = {
     7: lambda pixels: pixels[::-1, ::-1].swapaxes(0, 1),
     8: lambda pixels: pixels[:, ::-1].swapaxes(0, 1),
 }
-"""How an image of each EXIF orientation is put upright."""
+"""Turns that put an image of each EXIF orientation upright."""
 
 
 class Undecodable(ValueError):
@@ -169,4 +169,4 @@ _KINDS: tuple[tuple[bytes, Callable[[bytes], tuple[int, int]]], ...] = (
     (rb"RIFF....WEBP", _webp),
     (rb"II\*\x00|MM\x00\*", _tiff),
 )
-"""How files of each kind begin, and what reads their size."""
+"""First bytes of files of each kind, and readers of their size."""

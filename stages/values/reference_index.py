@@ -12,7 +12,7 @@ from omninav.stages.geometry.arrays import Bytes, Floats
 
 
 class ReferenceIndex(Value):
-    """What finds the references of a map that look like a view: short vectors of them, in one of two forms.
+    """Index of the references of a map that look like a view: short vectors of them, in one of two forms.
 
     A view as a vector (D,), less `mean` (D,), times `axes` (D, d), is a short vector.
     """

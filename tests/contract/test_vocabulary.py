@@ -1,6 +1,7 @@
-"""Names in code, configuration and files are the field's words: none that was replaced comes back."""
+"""Names in code, configuration and files are the field's words, and docstrings say what things are."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -68,5 +69,15 @@ def test_no_replaced_word_names_anything():
         for path in files
         for name in own_names(path)
         if name.lstrip("_") in REPLACED or name.lstrip("_").startswith(PREFIXES)
+    }
+    assert not found, "\n".join(sorted(found))
+
+
+def test_no_docstring_begins_with_what_of_where_who_or_how():
+    begins = re.compile(r'^\s*"""(What|Of|Where|Who|Whoever|How)\b.*', re.MULTILINE)
+    files = [path for folder in ("pipeline", "stages", "omninav") for path in (ROOT / folder).rglob("*.py")]
+    assert len(files) > 300
+    found = {
+        f"{path.relative_to(ROOT)}: {hit[0].strip()}" for path in files for hit in begins.finditer(path.read_text())
     }
     assert not found, "\n".join(sorted(found))

@@ -19,7 +19,7 @@ from omninav.pipeline.run.resume import resume
 
 @dataclass(frozen=True)
 class ExperimentState:
-    """How an experiment was started."""
+    """Record of how an experiment was started."""
 
     argv: tuple[str, ...]
     cwd: str

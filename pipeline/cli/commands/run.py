@@ -71,7 +71,7 @@ def _handed_over(
     job: Callable[[Any], float | None],
     on_sweep: Callable[[Path], None],
 ) -> int:
-    """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
+    """Does what the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
     if flags.hydra_help:
         hydra.hydra_help(CONFIG, flags_parser(), flags)
     elif flags.cfg:

@@ -1,4 +1,4 @@
-"""How turns that a camera sees lie to turns that odometry measures: alike, reversed, scaled or late."""
+"""Relation of turns that a camera sees to turns that odometry measures: alike, reversed, scaled or late."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""How one track of poses lies to another of the same drive: as it is, turned, scaled or mirrored."""
+"""Relation of one track of poses to another of the same drive: as it is, turned, scaled or mirrored."""
 
 import math
 from typing import Literal, NamedTuple
@@ -16,7 +16,7 @@ MAX_OCTAVES, OCTAVE = 12.0, 0.5
 ANGLES = 18
 """Bins of the angle between tracks, 20 degrees each."""
 NEAR_OCTAVES, NEAR_RAD = 0.5, math.radians(30.0)
-"""How far a pair may lie from a relation that it agrees with."""
+"""Largest distance of a pair from a relation that it agrees with, octaves of scale and rad."""
 
 PAIR_MOVED, PAIR_ALIKE = 2.0, 1.5
 """Length scales by which a pair must have moved to count, and within which it lies alike in two tracks."""
@@ -39,7 +39,7 @@ class TrackFit(NamedTuple):
 
 
 def track_fit(track: Array, other: Array, min_metres: float) -> TrackFit | None:
-    """How `track` (N, 3) lies to `other` (N, 3), each in a frame of its own; None where `other` does not move.
+    """Relation of `track` (N, 3) to `other` (N, 3), each in a frame of its own; None where `other` does not move.
 
     Each pair of poses votes for the scale and angle that turn one displacement, seen from the first pose, into the
     other's; pairs count where `other` moved by more than `min_metres`. Wrong poses of `other` vote for anything, a leap
