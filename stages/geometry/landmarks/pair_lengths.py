@@ -32,6 +32,8 @@ ARM_M = 0.2
 """Distance from the robot's axis, m, that a camera may have beside its described mount, so that turns move it."""
 LENGTH_SIGMA, LENGTH_SIGMA_M = 0.1, 0.05
 """Standard deviation of a length by images: a part of it, and m."""
+MAX_LOGARITHM, RESOLUTION = 10.0, 1e-5
+"""Largest logarithm of a ratio of depths that counts, and the steps in which they are compared."""
 FIRST_SCALE, LAST_SCALE, ROUNDS = 100.0, 1.0, 15
 """Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of so many rounds."""
 FREE = 1e3
@@ -154,6 +156,9 @@ def _depths(bearings: Array, pairs: VerifiedPairs) -> tuple[Array, Array]:
 
 def _grouped(keys: Ints, values: Array) -> tuple[Ints, Ints, Array, Ints]:
     """The different keys, where each one's values start, the values (N,), sorted by key and size, and their numbers."""
-    order = np.lexsort((values, keys))
-    different, starts, counts = np.unique(keys[order], return_index=True, return_counts=True)
-    return different, starts, values[order], counts
+    span = round(2.0 * MAX_LOGARITHM / RESOLUTION) + 1
+    steps = np.rint((np.clip(values, -MAX_LOGARITHM, MAX_LOGARITHM) + MAX_LOGARITHM) / RESOLUTION).astype(np.int64)
+    both = np.sort(keys * span + steps)  # one array sorts ten times as fast as two
+    keys, ordered = both // span, np.asarray(both % span * RESOLUTION - MAX_LOGARITHM)
+    starts = np.flatnonzero(np.diff(keys, prepend=-1)).astype(np.int64)
+    return keys[starts], starts, ordered, np.diff(starts, append=len(keys))
