@@ -200,7 +200,7 @@ def _refuse_search_path(overrides: Sequence[str]) -> None:
 
 
 def _foreign(given: Any, own: Any) -> Iterator[Problem]:
-    """Overrides under `hydra.` that are neither omninav's `own` nor of its flags."""
+    """Problems of overrides under `hydra.` that are neither omninav's `own` nor of its flags."""
     free = (*FOLDERS_OF_JOBS, *LAUNCHING, *OF_HYDRA)
     theirs, ours = (_plain(config) for config in (given, own))
     for key in sorted({*theirs, *ours} - {*free}):

@@ -118,7 +118,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
 
 
 def _unreadable_inputs(graph: Graph | None) -> Iterator[Problem]:
-    """Inputs that a graph with other problems cannot read: a name that is misspelled is said first."""
+    """Problems of inputs that a graph with other problems cannot read: a name that is misspelled is said first."""
     try:
         if graph is not None and graph.source is not None:
             graph.source.stage.inputs_digest()

@@ -93,7 +93,7 @@ class OnnxEncoder(Stage):
         self._output = self.output or names[0]
 
     def inputs_digest(self) -> str | None:
-        """Digests of the network, and of the version that runs it."""
+        """Digest of the network and of the version that runs it."""
         return network_digest(self.model)
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

@@ -55,7 +55,7 @@ class CameraDevice:
 
 
 def device_camera(device: str, camera: str | None, pixels: Pixels) -> tuple[Camera, str]:
-    """Reading of a device's images, and what was assumed ("": nothing). Raises `BadInput` where it is unknown.
+    """Camera model of a device, and what was assumed ("": nothing). Raises `BadInput` where it is unknown.
 
     `camera`: a camera.yaml, or the name of a projection; null: assumed where an image looks like one. `pixels`: one.
     """

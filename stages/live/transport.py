@@ -77,7 +77,7 @@ class Transport(ABC):
         self.place = ""
         """Place where it listens, for messages: the transport and its domain."""
         self.farewells: list[Callable[[], None]] = []
-        """Messages still to be sent before the transport is closed."""
+        """Senders of what must still go out before the transport is closed."""
 
     @abstractmethod
     def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:

@@ -206,7 +206,7 @@ class Route:
     seed: int = 0
     """Seed of random routes."""
     kidnappings: tuple[Kidnapping, ...] = ()
-    """Events of each drive along this route."""
+    """Kidnappings on each drive along this route."""
     day_duration_s: Positive | None = None
     """Seconds after which lamps, curtains and goods become those of the next day during a drive; null: never."""
 
@@ -317,7 +317,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class CameraErrors:
-    """Errors of the camera beside camera.yaml. Signs and directions follow from the seed, the same on all days."""
+    """Errors of the camera that camera.yaml lacks. Signs and directions follow from the seed, the same on all days."""
 
     tilt_deg: Annotated[float, Bounds(ge=0, le=30)] = 0.0
     """Degrees by which the camera leans; the image of the robot itself stays where it is."""

@@ -214,7 +214,7 @@ def _on_wall(
 
 
 class Fittings(NamedTuple):
-    """Boxes that stand and hang in a room."""
+    """Furniture and panels of a room."""
 
     blocks: list[Block]
     wall_panels: list[WallPanel]
