@@ -101,7 +101,8 @@ def counts(judged: Judged, source: str) -> str:
     of_paper = list(claims_of(judged, source))
     held = [verdict.holds for *_, verdict in of_paper]
     printed = [verdict.holds for _, claim, verdict in of_paper if "as printed" in claim.paper.lower()]
-    return f"Of {len(held)} claims of this paper {_shares(held)}; of {len(printed)} as printed {_shares(printed)}."
+    of_printed = f"; of {len(printed)} as printed {_shares(printed)}" if printed else ""
+    return f"Of {len(held)} claims of this paper {_shares(held)}{of_printed}."
 
 
 def by_chance(judged: Judged) -> str:

@@ -98,10 +98,7 @@ def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:
     claims = {**FILE["claims"], "part": {**FILE["claims"]["part"], "struck": "the limit is ours"}}
     (_, result), *_ = judged(whole=(case("", True, 3.0),), part=(case("", False, 5.25),))
     found = [(read_experiment(FILE | {"claims": claims}, "full"), result)]
-    assert counts(found, "A paper 2004") == (
-        "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided; "
-        "of 0 as printed 0 hold, 0 do not, and 0 are undecided."
-    )
+    assert counts(found, "A paper 2004") == "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided."
     assert "* as printed: so ([One](one.md)): the limit is ours" in claims_page(found)
     assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0])["one.md"])
 
