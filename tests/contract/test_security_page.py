@@ -36,7 +36,7 @@ TESTS = {
     "Maps": "hostile/test_examples.py::test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name",
     "Tables of runs": "hostile/test_limits.py::test_a_table_of_parquet_unpacks_in_proportion_to_its_size",
     "Images": "stages/values/test_encoded_image.py::test_an_image_that_says_it_is_too_large_is_not_decoded",
-    "Other than files": "pipeline/graph/test_small_files.py::test_what_is_no_file_is_named_without_waiting_for_it",
+    "Special files": "pipeline/graph/test_small_files.py::test_what_is_no_file_is_named_without_waiting_for_it",
     "Folders that cannot be written": f"{TRUST}::test_a_folder_that_cannot_be_used_is_one_line",
     "What a peer can do": f"{LIVE}::test_requests_that_are_turned_off_are_not_heard",
     "What it can call": "stages/live/test_amcl_interface.py::test_amcls_topics_and_services_are_answered",

@@ -33,7 +33,7 @@ ARM_M = 0.2
 LENGTH_SIGMA, LENGTH_SIGMA_M = 0.1, 0.05
 """Standard deviation of a length by images: a part of it, and m."""
 MAX_LOGARITHM, RESOLUTION = 10.0, 1e-5
-"""Largest logarithm of a ratio of depths that counts, and the steps in which they are compared."""
+"""Largest logarithm of a ratio of depths, for which larger ones count, and the steps to which it is rounded."""
 FIRST_SCALE, LAST_SCALE, ROUNDS = 100.0, 1.0, 15
 """Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of so many rounds."""
 FREE = 1e3
