@@ -149,7 +149,8 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
             continue
         parts = value if isinstance(value, list) else [value]
         if any(isinstance(part, dict | list) for part in parts):
-            raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {shown(value)}")
+            expected = "a list of numbers" if isinstance(value, list) else "a number or a word"
+            raise UnreadableRecording(f"{where}: '{path}' must be {expected}, not {shown(value)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
             what = f" {MATRIX}" if isinstance(key.name, int) else f": {problems[0].what}"

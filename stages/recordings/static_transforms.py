@@ -25,7 +25,9 @@ MAX_Z_M = 20_000.0
 MAX_FRAMES = 10_000
 """Largest number of frames that are kept."""
 LEVEL = math.cos(math.radians(20.0))
-"""Cosine of the largest angle between a camera's axis and the vertical, or the horizontal for one that looks ahead."""
+"""Cosine of the largest lean of a camera: of its axis if it looks up, of its image's vertical if it looks ahead."""
+MOVED = 0.01
+"""Largest difference between equal transforms: of their translations in m, of their rotations' matrices."""
 
 
 class Mounted(NamedTuple):
@@ -44,7 +46,8 @@ class StaticTransforms:
     """The last static transform of each frame into its parent."""
 
     def __init__(self) -> None:
-        self._links: dict[str, tuple[str, list[float], list[float]]] = {}
+        self._links: dict[str, tuple[str, Array]] = {}
+        self._contradicted: set[str] = set()
 
     def __len__(self) -> int:
         return len(self._links)
@@ -64,30 +67,35 @@ class StaticTransforms:
             except ValueError as error:
                 problem = error
                 continue
+            link = np.eye(4)
+            link[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+            link[:3, 3] = at.x, at.y, at.z
+            if child in self._links:
+                before, earlier = self._links[child]
+                if before != parent or np.abs(link - earlier).max() > MOVED:
+                    self._contradicted.add(child)
             if child in self._links or len(self._links) < MAX_FRAMES:
-                self._links[child] = parent, [at.x, at.y, at.z], [turn.x, turn.y, turn.z, turn.w]
+                self._links[child] = parent, link
         if problem is not None:
             raise problem
 
     def between(self, base: str, frame: str) -> Array | None:
         """The pose (4, 4) of a frame in another one; None where no transforms join them."""
-        (root, to_base), (other, to_frame) = self._to_root(base), self._to_root(frame)
+        (root, to_base, _), (other, to_frame, _) = self._to_root(base), self._to_root(frame)
         if not root or root != other:
             return None
         return np.linalg.inv(to_base) @ to_frame
 
-    def _to_root(self, frame: str) -> tuple[str, Array]:
-        """The root of a frame's tree and its pose there; "" for one that is its own ancestor."""
+    def _to_root(self, frame: str) -> tuple[str, Array, set[str]]:
+        """The root of a frame's tree ("" for one that is its own ancestor), its pose there, and the frames between."""
         pose, passed = np.eye(4), set[str]()
         while frame in self._links:
             if frame in passed or len(passed) == MAX_LINKS:
-                return "", pose
+                return "", pose, passed
             passed.add(frame)
-            frame, place, quaternion = self._links[frame]
-            link = np.eye(4)
-            link[:3, :3], link[:3, 3] = Rotation.from_quat(quaternion).as_matrix(), place
+            frame, link = self._links[frame]
             pose = link @ pose
-        return frame, pose
+        return frame, pose, passed
 
     def mounted(self, camera: Camera, base: str, frame: str, by_info: bool) -> Mounted:
         """The camera with its position on the robot where it has none and, where a CameraInfo alone describes it
@@ -103,20 +111,24 @@ class StaticTransforms:
         name, pose = joined[0]
         if np.abs(pose[:2, 3]).max() > FAR_M:
             return Mounted(camera)
+        unsure = sorted(self._contradicted & (self._to_root(frame)[2] ^ self._to_root(name)[2]))
+        warning = f"{TF_STATIC} gives {unsure[0]!r:.80} more than one pose; the last is taken" if unsure else ""
         x, y = (round(float(value), 6) + 0.0 for value in pose[:2, 3])
         where = f"x {x:.3f}, y {y:.3f} m in {name}, by {TF_STATIC}"
         camera = replace(camera, position_x=x, position_y=y)
         if not by_info:
-            return Mounted(camera, where)
+            return Mounted(camera, where, warning)
         floor = self.between(FLOOR, frame)
         if floor is not None and 0.0 < floor[2, 3] <= FAR_M:
             camera = replace(camera, height=round(float(floor[2, 3]), 6))
-        up, ahead = pose[2, 2] > LEVEL, math.hypot(*pose[:2, 2]) > LEVEL
+        up, ahead = pose[2, 2] > LEVEL, -pose[2, 1] > LEVEL
         if not up and (camera.ring is not None or not ahead):
-            leans = math.degrees(math.acos(np.clip(pose[2, 2], -1.0, 1.0)))
-            looks = "up" if camera.ring is not None else "ahead"
-            leaning = f"by {TF_STATIC} its axis is {leans:.0f} degrees off the vertical, expected a camera that looks"
+            part, looks, upright = (
+                ("image", "ahead", -pose[2, 1]) if camera.ring is None else ("axis", "up", pose[2, 2])
+            )
+            leans = math.degrees(math.acos(np.clip(upright, -1.0, 1.0)))
+            leaning = f"by {TF_STATIC} its {part} is {leans:.0f} degrees off the vertical, expected a camera that looks"
             return Mounted(camera, where, f"{leaning} {looks}; its yaw is taken to be 0: give camera=PATH/camera.yaml")
         axis = 0 if up else 2
         yaw = round(math.atan2(pose[1, axis], pose[0, axis]), 6)
-        return Mounted(replace(camera, yaw=yaw), f"{where}, turned by {math.degrees(yaw):.1f} degrees")
+        return Mounted(replace(camera, yaw=yaw), f"{where}, turned by {math.degrees(yaw):.1f} degrees", warning)

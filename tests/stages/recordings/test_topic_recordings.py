@@ -166,6 +166,28 @@ def test_a_lens_that_looks_ahead_is_doubted_and_loops_and_unknown_frames_say_not
     assert not open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None))).camera.placed
 
 
+def test_a_camera_that_hangs_upside_down_and_a_frame_with_two_poses_are_reported(tmp_path: Path) -> None:
+    height, width = picture(0).shape[:2]
+    k = [50.0, 0.0, width / 2, 0.0, 50.0, height / 2, 0.0, 0.0, 1.0]
+    fields = {"header": {"frame_id": "eye"}, "width": width, "height": height, "k": k}
+    kind = "sensor_msgs/msg/CameraInfo"
+    info = Made("/camera/camera_info", kind, START, START, make_message(kind, fields, START))
+    upright = in_frame("plate", "eye", 0.1, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5)
+    hanging = in_frame("plate", "eye", 0.1, 0.0, 0.5, 0.5, 0.5, 0.5, 0.5)
+    moved = in_frame("base_link", "plate", 0.4, -0.05, 0.3, 0.0, 0.0, 0.0, 1.0)
+    elsewhere = in_frame("base_link", "lidar", 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    again = in_frame("base_link", "lidar", 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    for links, assumed in (
+        ((PLATE, PLATE, upright, elsewhere, again), ""),
+        ((PLATE, hanging), "its image is 180 degrees off the vertical, expected a camera that looks ahead"),
+        ((moved, upright, PLATE), "/tf_static gives 'plate' more than one pose; the last is taken"),
+    ):
+        made = chain([info, *(fixed_frames(link) for link in links)], messages())
+        log = open_recording(str(write_mcap(tmp_path / "log.mcap", made, camera=None)))
+        assert (log.camera.position_x, log.camera.yaw) == (pytest.approx(0.3), 0.0)
+        assert (assumed in log.assumed[0]) if assumed else log.assumed == ()
+
+
 def test_a_transform_that_cannot_be_is_counted_and_the_others_hold(tmp_path: Path) -> None:
     unset = in_frame("plate", "lidar", 0, 0, 0, 0, 0, 0, 0)
     for broken in (
