@@ -147,10 +147,10 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
             value = section.get(key.name)
         if value is None:
             continue
-        parts = value if isinstance(value, list) else [value]
-        if any(isinstance(part, dict | list) for part in parts):
-            expected = "a list of numbers" if isinstance(value, list) else "a number or a word"
-            raise UnreadableRecording(f"{where}: '{path}' must be {expected}, not {shown(value)}")
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, dict | list):
+                expected = "hold numbers" if isinstance(value, list) else "be a number or a word"
+                raise UnreadableRecording(f"{where}: '{path}' must {expected}, not {shown(part)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
             what = f" {MATRIX}" if isinstance(key.name, int) else f": {problems[0].what}"

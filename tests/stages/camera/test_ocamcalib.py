@@ -46,5 +46,5 @@ def test_affine_parameters_move_rows_by_columns_and_columns_by_rows() -> None:
 def test_a_polynomial_that_bends_the_other_way_or_is_no_list_of_numbers_is_refused() -> None:
     with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must be \[a0, a1, …\] with a0 below 0"):
         parse_camera(write_camera(LENS).replace("- -170.0", "- 170.0"), "camera.yaml")
-    with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must be a number or a word, not a list"):
+    with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must hold numbers, not a list"):
         parse_camera(write_camera(LENS).replace("- -170.0", "- [1, 2]"), "camera.yaml")
