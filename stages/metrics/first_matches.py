@@ -10,7 +10,7 @@ import numpy as np
 from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
-from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, match_patches
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.triangulation import angles_between
@@ -87,6 +87,8 @@ class FirstMatches(MetricStage):
     """Largest ratio of the nearest to the second nearest patch."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance between the colours of two patches."""
+    patch_distance: PatchDistance = "euclidean"
+    """Distance of patches' descriptors in the search both ways: `mahalanobis` is the paper's (equation 2)."""
 
     def step(
         self,
@@ -144,9 +146,8 @@ class FirstMatches(MetricStage):
 
     def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
         if self.search == "both_ways":
-            return match_patches(
-                one.patches(), other.patches(), ComparisonOptions(self.ratio, max_colour_distance=self.colour)
-            )
+            options = ComparisonOptions(self.ratio, max_colour_distance=self.colour, patch_distance=self.patch_distance)
+            return match_patches(one.patches(), other.patches(), options)
         if not len(one) or not len(other):
             return NO_PAIRS
         pairs = one_way_matches(one.descriptors, other.descriptors, self.ratio)

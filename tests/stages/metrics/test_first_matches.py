@@ -292,3 +292,11 @@ def test_a_partner_is_clearer_than_the_second_by_a_fifth(second_nearest: float, 
     first = PLAIN.copy()
     first[1] = 255 - first[1]
     assert looking(first, second, search="one_way")["matched"] == matched - 1.0  # none looks like the second patch
+
+
+def test_by_equation_2_an_entry_that_varies_much_counts_for_little() -> None:
+    first = 100 + 4 * np.sign(LOOKS.astype(np.int64) - 127)
+    second = first.copy()
+    first[:, 0], second[:, 0] = 12 * np.arange(20), 12 * np.arange(20)[::-1]
+    assert looking(first, second, patch_distance="mahalanobis")["right"] == 20.0
+    assert looking(first, second)["right"] < 15.0
