@@ -9,7 +9,7 @@ from typing import Any
 
 import omninav
 from omninav.pipeline.experiment.repetition import condition_key
-from omninav.pipeline.jobs.executors import EngineSettings
+from omninav.pipeline.jobs.executors import ExecutorSettings
 from omninav.pipeline.jobs.job import Job
 from omninav.pipeline.jobs.run import Workers
 
@@ -29,14 +29,14 @@ def rows() -> list[Row]:
 
 def _overhead(place: Path) -> list[Row]:
     jobs = [Job(str(n), "benchmarks.cluster.tasks:nothing", {}, place / f"{n}.log") for n in range(EMPTY)]
-    with Workers(EngineSettings(workers=1), place) as workers:
+    with Workers(ExecutorSettings(workers=1), place) as workers:
         workers.run(jobs[:5])
         times = []
         for _ in range(ROUNDS):
             begun = time.perf_counter()
             workers.run(jobs)
             times.append((time.perf_counter() - begun) / EMPTY)
-    return [Row("overhead of a task, engine=local", 1e3 * statistics.median(times), "ms", limit=20.0)]
+    return [Row("overhead of a task, executor=local", 1e3 * statistics.median(times), "ms", limit=20.0)]
 
 
 def _throughput(place: Path) -> list[Row]:
@@ -64,13 +64,13 @@ def _throughput(place: Path) -> list[Row]:
 
     times: dict[int, list[float]] = {1: [], 2: []}
     processor: dict[int, list[float]] = {1: [], 2: []}
-    with Workers(EngineSettings(workers=1), place) as one, Workers(EngineSettings(workers=2), place / "two") as two:
-        engines = {1: one, 2: two}
-        for number, workers in engines.items():  # map, features and compiled code are there by then
+    with Workers(ExecutorSettings(workers=1), place) as one, Workers(ExecutorSettings(workers=2), place / "two") as two:
+        executors = {1: one, 2: two}
+        for number, workers in executors.items():  # map, features and compiled code are there by then
             ends = workers.run(jobs(number, 2))
             assert not any(end.error for end in ends.values()), ends
         for _ in range(ROUNDS):
-            for number, workers in engines.items():
+            for number, workers in executors.items():
                 workers.run(jobs(number, number))  # its processes are there
                 some = jobs(number, REPETITIONS)
                 begun = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Hydra's launcher for the jobs of a sweep that run where `engine=…` says: `hydra/launcher=omninav`."""
+"""Hydra's launcher for the jobs of a sweep that run where `executor=…` says: `hydra/launcher=omninav`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ NAME = "omninav"
 
 
 class OmninavLauncher(Launcher):
-    """Runs each job of a sweep as a job of the engine; nothing but words crosses to it."""
+    """Runs each job of a sweep as a job of the executor; nothing but words crosses to it."""
 
     def __init__(self) -> None:
         self._config: Any = None
@@ -32,7 +32,7 @@ class OmninavLauncher(Launcher):
 
         sweep = Path(str(self._config.hydra.sweep.dir)).absolute()
         words = [str(word) for word in self._config.hydra.overrides.hydra]
-        ended = run_sweep(sweep, self._config.engine, words, self._folders, job_overrides, initial_job_idx)
+        ended = run_sweep(sweep, self._config.executor, words, self._folders, job_overrides, initial_job_idx)
         return [_returned(overrides, objective) for overrides, objective in ended]
 
 

@@ -1,4 +1,4 @@
-"""One experiment by every engine, with something killed in the middle: its verdicts must be the same bytes.
+"""One experiment by every executor, with something killed in the middle: its verdicts must be the same bytes.
 
 `python benchmarks/cluster/kills.py FOLDER [-- WORD …]`: the words of the experiment, by default Figure 3 in small.
 """
@@ -119,20 +119,20 @@ def main() -> None:
     """Run all, one after the other, and print a row for each."""
     place = Path(sys.argv[1]).resolve()
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else WORDS
-    print("| engine | killed in the middle | exit codes | seconds | repetitions kept | verdicts | all metrics |")
+    print("| executor | killed in the middle | exit codes | seconds | repetitions kept | verdicts | all metrics |")
     print("|---|---|---|---:|---:|---|---|", flush=True)
-    alone = Client(place / "local", words, "engine.workers=2")
+    alone = Client(place / "local", words, "executor.workers=2")
     reference_code = alone.end()
     reference = alone.contents()
     total = len(alone.results())
     middle = int(AT * total)
 
-    def row(engine: str, killed: str, client: Client, codes: list[int], kept: int) -> None:
+    def row(where: str, killed: str, client: Client, codes: list[int], kept: int) -> None:
         verdicts, metrics = client.contents()
         same = ["same bytes" if verdicts == reference[0] else "DIFFER", "same" if metrics == reference[1] else "DIFFER"]
         seconds = time.monotonic() - client.begun
         shown = " then ".join(map(str, codes))
-        print(f"| {engine} | {killed} | {shown} | {seconds:.0f} | {kept} of {total} | {' | '.join(same)} |", flush=True)
+        print(f"| {where} | {killed} | {shown} | {seconds:.0f} | {kept} of {total} | {' | '.join(same)} |", flush=True)
 
     row("local, 2 workers", "nothing", alone, [reference_code], 0)
 
@@ -152,9 +152,9 @@ def main() -> None:
     def nothing(client: Client) -> list[int]:
         return [client.end()]
 
-    case("local, 1 worker", "nothing", nothing, "engine.workers=1")
+    case("local, 1 worker", "nothing", nothing, "executor.workers=1")
     with OneNodeSlurm(place / "slurm_parts", port=PORT + 100) as slurm:
-        on_slurm = ("engine=slurm", "engine.workers=2", "engine.memory=2GB")
+        on_slurm = ("executor=slurm", "executor.workers=2", "executor.memory=2GB")
 
         def slurm_worker_dies(client: Client) -> list[int]:
             os.kill(worker_of_slurm(client.folder), signal.SIGKILL)
@@ -175,7 +175,7 @@ def main() -> None:
         case("slurm", "controller", controller_dies, *on_slurm, **slurm.environment)
         case("slurm", "client", client_dies, *on_slurm, **slurm.environment)
     with Dask(place / "dask_parts") as dask:
-        address = ("engine=dask", f"engine.address=tcp://127.0.0.1:{PORT}")
+        address = ("executor=dask", f"executor.address=tcp://127.0.0.1:{PORT}")
 
         def worker_dies(client: Client) -> list[int]:
             dask.kill("worker 0")
@@ -193,7 +193,7 @@ def main() -> None:
         case("dask", "worker", worker_dies, *address)
         case("dask", "client", client_dies, *address)
         case("dask", "scheduler", scheduler_dies, *address)
-    case("local, 2 workers", "client", client_dies, "engine.workers=2")
+    case("local, 2 workers", "client", client_dies, "executor.workers=2")
 
 
 if __name__ == "__main__":

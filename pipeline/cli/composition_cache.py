@@ -38,7 +38,7 @@ def parsed(words: Sequence[str]) -> list[Override]:
 def from_options(kept: Callable[[tuple[str, ...]], bytes], words: Sequence[Override]) -> Any:
     """Sets words in the configuration that their options give, whose bytes `kept` returns. Raises Hydra's errors.
 
-    Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
+    Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `executor=…`). So what
     options give is kept, and all else (`day=2`) is set in a copy of it. What was set is listed under `typed`.
     """
     settings = [word for word in words if _is_setting(word)]

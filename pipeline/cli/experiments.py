@@ -102,7 +102,7 @@ def without_graph(words: Sequence[str], config_dirs: Sequence[str] = ()) -> Any:
     options = (item for item in config_file()["defaults"] if isinstance(item, dict))
     chosen = (name for option in options for name, value in option.items() if value and name in listed_groups())
     with suppress(HydraException):
-        return compose([*(f"~{name}" for name in chosen if name != "engine"), *words])
+        return compose([*(f"~{name}" for name in chosen if name != "executor"), *words])
     return composed_of(words, config_dirs)
 
 

@@ -1,4 +1,4 @@
-"""The jobs of a sweep that run where `engine=…` says: how they are given to it, and how one of them runs there."""
+"""The jobs of a sweep that run where `executor=…` says: how they are given to it, and how one of them runs there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -9,7 +9,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import OmegaConf, open_dict, read_write
 
-from omninav.pipeline.jobs.executors import read_engine
+from omninav.pipeline.jobs.executors import read_executor
 from omninav.pipeline.jobs.job import Job, Outcome, Send
 from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.jobs.throttle import Throttle
@@ -24,7 +24,7 @@ LOGS = ".jobs"
 
 def run_sweep(
     sweep: Path,
-    engine: Any,
+    executor: Any,
     hydra_words: Sequence[str],
     folders: Sequence[str],
     job_overrides: Sequence[Sequence[str]],
@@ -37,12 +37,12 @@ def run_sweep(
     given = {"sweep": str(sweep), "hydra": list(hydra_words), "folders": list(folders)}
     jobs = []
     for number, overrides in enumerate(job_overrides, first):
-        own = {**given, "number": number, "overrides": [word for word in overrides if not is_of_engine(word)]}
+        own = {**given, "number": number, "overrides": [word for word in overrides if not is_of_executor(word)]}
         jobs.append(Job(str(number), f"{__name__}:{run_sweep_job.__name__}", own, sweep / LOGS / f"{number}.log"))
-    settings: Any = OmegaConf.to_container(engine, resolve=True)
+    settings: Any = OmegaConf.to_container(executor, resolve=True)
     ends: dict[str, JobEnd] = {}
     throttle = Throttle()
-    with Progress(unit="jobs") as progress, Workers(read_engine(settings), sweep / LOGS) as workers:
+    with Progress(unit="jobs") as progress, Workers(read_executor(settings), sweep / LOGS) as workers:
         progress.begin(sweep.name, 0, len(jobs))
 
         def on_end(job: Job, outcome: Outcome) -> None:
@@ -58,9 +58,10 @@ def run_sweep(
     return [(list(job.given["overrides"]), ends[job.name].objective) for job in jobs]
 
 
-def is_of_engine(word: str) -> bool:
+def is_of_executor(word: str) -> bool:
     """Tells whether a word says where jobs run, and nothing of what they do."""
-    return word.lstrip("+").startswith(("engine=", "engine."))
+    name = word.lstrip("+").partition("=")[0].partition(".")[0]
+    return name in ("executor", "engine")  # older sweeps have engine=… in their folders
 
 
 def _end_of(job: Job, outcome: Outcome) -> JobEnd:
@@ -75,7 +76,7 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
 
 
 def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
-    """Run one job of a sweep, as a job of an engine: Hydra composes it anew from its words. Returns a `JobEnd`."""
+    """Run one job of a sweep, as a job of an executor: Hydra composes it anew from its words. Returns a `JobEnd`."""
     from .composition import offer_plugins
 
     offer_plugins()

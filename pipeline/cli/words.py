@@ -21,7 +21,7 @@ _LONG_NUMBER = re.compile(rf"(?<![\w.])[-+]?\d{{{MAX_DIGITS},}}")
 INFO = ("all", "config", "defaults", "defaults-tree", "plugins", "searchpath")
 NOT_TAKEN = {"experimental_rerun": (), "config_path": ("-cp",), "config_name": ("-cn",), "shell_completion": ("-sc",)}
 """Flags of Hydra that would read pickles, replace omninav's own configuration or write to a shell's start files."""
-OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
+OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "executor", "hydra")
 """Settings of a whole experiment; all others are for its conditions."""
 
 

@@ -14,7 +14,7 @@ import yaml
 from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
 from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput, counted
-from omninav.pipeline.jobs.executors import EngineSettings, read_engine
+from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
 from omninav.pipeline.jobs.job import Job, Outcome
 from omninav.pipeline.jobs.progress import JobProgress
 from omninav.pipeline.jobs.run import Workers
@@ -53,14 +53,14 @@ class ExperimentRun:
     folder: Path
     argv: Sequence[str]
     conditions: list[ConditionRun]
-    engine: EngineSettings = field(default_factory=EngineSettings)
+    executor: ExecutorSettings = field(default_factory=ExecutorSettings)
     recordings: list[Recording] = field(default_factory=list)
     started: datetime = field(default_factory=datetime.now)
 
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
         try:
-            with locked(self.folder / ".lock", wait=False), Workers(self.engine, self.folder) as workers:
+            with locked(self.folder / ".lock", wait=False), Workers(self.executor, self.folder) as workers:
                 return self._run(workers)
         except Taken as taken:
             raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
@@ -215,8 +215,8 @@ class ExperimentRun:
             "started": self.started.isoformat(timespec="seconds"),
             "written": datetime.now().isoformat(timespec="seconds"),
             "git_commit": git_commit(),
-            "engine": self.engine.name,
-            "workers": self.engine.workers,
+            "engine": self.executor.name,
+            "workers": self.executor.workers,
             "libraries": {name: version(name) for name in LIBRARIES},
         }
         write_json(self.folder / STATE, manifest)
@@ -262,11 +262,11 @@ def plan_experiment(
     profile = str(config.get("profile") or FULL)
     experiment = read_experiment(config["experiment"], profile)
     file = yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120)
-    engine = read_engine(config.get("engine"))
+    executor = read_executor(config.get("executor"))
     if experiment.cores is not None:
-        engine = replace(engine, workers=experiment.cores)
+        executor = replace(executor, workers=experiment.cores)
     folder = (Path(str(config.get("runs", "runs"))) / f"{experiment.name}_{profile}").resolve()
     conditions = condition_runs(experiment, folder, overrides)
-    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, engine)
+    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, executor)
     check(experiment, conditions, compose)
     return run

@@ -1,4 +1,4 @@
-"""Engines by Dask: a scheduler that runs already, or workers that a batch system such as Slurm starts."""
+"""Executors by Dask: a scheduler that runs already, or workers that a batch system such as Slurm starts."""
 
 import logging
 import re
@@ -12,7 +12,7 @@ from distributed import Client
 
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 
-from .executors import EngineSettings
+from .executors import ExecutorSettings
 
 START_S = 60.0
 """Longest wait for a scheduler's answer, seconds."""
@@ -54,16 +54,16 @@ class DaskExecutor(Executor):
             self._cluster.close(timeout=10)
 
 
-def dask_cluster(settings: EngineSettings) -> DaskExecutor:
-    """`engine=dask`: the scheduler at `engine.address`, with whatever workers it has."""
+def dask_cluster(settings: ExecutorSettings) -> DaskExecutor:
+    """`executor=dask`: the scheduler at `executor.address`, with whatever workers it has."""
     options = _options(settings, ("address",))
     if "address" not in options:
-        raise BadInput("engine=dask: where is its scheduler? type engine.address=tcp://HOST:8786")
+        raise BadInput("executor=dask: where is its scheduler? type executor.address=tcp://HOST:8786")
     return DaskExecutor(_client(options["address"]))
 
 
-def slurm(settings: EngineSettings) -> DaskExecutor:
-    """`engine=slurm`: each worker is a batch job of one core; one that dies is started again."""
+def slurm(settings: ExecutorSettings) -> DaskExecutor:
+    """`executor=slurm`: each worker is a batch job of one core; one that dies is started again."""
     from dask_jobqueue import SLURMCluster
 
     options = _options(settings, ("partition", "time", "account", "interface"))
@@ -92,15 +92,15 @@ def slurm(settings: EngineSettings) -> DaskExecutor:
         raise
 
 
-def _options(settings: EngineSettings, known: tuple[str, ...]) -> dict[str, str]:
+def _options(settings: ExecutorSettings, known: tuple[str, ...]) -> dict[str, str]:
     problems = []
     given = {name: str(value) for name, value in settings.options.items() if value is not None}
     for name, value in given.items():
         if name not in known:
             hint = suggest(name, ("workers", "memory", *known), "settings")
-            problems.append(Problem(f"engine.{name}", f"the engine '{settings.name}' has no such setting", hint))
+            problems.append(Problem(f"executor.{name}", f"the executor '{settings.name}' has no such setting", hint))
         elif not WORD.fullmatch(value):
-            problems.append(Problem(f"engine.{name}", f"{value!r:.40}, expected a word without spaces"))
+            problems.append(Problem(f"executor.{name}", f"{value!r:.40}, expected a word without spaces"))
     if problems:
         raise ProblemsFound(problems)
     return given
@@ -111,7 +111,7 @@ def _client(where: Any) -> Any:
     try:
         return Client(where, timeout=START_S if not isinstance(where, str) else 5, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        raise BadInput(f"engine.address={where}: no scheduler answers there ({error!s:.200})") from None
+        raise BadInput(f"executor.address={where}: no scheduler answers there ({error!s:.200})") from None
 
 
 def _quiet() -> None:

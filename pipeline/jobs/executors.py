@@ -1,4 +1,4 @@
-"""Engines: where jobs are placed. Each is a factory that gives a `concurrent.futures.Executor`, found by its name."""
+"""Where jobs run: factories of a `concurrent.futures.Executor`, found by their names."""
 
 import os
 import re
@@ -12,8 +12,8 @@ from typing import Any
 
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 
-ENTRY_POINTS = "omninav.engines"
-"""The group in which installed packages offer engines of their own."""
+ENTRY_POINTS = "omninav.executors"
+"""The group in which installed packages offer executors of their own."""
 BUILT_IN = {
     "local": "omninav.pipeline.jobs.executors:local",
     "slurm": "omninav.pipeline.jobs.dask_executor:slurm",
@@ -22,8 +22,8 @@ BUILT_IN = {
 
 
 @dataclass(frozen=True)
-class EngineSettings:
-    """Settings under `engine.…`."""
+class ExecutorSettings:
+    """Settings under `executor.…`."""
 
     name: str = "local"
     workers: int | None = None
@@ -31,33 +31,34 @@ class EngineSettings:
     memory: int | None = None
     """Bytes that a job may take; None: as many as there are."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Whatever else stands there, for the engine itself."""
+    """Options of this executor alone."""
     folder: Path | None = None
-    """Folder for what an engine's workers print; all machines see it."""
+    """Folder for what an executor's workers print; all machines see it."""
 
 
-Factory = Callable[[EngineSettings], Executor]
+Factory = Callable[[ExecutorSettings], Executor]
 
 
-def read_engine(plain: Any) -> EngineSettings:
-    """The settings of an engine, as a configuration has them. Raises `ProblemsFound`."""
+def read_executor(plain: Any) -> ExecutorSettings:
+    """Read the settings of an executor from a configuration. Raises `ProblemsFound`."""
     given: dict[str, Any] = {"name": plain} if isinstance(plain, str) else dict(plain or {})
     name, workers, memory = (given.pop(key, None) for key in ("name", "workers", "memory"))
     name = "local" if name is None else name
     problems = []
     known = _factories()
     if name not in known:
-        problems.append(Problem("engine", f"there is no engine '{name!s:.40}'", suggest(str(name), known, "engines")))
+        hint = suggest(str(name), known, "executors")
+        problems.append(Problem("executor", f"there is no executor '{name!s:.40}'", hint))
     if workers is not None and (not isinstance(workers, int) or isinstance(workers, bool) or not 1 <= workers <= 1e5):
         what = f"{workers!r:.40}, expected a whole number >= 1"
-        problems.append(Problem("engine.workers", what, "type engine.workers=4"))
+        problems.append(Problem("executor.workers", what, "type executor.workers=4"))
     size = None if memory is None else _bytes(memory)
     if memory is not None and size is None:
         what = f"{memory!r:.40}, expected a size with its unit"
-        problems.append(Problem("engine.memory", what, "type engine.memory=4GB"))
+        problems.append(Problem("executor.memory", what, "type executor.memory=4GB"))
     if problems:
         raise ProblemsFound(problems)
-    return EngineSettings(name, workers, size, given)
+    return ExecutorSettings(name, workers, size, given)
 
 
 def _bytes(text: Any) -> int | None:
@@ -65,19 +66,19 @@ def _bytes(text: Any) -> int | None:
     return int(float(found[1]) * 1000 ** ("KMGT".index(found[2].upper()) + 1)) if found else None
 
 
-def executor_of(settings: EngineSettings) -> Executor:
+def executor_of(settings: ExecutorSettings) -> Executor:
     """The executor that settings describe. Raises `BadInput` where it cannot be had."""
     target = _factories()[settings.name]
     module, _, name = target.partition(":")
     try:
         factory: Factory = getattr(import_module(module), name)
     except ImportError as error:
-        raise BadInput(f"engine={settings.name}: {error}; {_to_install(settings.name)}") from None
+        raise BadInput(f"executor={settings.name}: {error}; {_to_install(settings.name)}") from None
     return factory(settings)
 
 
 def _to_install(name: str) -> str:
-    return f"pip install 'omninav[{name}]'" if name in BUILT_IN else f"install what the engine '{name}' needs"
+    return f"pip install 'omninav[{name}]'" if name in BUILT_IN else f"install what the executor '{name}' needs"
 
 
 def _factories() -> dict[str, str]:
@@ -89,10 +90,10 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def local(settings: EngineSettings) -> Executor:
+def local(settings: ExecutorSettings) -> Executor:
     """Threads of this process, each of which waits for the process of one job."""
-    what, known = f"the engine '{settings.name}' has no such setting", ("workers", "memory")
+    what, known = f"the executor '{settings.name}' has no such setting", ("workers", "memory")
     if settings.options:
         unknown = settings.options
-        raise ProblemsFound(Problem(f"engine.{name}", what, suggest(name, known, "settings")) for name in unknown)
+        raise ProblemsFound(Problem(f"executor.{name}", what, suggest(name, known, "settings")) for name in unknown)
     return ThreadPoolExecutor(settings.workers or cores(), "job")

@@ -72,7 +72,7 @@ class _Worker:
         while (line := self._answer()) is None:
             peak = max(peak, _memory(self._process.pid))
             if limit and peak > limit:
-                return self._ended(f"it took {_size(peak)} of memory, more than engine.memory={_size(limit)} allows")
+                return self._ended(f"it took {_size(peak)} of memory, more than executor.memory={_size(limit)} allows")
             if lease.over():
                 return self._ended("stopped, because whoever started it has ended")
         if not line:

@@ -15,7 +15,7 @@ from typing import Any
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.problems import BadInput
 
-from .executors import EngineSettings, cores, executor_of
+from .executors import ExecutorSettings, cores, executor_of
 from .job import Job, Outcome
 from .perform import perform, release
 from .throttle import Throttle
@@ -31,12 +31,12 @@ Ends = queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]
 
 
 class Workers:
-    """Those who run jobs, as an engine's settings describe them; a context manager.
+    """Runs jobs by the executor that settings describe; a context manager.
 
-    The engine is started with the first job. `folder` must be seen by all of its machines.
+    It is started with the first job. `folder` must be seen by all of its machines.
     """
 
-    def __init__(self, settings: EngineSettings, folder: Path) -> None:
+    def __init__(self, settings: ExecutorSettings, folder: Path) -> None:
         self.settings = replace(settings, folder=folder.absolute())
         self._lease = folder / ".client"
         self._token = secrets.token_hex(16)
@@ -65,7 +65,7 @@ class Workers:
         on_message: Callable[[Job, Any], None] = lambda job, message: None,
         on_end: Callable[[Job, Outcome], None] = lambda job, outcome: None,
     ) -> dict[str, Outcome]:
-        """Run jobs. Returns how each ended, by name. Raises `BadInput` where the engine itself is gone.
+        """Run jobs. Returns how each ended, by name. Raises `BadInput` where the executor itself is gone.
 
         `on_message` gets every message of a job, `on_end` how it ended.
         """
@@ -109,7 +109,7 @@ class Workers:
         try:
             future = self._executor.submit(perform, job.text(attempt, self._lease, self._token, self.settings.memory))
         except Exception as error:
-            message = f"engine={self.settings.name}: it takes no more jobs ({error}); the same command goes on"
+            message = f"executor={self.settings.name}: it takes no more jobs ({error}); the same command goes on"
             raise BadInput(message) from error
         future.add_done_callback(lambda done: ends.put((job, attempt, done)))
 

@@ -42,8 +42,8 @@ def test_what_can_run_passes_and_leaves_nothing(tmp_path: Path, monkeypatch, cap
 
 def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "engine.workers=-1"]) == 2
-    assert "engine.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
+    assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "executor.workers=-1"]) == 2
+    assert "executor.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
 
 
 def test_an_objective_that_no_stage_measures_is_refused_before_the_run(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -398,17 +398,17 @@ def dask_cluster() -> Iterator[tuple[str, ...]]:
     distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
     how = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "protocol": "tcp", "dashboard_address": ":0"}
     with distributed.LocalCluster(**how) as cluster:
-        yield "engine=dask", f"engine.address={cluster.scheduler_address}"
+        yield "executor=dask", f"executor.address={cluster.scheduler_address}"
 
 
 @pytest.mark.parametrize(
-    "engine",
-    [nullcontext(("engine.workers=1",)), nullcontext(("engine.workers=8",)), dask_cluster()],
+    "executor",
+    [nullcontext(("executor.workers=1",)), nullcontext(("executor.workers=8",)), dask_cluster()],
     ids=["one process", "eight processes", "dask"],
 )
-def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, engine, request):
+def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, executor, request):
     runs = dice.place / request.node.callspec.id.replace(" ", "_")
-    with engine as words:
+    with executor as words:
         dice.go(*MINE, *words, f"runs={runs}", "cache=null")
     here, there = dice.place / "runs/dice_full", runs / "dice_full"
     first, second = (read_result(folder / "dice.result.json") for folder in (here, there))

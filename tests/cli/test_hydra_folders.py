@@ -84,7 +84,7 @@ def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_p
 
 def test_the_jobs_of_a_sweep_that_an_engine_runs_leave_the_same_and_name_what_fails(toy, tmp_path: Path):
     words = ("--config-dir=mine", "-m", "seed=0,1", "nodes.count.length_=4,none")
-    ended = toy(*words, "hydra.sweep.dir=there", "engine.workers=2")
+    ended = toy(*words, "hydra.sweep.dir=there", "executor.workers=2")
     assert ended.returncode == 2
     assert sorted(re.findall(r"^job (\d): 1 problem:\n +nodes.count.length_: 'none'", ended.stderr, re.M)) == ["1", "3"]
     assert ended.stdout.splitlines()[-1] == "sweep: there/sweep.html"
@@ -96,9 +96,9 @@ def test_the_jobs_of_a_sweep_that_an_engine_runs_leave_the_same_and_name_what_fa
     assert (tmp_path / "here/0/metrics.json").read_bytes() == (tmp_path / "there/0/metrics.json").read_bytes()
 
 
-@pytest.mark.parametrize("engine", [(), ("engine.workers=1",)])
-def test_a_sweep_that_is_typed_again_does_only_what_is_missing(toy, tmp_path: Path, engine: tuple[str, ...]):
-    words = ("--config-dir=mine", "-m", "seed=0,1", "hydra.sweep.dir=out", *engine)
+@pytest.mark.parametrize("executor", [(), ("executor.workers=1",)])
+def test_a_sweep_that_is_typed_again_does_only_what_is_missing(toy, tmp_path: Path, executor: tuple[str, ...]):
+    words = ("--config-dir=mine", "-m", "seed=0,1", "hydra.sweep.dir=out", *executor)
     manifests = [tmp_path / "out" / number / "manifest.json" for number in "01"]
     toy(*words, check=True)
     first = [manifest.read_bytes() for manifest in manifests]

@@ -72,7 +72,7 @@ def python(folder: Path, *words: str, program: str = sys.executable, **environme
     return ended.stdout
 
 
-@pytest.mark.parametrize("more", [(), ("-m", "seed=0", "engine=local", "engine.workers=1")], ids=["run", "sweep"])
+@pytest.mark.parametrize("more", [(), ("-m", "seed=0", "executor=local", "executor.workers=1")], ids=["run", "sweep"])
 def test_a_run_reads_nothing_of_the_folder_that_it_is_started_in(tmp_path: Path, more: tuple[str, ...]) -> None:
     before = hostile(tmp_path)
     with watched(tmp_path) as seen:

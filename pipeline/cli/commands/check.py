@@ -20,7 +20,7 @@ from omninav.pipeline.graph.ground_truth import truth_readers
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Source
-from omninav.pipeline.jobs.executors import read_engine
+from omninav.pipeline.jobs.executors import read_executor
 from omninav.pipeline.run.plan import Plan, check_inputs, plan
 
 MAX_TRIED = 1 << 26
@@ -37,7 +37,7 @@ def command(arguments: list[str]) -> int:
     with composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:
             return _check_experiment(config, arguments)
-        read_engine(OmegaConf.to_container(config.engine, resolve=True))
+        read_executor(OmegaConf.to_container(config.executor, resolve=True))
         planned = plan(complete(config))
     check_objective(planned.config.get("objective"), planned.graph)
     check_inputs(planned)

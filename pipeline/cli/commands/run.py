@@ -19,7 +19,7 @@ from omninav.pipeline.cli.composition_cache import CONFIG, RUN_ALONE
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
-from omninav.pipeline.cli.sweep_jobs import is_of_engine
+from omninav.pipeline.cli.sweep_jobs import is_of_executor
 from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.cli.words import condition_words, flags_parser, read_flags, word_of
 from omninav.pipeline.files import Taken, locked
@@ -29,7 +29,7 @@ from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.run_folder import new_folder
 
 LAUNCHER = "hydra/launcher=omninav"
-"""Word that sends the jobs of a sweep to the engine that was typed."""
+"""Word that sends the jobs of a sweep to the executor that was typed."""
 
 
 def command(
@@ -49,7 +49,7 @@ def command(
         arguments = [listed[words.index(word)] if word in words else word for word in arguments]
         if flags.multirun:
             _refuse_misspelled_sweep(listed, folders)
-            if any(map(is_of_engine, listed)) and not _has_launcher(listed):
+            if any(map(is_of_executor, listed)) and not _has_launcher(listed):
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
@@ -160,5 +160,5 @@ def _refuse_other_sweep(folder: Path, words: Sequence[str]) -> None:
     settings = read_yaml(file)
     before = [str(word) for word in OmegaConf.select(OmegaConf.create(settings), "hydra.overrides.task") or ()]
     given = [word for word in words if not word.startswith(("hydra.", "hydra/"))]
-    if sorted(itertools.filterfalse(is_of_engine, before)) != sorted(itertools.filterfalse(is_of_engine, given)):
+    if sorted(itertools.filterfalse(is_of_executor, before)) != sorted(itertools.filterfalse(is_of_executor, given)):
         raise BadInput(f"{folder}: another sweep is in it ({' '.join(before):.200}); name another: hydra.sweep.dir=…")
