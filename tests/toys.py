@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Quantity, Source, Stage, State, Tick, Truth, Value
 from omninav.pipeline.files import digest_text, write_whole
-from omninav.pipeline.graph.results import Figure, Metrics
+from omninav.pipeline.graph.results import Metrics, Plot
 
 
 class Number(Value):
@@ -274,10 +274,10 @@ class Draw(Stage):
     """Draws all numbers."""
 
     class Out(Outputs):
-        figure: Figure
+        plot: Plot
 
     def step(self, ctx: Context, numbers: Sequence[Number]) -> Out:
-        return self.Out(figure=Figure("drawn", "All numbers", "As they came.", str(len(numbers)).encode()))
+        return self.Out(plot=Plot("drawn", "All numbers", "As they came.", str(len(numbers)).encode()))
 
 
 class DrawSlowly(Draw):

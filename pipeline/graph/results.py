@@ -112,9 +112,9 @@ def _as_json(value: Any) -> Any:
 
 
 class Slide(Value):
-    """One frame of a figure that is stepped through.
+    """One frame of a plot that is stepped through.
 
-    `label`: what it is of (`frame 12, 3.4 s`). `overlay`: SVG to be laid over the figure's drawing, in its units.
+    `label`: what it is of (`frame 12, 3.4 s`). `overlay`: SVG to be laid over the plot's drawing, in its units.
     `photographs`: each its caption and its JPEG bytes. `facts`: names and what they are at this frame, as texts.
     """
 
@@ -124,8 +124,8 @@ class Slide(Value):
     facts: tuple[tuple[str, str], ...] = ()
 
 
-class Figure(Value):
-    """A plot for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
+class Plot(Value):
+    """A picture for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
 
     `name` is its file name without suffix; plots are shown in the order of `order`, then of their names. `slides` are
     what changes from frame to frame over an SVG, which the reader steps through.
@@ -162,16 +162,16 @@ class MetricStage(Stage):
         metrics: Metrics | None = None
 
 
-class FigureStage(Stage):
-    """Base of stages that plot: `step` returns `self.Out(figure=…)`, or `self.Out()` where there is nothing to show."""
+class PlotStage(Stage):
+    """Base of stages that plot: `step` returns `self.Out(plot=…)`, or `self.Out()` where there is nothing to show."""
 
     class Out(Outputs):
-        """`figure`: for the report."""
+        """`plot`: for the report."""
 
-        figure: Figure | None = None
+        plot: Plot | None = None
 
     def drawn(
         self, name: str, title: str, caption: str, content: bytes, order: int, slides: tuple[Slide, ...] = ()
     ) -> Out:
-        """A figure whose content is SVG; all else as in `Figure`."""
-        return self.Out(figure=Figure(name, title, caption, content, "image/svg+xml", order, slides))
+        """A plot whose content is SVG; all else as in `Plot`."""
+        return self.Out(plot=Plot(name, title, caption, content, "image/svg+xml", order, slides))

@@ -31,8 +31,8 @@ RC: dict[Any, Any] = {
 }
 
 
-class Plot:
-    """A figure being drawn; `content` holds its bytes once the `plot` block has ended."""
+class Drawing:
+    """A plot being drawn; `content` holds its bytes once the `plot` block has ended."""
 
     def __init__(self, canvas: "Canvas") -> None:
         self.canvas = canvas
@@ -40,15 +40,15 @@ class Plot:
 
 
 @contextmanager
-def plot(width: float, height: float, dpi: int = 110) -> Iterator[Plot]:
-    """A blank figure of width x height inches in the house style, as PNG, without pyplot's global state."""
+def plot(width: float, height: float, dpi: int = 110) -> Iterator[Drawing]:
+    """A blank plot of width x height inches in the house style, as PNG, without pyplot's global state."""
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
     with matplotlib.rc_context():
         matplotlib.rcdefaults()  # a user's own matplotlibrc must not change the bytes
         matplotlib.rcParams.update(RC)
-        drawn = Plot(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
+        drawn = Drawing(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
         yield drawn
         buffer = io.BytesIO()
         drawn.canvas.savefig(buffer, format="png", metadata={"Software": None})

@@ -11,7 +11,7 @@ from typing import Any
 
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.graph.results import Figure, Metrics, Slide, Table
+from omninav.pipeline.graph.results import Metrics, Plot, Slide, Table
 
 from .chart import BEGINNING
 from .key_figures import key_figures
@@ -29,7 +29,7 @@ def write_report(
     metrics: Metrics,
     timing: Mapping[str, Any],
     graph_svg: str,
-    figures: Sequence[Figure],
+    plots: Sequence[Plot],
     tables: Sequence[Table],
     config_yaml: str,
     graph: Graph | None = None,
@@ -37,13 +37,13 @@ def write_report(
 ) -> Path:
     """Write `report.html` into a run's folder: warnings, key figures and plots, then all else, folded.
 
-    Nothing on the page is fetched from anywhere. Figures and tables stand in their order. The parameters are those of
+    Nothing on the page is fetched from anywhere. Plots and tables stand in their order. The parameters are those of
     `graph`. The page names the folder `shown_as`, where that is another one.
     """
     from markupsafe import Markup
 
-    shown_figures = [_figure(figure) for figure in sorted(figures, key=lambda figure: (figure.order, figure.name))]
-    _stand_side_by_side(shown_figures)
+    shown_plots = [_shown(plot) for plot in sorted(plots, key=lambda plot: (plot.order, plot.name))]
+    _stand_side_by_side(shown_plots)
     shown_tables = [
         {"title": t.title, "caption": t.caption, "columns": t.columns, "rows": [[_cell(c) for c in r] for r in t.rows]}
         for t in sorted(tables, key=lambda table: (table.order, table.name))
@@ -58,7 +58,7 @@ def write_report(
         warnings=warning_lines(manifest),
         facts=[_fact(str(name), value) for name, value in (manifest.get("facts") or {}).items()],
         dropped=skipped(manifest),
-        figures=shown_figures,
+        plots=shown_plots,
         tables=shown_tables,
         graph_svg=Markup(graph_svg[graph_svg.find("<svg") :]),  # our own drawing, escaped where it was drawn
         parameters=[] if graph is None else parameter_rows(graph),
@@ -73,27 +73,27 @@ def write_report(
     return path
 
 
-def _figure(figure: Figure) -> dict[str, Any]:
-    """A figure as the page shows it: a chart of ours stands in it as it is, everything else as a picture."""
+def _shown(plot: Plot) -> dict[str, Any]:
+    """A plot as the page shows it: a chart of ours stands in it as it is, everything else as a picture."""
     from markupsafe import Markup
 
-    shown: dict[str, Any] = {"name": figure.name, "title": figure.title, "caption": figure.caption, "kind": "picture"}
-    if figure.content.startswith(BEGINNING.encode()):
-        drawn = figure.content.decode().replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)
+    shown: dict[str, Any] = {"name": plot.name, "title": plot.title, "caption": plot.caption, "kind": "picture"}
+    if plot.content.startswith(BEGINNING.encode()):
+        drawn = plot.content.decode().replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)
         shown |= {"kind": "chart", "svg": Markup(drawn)}
-        if figure.slides:
-            shown |= {"kind": "slides", "slides": figure.slides, "data": Markup(_slides(figure.slides))}
+        if plot.slides:
+            shown |= {"kind": "slides", "slides": plot.slides, "data": Markup(_slides(plot.slides))}
         return shown
-    return shown | {"media_type": figure.media_type, "base64": base64.b64encode(figure.content).decode()}
+    return shown | {"media_type": plot.media_type, "base64": base64.b64encode(plot.content).decode()}
 
 
-def _stand_side_by_side(figures: Sequence[dict[str, Any]]) -> None:
+def _stand_side_by_side(plots: Sequence[dict[str, Any]]) -> None:
     """Put charts that follow each other in pairs; one that is left over stands beside its caption."""
     charts = 0
-    for figure, following in zip_longest(figures, figures[1:]):
-        charts = charts + 1 if figure["kind"] == "chart" else 0
+    for plot, following in zip_longest(plots, plots[1:]):
+        charts = charts + 1 if plot["kind"] == "chart" else 0
         ends = following is None or following["kind"] != "chart"
-        figure["place"] = "" if not charts else "alone" if ends and charts % 2 else "half"
+        plot["place"] = "" if not charts else "alone" if ends and charts % 2 else "half"
 
 
 def _slides(slides: Sequence[Slide]) -> str:

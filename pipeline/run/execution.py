@@ -126,7 +126,7 @@ def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
     from omninav.pipeline.report.run_page import write_report
 
-    metrics, figures, tables = results_of(engine)
+    metrics, plots, tables = results_of(engine)
     notes, timing = notes_of(engine), stage_times(engine)
     write_metrics(run.folder, metrics)
     write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
@@ -154,7 +154,7 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
     graph_svg, config_yaml = ((run.folder / name).read_text(encoding="utf-8") for name in ("graph.svg", CONFIG))
     done = {**run.manifest, "status": "complete"}
-    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph, run.shown_as)
+    write_report(run.folder, done, metrics, timing, graph_svg, plots, tables, config_yaml, engine.graph, run.shown_as)
     run.manifest = done | {"files": _digests(run.folder)}
     run.save()
     engine.close()

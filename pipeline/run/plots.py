@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from omninav.pipeline.graph.graph import Graph, Node
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.graph.results import Plot
 
 PLOTS = ("auto", "few", "all", "none")
 """Values of `plots`: `auto` draws few, and a sweep takes it for `none`."""
@@ -27,7 +27,7 @@ def with_plots(graph: Graph, plots: str, keep: Iterable[str]) -> Graph:
 
 def _only_draws(node: Node) -> bool:
     ports = node.signature.outputs.values()
-    return node.lifetime != "tick" and bool(ports) and all(port.type is Figure for port in ports)
+    return node.lifetime != "tick" and bool(ports) and all(port.type is Plot for port in ports)
 
 
 def _is_drawn(node: Node, plots: str) -> bool:

@@ -1,33 +1,33 @@
-"""Results of a graph that has run: metrics, figures, tables, counts and facts."""
+"""Results of a graph that has run: metrics, plots, tables, counts and facts."""
 
 from collections.abc import Container, Iterator
 from typing import Any
 
 from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.graph.results import Figure, Metrics, Table, by_path, merged
+from omninav.pipeline.graph.results import Metrics, Plot, Table, by_path, merged
 
 
-def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
-    """Metrics merged into one, figures and tables. A stage that changes another's figure is warned of."""
+def results_of(engine: Engine) -> tuple[Metrics, list[Plot], list[Table]]:
+    """Metrics merged into one, plots and tables. A stage that changes another's metric is warned of."""
     metrics: list[Metrics] = []
     stated: dict[str, tuple[str, Any]] = {}
-    figures: list[Figure] = []
+    plots: list[Plot] = []
     tables: list[Table] = []
     for node in engine.graph.nodes.values():
         for origin in node.origins:
             for value in _flat(engine.last(origin)):
                 if isinstance(value, Metrics):
                     metrics.append(value)
-                    for path, figure in by_path(merged([value]).values):
-                        other, before = stated.setdefault(path, (node.name, figure))
-                        if figure != before:
+                    for path, number in by_path(merged([value]).values):
+                        other, before = stated.setdefault(path, (node.name, number))
+                        if number != before:
                             what = f"{path} in metrics.json is its own, not that of {other}"
                             engine.calls[node.name].ctx.warn(f"{node.name}: {what}; give it another name")
-                elif isinstance(value, Figure):
-                    figures.append(value)
+                elif isinstance(value, Plot):
+                    plots.append(value)
                 elif isinstance(value, Table):
                     tables.append(value)
-    return merged(metrics), figures, tables
+    return merged(metrics), plots, tables
 
 
 def _flat(value: Any) -> Iterator[Any]:

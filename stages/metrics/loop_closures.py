@@ -5,7 +5,7 @@ from typing import Any
 import networkx
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, Outputs, Plot, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.geometry.arrays import Array, Bools
@@ -49,10 +49,10 @@ class LoopClosures(Stage):
     """
 
     class Out(Outputs):
-        """`metrics`: the entries `map` and `loops` of metrics.json; `figure`: absent where no loop closure is right."""
+        """`metrics`: the entries `map` and `loops` of metrics.json; `plot`: absent where no loop closure is right."""
 
         metrics: Metrics
-        figure: Figure | None = None
+        plot: Plot | None = None
 
     def step(self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap) -> Out:
         size = len(artifact_bytes(map))
@@ -84,8 +84,8 @@ class LoopClosures(Stage):
             "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], closed),
             "at_supports": at_supports(supports, closed),
         }
-        figure = None if some is None else _drawn(supports, some)
-        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), figure=figure)
+        plot = None if some is None else _drawn(supports, some)
+        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), plot=plot)
 
 
 def parts_of(map: TopologicalMap) -> int:
@@ -151,12 +151,12 @@ def precision_recall(support: Array, right: Bools) -> tuple[Array, Array]:
     return found / accepted, found / right.sum()
 
 
-def _drawn(support: Array, right: Bools) -> Figure:
+def _drawn(support: Array, right: Bools) -> Plot:
     precision, recall = precision_recall(support, right)
     chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", height=(260.0, 260.0))
     edges = np.repeat(np.append(0.0, recall), 2)[1:-1]
     chart.base.line(np.column_stack([edges, np.repeat(precision, 2)]), "blue", 1.8)  # as high as where a step ends
-    return Figure(
+    return Plot(
         name="precision_recall",
         title="Precision and recall of loop closures",
         caption=f"Loop closures accepted by falling support, {int(right.sum())} of {len(right)} right. The area below "

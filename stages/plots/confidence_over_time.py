@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Chart, Colour
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.stretches import Stretches, StretchState
@@ -19,13 +19,13 @@ MAX_TOLD = 3
 """Longest stretches that the caption explains."""
 
 
-class ConfidenceOverTime(FigureStage):
+class ConfidenceOverTime(PlotStage):
     """Plots the probability that the estimate is right over time (s), the last log's. Nothing without a monitor.
 
     Bands are the stretches that were not tracked, of which the caption explains the longest.
     """
 
-    def step(self, ctx: Context, drive: Drive, stretches: Stretches | None = None) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive, stretches: Stretches | None = None) -> PlotStage.Out:
         last = drive.last_log
         if not np.isfinite(last.confidence).any():
             return self.Out()

@@ -129,7 +129,7 @@ def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float
 
 
 def fitting_height(extent: tuple[float, float, float, float] | None, width: float, low: float, high: float) -> float:
-    """Height (inches) at which an equal-axes plot of `extent` fills a figure of this width, within limits."""
+    """Height (inches) of an equal-axes plot of `extent` that has this width, within limits."""
     if extent is None:
         return low
     shape = (extent[3] - extent[2]) / (extent[1] - extent[0])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, stacked
 from omninav.stages.geometry.arrays import Array
@@ -12,13 +12,13 @@ from omninav.stages.geometry.plane.pose_errors import first_settled, heading_err
 from omninav.stages.values.drive import Drive
 
 
-class ErrorOverTime(FigureStage):
+class ErrorOverTime(PlotStage):
     """Plots position (m) and heading error (degrees) over time, odometry alone beside them, convergence marked.
 
     Nothing is drawn for logs without ground truth.
     """
 
-    def step(self, ctx: Context, drive: Drive) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive) -> PlotStage.Out:
         logs = [log for log in drive.by_log if log.has_truth]
         if not logs:
             return self.Out()

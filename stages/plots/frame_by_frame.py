@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
@@ -45,7 +45,7 @@ MAX_DOTS = 150
 """Particles that are drawn of a belief at most."""
 
 
-class FrameByFrame(FigureStage):
+class FrameByFrame(PlotStage):
     """Shows up to 60 frames of the last log, at even steps: the image, its best match and the belief.
 
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
@@ -75,7 +75,7 @@ class FrameByFrame(FigureStage):
         statuses: Sequence[DrivingStatus | None] | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
         answers: Sequence[Answers | None] | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         ticks = first_seen(events or ())
         last = drive.last_log
         shown = even_frames(int(last.frames[-1]) + 1) if len(last) else ()

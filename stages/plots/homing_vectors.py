@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField
@@ -18,14 +18,14 @@ BANDS: tuple[tuple[float, float, Colour, str], ...] = (
 """Errors of the direction, degrees: from, to before, and how they are drawn. The experiment's claims ask for 15."""
 
 
-class ShowHomingVectors(FigureStage):
+class ShowHomingVectors(PlotStage):
     """Plots a dart where each view was taken, along its homing vector, coloured by its error.
 
     As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them. Gives nothing where
     there is no field.
     """
 
-    def step(self, ctx: Context, field: HomingField | None = None, plan: FloorPlan | None = None) -> FigureStage.Out:
+    def step(self, ctx: Context, field: HomingField | None = None, plan: FloorPlan | None = None) -> PlotStage.Out:
         if field is None:
             return self.Out()
         found, degrees = np.isfinite(field.directions), np.degrees(field.errors)

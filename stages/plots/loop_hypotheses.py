@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.floor_plan import FloorPlan
@@ -13,7 +13,7 @@ from .drawing import extent_of
 from .plan_chart import draw_lines, draw_surroundings, plan_chart
 
 
-class ShowLoopHypotheses(FigureStage):
+class ShowLoopHypotheses(PlotStage):
     """Plots accepted and rejected loop hypotheses over the drive, and the map with its places, links and path images.
 
     As Figures 11 and 12 of Goedeme et al. 2007. Poses are those that the map keeps for drawing: truth, or odometry.
@@ -22,7 +22,7 @@ class ShowLoopHypotheses(FigureStage):
 
     def step(
         self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None = None
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         if not np.isfinite(hypotheses.poses).all(axis=1).any():
             return self.Out()
         accepted, number = int(hypotheses.accepted.sum()), len(hypotheses.accepted)

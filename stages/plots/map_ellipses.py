@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
@@ -21,14 +21,14 @@ SIGMAS = 1.0
 """Half the width of an ellipse, standard deviations."""
 
 
-class MapEllipses(FigureStage):
+class MapEllipses(PlotStage):
     """Plots a map of views as ellipses, as opaque as they weigh, over the true path and the floor plan.
 
     Without truth the path is that of the estimates, and no plan is drawn: the map has a frame of its own then. Gives
     nothing where the map is empty.
     """
 
-    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, plan: FloorPlan | None = None) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, plan: FloorPlan | None = None) -> PlotStage.Out:
         if not len(map.weights):
             return self.Out()
         true = drive.has_truth

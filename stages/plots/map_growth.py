@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.drive import Drive
@@ -17,7 +17,7 @@ BINS = 80
 X_LABEL = "frames, all logs one after the other"
 
 
-class MapGrowth(FigureStage):
+class MapGrowth(PlotStage):
     """Plots references and components over the frames of all logs, with references added and removed.
 
     Gives nothing where nothing was ever learned.
@@ -31,7 +31,7 @@ class MapGrowth(FigureStage):
         drive: Drive,
         events: Sequence[ViewEvent | None],
         after_last: ViewEvent | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         """The whole run at once. `after_last`: what was learned once the last log had ended, counted to its end."""
         rows = [row for row, event in enumerate(events) if event is not None]
         found = [event for event in events if event is not None]

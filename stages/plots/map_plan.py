@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
@@ -13,7 +13,7 @@ from .drawing import extent_of, landmarks_of
 from .plan_chart import draw_landmarks, draw_surroundings, plan_chart
 
 
-class MapPlot(FigureStage):
+class MapPlot(PlotStage):
     """Plots the map's references with their headings, and its edges. Map frame, metres.
 
     `as_driven`: the same map before it was straightened, drawn where that moved it. Gives nothing where the map is
@@ -27,7 +27,7 @@ class MapPlot(FigureStage):
         map: ReferenceGraph,
         plan: FloorPlan | None = None,
         as_driven: ReferenceGraph | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         """The map at the end of the run; `drive` makes it wait until then."""
         if not len(map):
             return self.Out()

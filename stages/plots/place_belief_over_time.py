@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.geometry.arrays import Array, Ints
@@ -21,7 +21,7 @@ COLUMNS = 900
 """Ticks that are told apart in the plot; of longer drives the largest belief in each."""
 
 
-class PlaceBeliefOverTime(FigureStage):
+class PlaceBeliefOverTime(PlotStage):
     """Plots the belief in every place over time, darker where more probable, with the truly nearest place.
 
     Of the last log. Below it: the belief's share of its maximum, of the truly nearest place, and of that together with
@@ -34,7 +34,7 @@ class PlaceBeliefOverTime(FigureStage):
         drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         last = drive.last_log
         shares = np.full((len(last), len(map)), np.nan)
         for k, row in enumerate(last.row):

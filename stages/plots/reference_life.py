@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, FigureStage
+from omninav.pipeline import Bounds, Context, PlotStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.geometry.arrays import Array
@@ -22,7 +22,7 @@ SAME_M = 1.0
 """Largest distance between components of two frames that are the same place, metres."""
 
 
-class ReferenceLife(FigureStage):
+class ReferenceLife(PlotStage):
     """Plots the components of one reference over the frames: their weights, and their places over the plan.
 
     Components of two frames are the same place where they are nearest to each other. True positions are those of the
@@ -43,7 +43,7 @@ class ReferenceLife(FigureStage):
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
         plan: FloorPlan | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         name = farthest_moved(events) if self.name is None else self.name
         if name is None:
             return self.Out()

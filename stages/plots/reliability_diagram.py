@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.values.confidence import ConfidenceReliability
 
 
-class ReliabilityDiagram(FigureStage):
+class ReliabilityDiagram(PlotStage):
     """Plots the share of right estimates over the confidence stated for them.
 
     Gives nothing where there is no confidence, or no ground truth.
     """
 
-    def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> FigureStage.Out:
+    def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> PlotStage.Out:
         if reliability is None:
             return self.Out()
         chart = Chart((0.0, 1.0), (0.0, 1.0), "confidence", "share of frames within the tolerance",

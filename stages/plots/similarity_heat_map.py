@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, Plot, PlotStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
@@ -19,12 +19,12 @@ FRAMES = 4
 """Number of columns."""
 
 
-class SimilarityHeatMap(FigureStage):
+class SimilarityHeatMap(PlotStage):
     """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
     on_request = True
 
-    def step(self, ctx: Context, drive: Drive, peaks: Sequence[Peaks | None], map: ReferenceGraph) -> FigureStage.Out:
+    def step(self, ctx: Context, drive: Drive, peaks: Sequence[Peaks | None], map: ReferenceGraph) -> PlotStage.Out:
         """The whole run at once; frames of the last log are shown."""
         last = drive.last_log
         kept = [
@@ -36,7 +36,7 @@ class SimilarityHeatMap(FigureStage):
             return self.Out()
         panels = [kept[i] for i in spread_out(len(kept), FRAMES)]
         return self.Out(
-            figure=Figure(
+            plot=Plot(
                 name="similarity_heat_map",
                 title="Similarity to the map's views",
                 caption="Above: each reference's best similarity over all headings (grey: not compared, as "

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Plot, Stage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import broken
 from omninav.stages.geometry.arrays import Array
@@ -28,10 +28,10 @@ class TrajectoryOverMap(Stage):
     """
 
     class Out(Outputs):
-        """`figure`: the last log; `earlier`: where there are several, the ones before it in one plot."""
+        """`plot`: the last log; `earlier`: where there are several, the ones before it in one plot."""
 
-        figure: Figure | None = None
-        earlier: Figure | None = None
+        plot: Plot | None = None
+        earlier: Plot | None = None
 
     def step(
         self,
@@ -46,7 +46,7 @@ class TrajectoryOverMap(Stage):
         if not logs:
             return self.Out()
         planned = [] if routes is None else planned_routes(routes, map)
-        last = Figure(
+        last = Plot(
             name="trajectory_over_map",
             title="Path driven" if map is None else "Trajectory over the map",
             caption=_caption(logs[-1], map, None if routes is None else len(planned)),
@@ -55,8 +55,8 @@ class TrajectoryOverMap(Stage):
             order=10,
         )
         if len(logs) == 1:
-            return self.Out(figure=last)
-        earlier = Figure(
+            return self.Out(plot=last)
+        earlier = Plot(
             name="trajectory_over_map_earlier",
             title="Trajectories of the earlier logs",
             caption="The log before the last one."
@@ -66,7 +66,7 @@ class TrajectoryOverMap(Stage):
             media_type="image/svg+xml",
             order=13,
         )
-        return self.Out(figure=last, earlier=earlier)
+        return self.Out(plot=last, earlier=earlier)
 
 
 def planned_routes(routes: Sequence[PlannedRoute | None], map: AnyMap | None) -> list[Array]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, FigureStage
+from omninav.pipeline import Context, PlotStage
 from omninav.pipeline.report.chart import Colour, broken
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.geometry.arrays import Array, Ints
@@ -25,7 +25,7 @@ JUDGED: tuple[tuple[int, Colour, str], ...] = (
 """Kinds of believed places, by the truly nearest one."""
 
 
-class TrueAndEstimatedPlace(FigureStage):
+class TrueAndEstimatedPlace(PlotStage):
     """Plots the true path over the topological map, each image joined with its most probable place (map frame, m).
 
     Faint where it was believed with less than a half; green where that place's medoid is the truly nearest, blue where
@@ -39,7 +39,7 @@ class TrueAndEstimatedPlace(FigureStage):
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
         plan: FloorPlan | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         last = drive.last_log
         last = last.at(known(last.truth))
         spots, places, shares = [], [], []

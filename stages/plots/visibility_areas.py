@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, FigureStage
+from omninav.pipeline import Context, Plot, PlotStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.drive import Drive
@@ -36,7 +36,7 @@ EXAMPLES = 5
 """Number of references that have a panel."""
 
 
-class ShowVisibilityAreas(FigureStage):
+class ShowVisibilityAreas(PlotStage):
     """Plots visibility areas of some references over the grid, and how many views' areas each free cell lies in.
 
     As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the image was taken, its axis, the point lambda and
@@ -53,7 +53,7 @@ class ShowVisibilityAreas(FigureStage):
         areas: VisibilityAreas,
         grid: OccupancyGrid,
         drive: Drive | None = None,
-    ) -> FigureStage.Out:
+    ) -> PlotStage.Out:
         """Draw a panel for each example, and one for all."""
         seen = np.flatnonzero((areas.target >= 0).any(axis=1))
         chosen = seen[np.unique(np.linspace(0, len(seen) - 1, EXAMPLES + 2)[1:-1].astype(np.int64))]
@@ -64,7 +64,7 @@ class ShowVisibilityAreas(FigureStage):
         made = " The grid is a stand-in, made from the tour's free path." if grid.made_from == "tour" else ""
         driven = np.empty((0, 2)) if drive is None else drive.truth[:, :2]
         return self.Out(
-            figure=Figure(
+            plot=Plot(
                 name="visibility_areas",
                 title="Visibility areas",
                 caption=f"{len(chosen)} of {len(map)} references: a circle where the image was taken, a cross at "

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sample_metrics import VALUES, measured
 
-from omninav.pipeline import Bounds, Context, Figure, Metrics, Quantity, Stage, Table
+from omninav.pipeline import Bounds, Context, Metrics, Plot, Quantity, Stage, Table
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.report.chart import Chart
@@ -34,7 +34,7 @@ TIMING = {
     "stages": {"match": {"lifetime": "tick", "calls": 300, "p50_ms": 1.234, "p95_ms": 2.5, "max_ms": 31.0}},
 }
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><title>graph</title></svg>'
-PICTURE = Figure("path", "The path", "Where it went & why.", b"\x89PNG not really", order=1)
+PICTURE = Plot("path", "The path", "Where it went & why.", b"\x89PNG not really", order=1)
 
 
 class Wellformed(HTMLParser):
@@ -54,12 +54,12 @@ class Wellformed(HTMLParser):
         assert self.open.pop() == tag
 
 
-def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables=(), graph=None):
+def report(tmp_path, metrics=None, manifest=MANIFEST, plots=(PICTURE,), tables=(), graph=None):
     manifest = {"cwd": str(tmp_path), **manifest}
     folder = tmp_path / "runs" / "a run"
     folder.mkdir(parents=True, exist_ok=True)
     metrics, config = measured() if metrics is None else metrics, "seed: 3\nname: <x>\n"
-    return write_report(folder, manifest, metrics, TIMING, SVG, figures, tables, config, graph).read_text()
+    return write_report(folder, manifest, metrics, TIMING, SVG, plots, tables, config, graph).read_text()
 
 
 def text_of(page: str) -> str:
@@ -98,8 +98,8 @@ def test_a_page_has_results_with_units_skipped_data_notes_and_the_command(tmp_pa
 
 
 def test_plots_are_inside_the_page_in_their_order(tmp_path):
-    later = Figure("aaa", "Later", "Second.", b"<svg/>", media_type="image/svg+xml", order=2)
-    page = report(tmp_path, figures=(later, PICTURE))
+    later = Plot("aaa", "Later", "Second.", b"<svg/>", media_type="image/svg+xml", order=2)
+    page = report(tmp_path, plots=(later, PICTURE))
     assert f'src="data:image/png;base64,{base64.b64encode(PICTURE.content).decode()}"' in page
     assert page.index("The path") < page.index("Later")
     assert "Where it went &amp; why." in page
@@ -141,7 +141,7 @@ def chart() -> Chart:
 
 
 def test_a_chart_stands_in_the_page_in_the_colours_of_the_page(tmp_path):
-    page = report(tmp_path, figures=(Figure("path", "The path", "It went.", chart().svg(), "image/svg+xml"),))
+    page = report(tmp_path, plots=(Plot("path", "The path", "It went.", chart().svg(), "image/svg+xml"),))
     assert 'style="fill:none;stroke-linejoin:round;stroke:var(--blue,#0072b2)' in page
     assert "prefers-color-scheme: dark" in page
     assert "--blue: #5fb4e6" in page
@@ -150,8 +150,8 @@ def test_a_chart_stands_in_the_page_in_the_colours_of_the_page(tmp_path):
 def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
     frame = ("<circle/>", (("seen", b"JPEG"),), (("error", "1 m"),))
     slides = tuple(Slide(f"frame {n} </script>", *frame) for n in (0, 1))
-    figure = Figure("frames", "Frames", "One by one.", chart().svg(), "image/svg+xml", slides=slides)
-    page = report(tmp_path, figures=(figure,))
+    plot = Plot("frames", "Frames", "One by one.", chart().svg(), "image/svg+xml", slides=slides)
+    page = report(tmp_path, plots=(plot,))
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page, flags=re.S)[1])
     assert data["photographs"] == [base64.b64encode(b"JPEG").decode()]
     assert [slide["photographs"] for slide in data["slides"]] == [[["seen", 0]]] * 2
@@ -236,7 +236,7 @@ def test_what_files_name_is_text_on_the_page(tmp_path):
         "libraries": {evil: evil},
         "error": evil,
     }
-    page = report(tmp_path, manifest=manifest, figures=(Figure(evil, evil, evil, b"\x89PNG", order=1),))
+    page = report(tmp_path, manifest=manifest, plots=(Plot(evil, evil, evil, b"\x89PNG", order=1),))
     assert "alert(1)" in page
     assert "<script>alert" not in page
     assert "<img src=x" not in page

@@ -74,7 +74,7 @@ def measured(drive: Drive, **parameters: float) -> dict:
 def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
     out = Calibration().step(Context("calibration"), made([0.9] * 300 + [0.1] * 100))
     assert out.metrics.values["calibration"]["lost_auroc"] == 1.0
-    drawn = ReliabilityDiagram().step(Context("plot"), out.reliability).figure
+    drawn = ReliabilityDiagram().step(Context("plot"), out.reliability).plot
     assert drawn is not None
     assert b"confidence" in drawn.content
     assert "0.5 m and 10°" in drawn.caption
@@ -84,7 +84,7 @@ def test_without_a_confidence_only_ellipses_are_told():
     out = Calibration().step(Context("calibration"), made([None] * 40))
     assert out.metrics.values["calibration"].keys() == {"ellipse_50", "ellipse_95", "nees"}
     assert out.reliability is None
-    assert ReliabilityDiagram().step(Context("plot"), out.reliability).figure is None
+    assert ReliabilityDiagram().step(Context("plot"), out.reliability).plot is None
 
 
 def test_squared_errors_are_over_covariances_and_a_flat_covariance_has_none():
@@ -96,10 +96,10 @@ def test_squared_errors_are_over_covariances_and_a_flat_covariance_has_none():
 
 
 def test_confidence_is_plotted_where_there_is_one():
-    figure = ConfidenceOverTime().step(Context("plot"), made([0.9, 0.2, 0.3, 0.1])).figure
+    figure = ConfidenceOverTime().step(Context("plot"), made([0.9, 0.2, 0.3, 0.1])).plot
     assert figure is not None
     assert "75 %" in figure.caption
-    assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).figure is None
+    assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).plot is None
 
 
 TRUE = (3.0, -2.0, 1.0)

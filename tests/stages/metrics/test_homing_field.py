@@ -49,11 +49,11 @@ def test_errors_are_angles_to_the_true_way_and_lost_views_count_as_half_a_turn()
 def test_the_picture_has_a_dart_for_each_view_that_has_a_vector_and_one_for_the_target() -> None:
     shown = field(POSES, VECTORS).field
     assert shown is not None
-    figure = ShowHomingVectors().step(CTX, shown).figure
-    assert figure is not None
-    assert figure.content.count(b"<polygon") == np.isfinite(shown.directions).sum() + 1
-    assert "From 3 views" in figure.caption
-    assert ShowHomingVectors().step(CTX).figure is None
+    plot = ShowHomingVectors().step(CTX, shown).plot
+    assert plot is not None
+    assert plot.content.count(b"<polygon") == np.isfinite(shown.directions).sum() + 1
+    assert "From 3 views" in plot.caption
+    assert ShowHomingVectors().step(CTX).plot is None
 
 
 def test_without_another_view_there_is_no_field() -> None:

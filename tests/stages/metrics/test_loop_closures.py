@@ -45,7 +45,7 @@ def hypotheses(pose_source="truth"):
 
 def measured(hypotheses, map=MAP, **parameters):
     out = LoopClosures(**parameters).step(Context("loops"), hypotheses, map)
-    return out.metrics.values, out.figure
+    return out.metrics.values, out.plot
 
 
 def test_a_hypothesis_is_right_where_some_images_of_both_were_taken_within_near_m(monkeypatch: pytest.MonkeyPatch):
@@ -80,9 +80,9 @@ def test_other_thresholds_of_support_accept_what_lies_above_them():
 
 
 def test_there_is_a_curve_and_its_area_where_a_loop_closure_is_right(monkeypatch: pytest.MonkeyPatch):
-    figure = measured(hypotheses())[1]
-    assert "2 of 4 right" in figure.caption
-    assert "83.3 %" in figure.caption
+    plot = measured(hypotheses())[1]
+    assert "2 of 4 right" in plot.caption
+    assert "83.3 %" in plot.caption
     monkeypatch.setattr("omninav.stages.metrics.loop_closures.NEAR_M", 0.5)
     values, none = measured(hypotheses())
     assert values["loops"]["loop_closures"]["average_precision"] is none is None
@@ -95,8 +95,8 @@ def test_each_step_of_the_curve_is_as_high_as_the_precision_where_it_ends():
 
 
 def test_without_truth_it_is_not_said_what_is_right():
-    values, figure = measured(hypotheses("odometry"))
-    assert figure is None
+    values, plot = measured(hypotheses("odometry"))
+    assert plot is None
     assert values["loops"]["precision"] is values["loops"]["loop_closures"]["average_precision"] is None
     assert values["loops"]["at_supports"]["recall"] == [None] * 19
     assert (values["loops"]["accepted"], values["loops"]["merged"]["accepted"]) == (3, 2)

@@ -40,12 +40,12 @@ def panoramas(run):
         yield PanoramaSnapshot().step(CTX, tick, Panorama(pixels)).snapshot
 
 
-def all_figures(run):
-    yield TrajectoryOverMap().step(CTX, run.drive, run.map).figure
-    yield ErrorOverTime().step(CTX, run.drive).figure
-    yield MapPlot().step(CTX, run.drive, run.map).figure
-    yield FrameByFrame().step(CTX, run.drive, list(panoramas(run)), run.beliefs, run.map).figure
-    yield SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).figure
+def all_plots(run):
+    yield TrajectoryOverMap().step(CTX, run.drive, run.map).plot
+    yield ErrorOverTime().step(CTX, run.drive).plot
+    yield MapPlot().step(CTX, run.drive, run.map).plot
+    yield FrameByFrame().step(CTX, run.drive, list(panoramas(run)), run.beliefs, run.map).plot
+    yield SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).plot
 
 
 def reference_thumbnails(run):
@@ -54,53 +54,53 @@ def reference_thumbnails(run):
 
 
 @pytest.fixture(scope="module")
-def figures():
-    return list(all_figures(small_run()))
+def plots():
+    return list(all_plots(small_run()))
 
 
-def test_every_picture_can_be_decoded_is_small_and_says_what_it_shows(figures):
-    for figure in figures:
-        if figure.media_type == "image/svg+xml":
-            marks = ElementTree.fromstring(figure.content).iter()
-            assert sum(mark.tag.endswith(("}path", "}polygon")) for mark in marks) > 10, f"{figure.name} is blank"
+def test_every_picture_can_be_decoded_is_small_and_says_what_it_shows(plots):
+    for plot in plots:
+        if plot.media_type == "image/svg+xml":
+            marks = ElementTree.fromstring(plot.content).iter()
+            assert sum(mark.tag.endswith(("}path", "}polygon")) for mark in marks) > 10, f"{plot.name} is blank"
         else:
-            pixels = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
+            pixels = cv2.imdecode(np.frombuffer(plot.content, np.uint8), cv2.IMREAD_COLOR)
             assert pixels.shape[1] > 500
-            assert pixels.std() > 5, f"{figure.name} is blank"
-        assert len(figure.content) < 150_000
-        assert figure.title
-        assert len(figure.caption) > 30
+            assert pixels.std() > 5, f"{plot.name} is blank"
+        assert len(plot.content) < 150_000
+        assert plot.title
+        assert len(plot.caption) > 30
 
 
-def test_the_same_run_gives_the_same_pictures_byte_for_byte(figures):
-    assert [figure.content for figure in all_figures(small_run())] == [figure.content for figure in figures]
+def test_the_same_run_gives_the_same_pictures_byte_for_byte(plots):
+    assert [plot.content for plot in all_plots(small_run())] == [plot.content for plot in plots]
 
 
-def test_a_users_own_matplotlib_settings_change_nothing(figures):
+def test_a_users_own_matplotlib_settings_change_nothing(plots):
     import matplotlib
 
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "figure.facecolor": "red"}):
         run = small_run()
-        again = SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).figure
+        again = SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).plot
         assert matplotlib.rcParams["font.size"] == 20
-    assert again.content == figures[-1].content
+    assert again.content == plots[-1].content
 
 
 def test_a_trajectory_stands_over_what_stands_on_the_floor():
     run, plan = small_run(frames=20), plan_of(DEMO, 0)
-    bare, furnished = (TrajectoryOverMap().step(CTX, run.drive, run.map, plan=p).figure for p in (None, plan))
+    bare, furnished = (TrajectoryOverMap().step(CTX, run.drive, run.map, plan=p).plot for p in (None, plan))
     assert b"<image" not in bare.content
     assert b"obstacles" in furnished.content
     assert b"<image" in furnished.content
     of_odometry = dataclasses.replace(run.map, pose_source="odometry")  # in a frame of its own
-    assert b"obstacles" not in TrajectoryOverMap().step(CTX, run.drive, of_odometry, plan=plan).figure.content
+    assert b"obstacles" not in TrajectoryOverMap().step(CTX, run.drive, of_odometry, plan=plan).plot.content
 
 
 def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     run = small_run(frames=30)
     drive = dataclasses.replace(run.drive, reference=np.full(30, 7), similarity=np.full(30, 0.9))
     given = list(panoramas(run)), run.beliefs, run.map, reference_thumbnails(run)
-    slides = FrameByFrame().step(CTX, drive, *given).figure.slides
+    slides = FrameByFrame().step(CTX, drive, *given).plot.slides
     assert [slide.label.split(" · ")[0] for slide in slides] == [f"frame {n}" for n in range(30)]
     facts = dict(slides[4].facts)
     wrong = np.hypot(*(drive.estimate[4] - drive.truth[4])[:2])
@@ -117,12 +117,10 @@ def test_the_estimates_ellipse_is_drawn_and_how_many_true_positions_such_hold_is
     drive = dataclasses.replace(run.drive, estimate=run.drive.truth.copy(), truth=truth)
     sure = dataclasses.replace(drive, covariance=np.zeros((20, 3, 3)))
     drive = dataclasses.replace(drive, covariance=np.repeat(np.diag((1.0, 0.25, 0.1))[None], 20, axis=0))
-    figure, point = (
-        FrameByFrame().step(CTX, each, list(panoramas(run)), None, run.map).figure for each in (drive, sure)
-    )
-    assert "The 95 % ellipse holds 75 % of the true positions." in figure.caption
+    plot, point = (FrameByFrame().step(CTX, each, list(panoramas(run)), None, run.map).plot for each in (drive, sure))
+    assert "The 95 % ellipse holds 75 % of the true positions." in plot.caption
     assert "ellipse" not in point.caption
-    assert ["<ellipse" in slide.overlay for slide in (figure.slides[7], point.slides[7])] == [True, False]
+    assert ["<ellipse" in slide.overlay for slide in (plot.slides[7], point.slides[7])] == [True, False]
 
 
 def test_the_best_match_in_a_map_that_is_learned_on_the_way_is_an_image_of_the_drive():
@@ -131,14 +129,14 @@ def test_the_best_match_in_a_map_that_is_learned_on_the_way_is_an_image_of_the_d
     none = np.empty(0, np.int64)
     learned = ViewEvent(1, 1, np.array([7]), np.array([2]), none, "", none, np.empty(0), np.empty((0, 2)), none)
     seen = list(panoramas(run))
-    figure = FrameByFrame().step(CTX, drive, seen, run.beliefs, events=[None] * 29 + [learned], panoramas=seen).figure
-    words, shown = figure.slides[20].photographs[1]
+    plot = FrameByFrame().step(CTX, drive, seen, run.beliefs, events=[None] * 29 + [learned], panoramas=seen).plot
+    words, shown = plot.slides[20].photographs[1]
     assert words == "best match in the map"
     image, then = (cv2.imdecode(np.frombuffer(data, np.uint8), 1) for data in (shown, seen[2].jpeg))
     quarter = np.roll(cv2.resize(then, image.shape[1::-1], interpolation=cv2.INTER_AREA), image.shape[1] // 4, axis=1)
     assert np.abs(image.astype(int) - quarter).mean() < 20 < np.abs(image.astype(int) - np.roll(quarter, 60, 1)).mean()
     gap = np.hypot(*(drive.truth[2] - drive.truth[20])[:2])
-    assert dict(figure.slides[20].facts)["best match"] == f"number 7, taken {gap:.2f} m away"
+    assert dict(plot.slides[20].facts)["best match"] == f"number 7, taken {gap:.2f} m away"
 
 
 def test_slides_of_a_long_drive_are_at_most_sixty_at_even_steps_and_all_have_their_image():
@@ -166,23 +164,23 @@ def test_a_caption_says_which_frames_can_be_stepped_to(shown, frames, words):
 
 def test_several_logs_get_a_picture_of_the_earlier_ones():
     out = TrajectoryOverMap().step(CTX, small_run(frames=20, logs=3).drive, None)
-    assert out.figure is not None
+    assert out.plot is not None
     assert out.earlier is not None
 
 
 def test_without_truth_or_estimates_there_is_a_trajectory_but_no_error():
     run = small_run(frames=20)
-    assert ErrorOverTime().step(CTX, run.blind).figure is None
-    assert "no ground truth" in TrajectoryOverMap().step(CTX, run.blind, run.map).figure.caption
+    assert ErrorOverTime().step(CTX, run.blind).plot is None
+    assert "no ground truth" in TrajectoryOverMap().step(CTX, run.blind, run.map).plot.caption
     run.estimates = [None] * 20
-    assert ErrorOverTime().step(CTX, run.drive).figure is not None
-    assert TrajectoryOverMap().step(CTX, run.drive, run.map).figure is not None
+    assert ErrorOverTime().step(CTX, run.drive).plot is not None
+    assert TrajectoryOverMap().step(CTX, run.drive, run.map).plot is not None
 
 
 def test_an_empty_run_gives_no_pictures():
     run = small_run(frames=0)
     run.map = reference_graph(0)
-    assert list(all_figures(run)) == [None] * 5
+    assert list(all_plots(run)) == [None] * 5
 
 
 def test_peaks_are_kept_with_their_best_headings():

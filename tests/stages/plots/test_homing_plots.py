@@ -84,7 +84,7 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
 @pytest.mark.parametrize("camera", [MIRROR, STRIP], ids=["mirror", "strip"])
 def test_a_frame_shows_what_is_followed_the_target_and_the_vector(camera):
     given = drive(camera)
-    one, other = (FrameByFrame().step(CTX, snapshots=[None] * TICKS, **given).figure for _ in range(2))
+    one, other = (FrameByFrame().step(CTX, snapshots=[None] * TICKS, **given).plot for _ in range(2))
     assert encode(one) == encode(other)
     first, followed, lost, *_ = (one.slides[n] for n in (0, 3, 7))
     assert [caption for caption, _ in first.photographs] == ["image"]

@@ -31,9 +31,9 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
     assert seen == pytest.approx([160, 80, 0, 240], abs=3)
     assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
-    figure = FrameByFrame().step(CTX, made_drive([None]), [shot]).figure
-    assert figure is not None
-    assert "Windows" in figure.caption
+    plot = FrameByFrame().step(CTX, made_drive([None]), [shot]).plot
+    assert plot is not None
+    assert "Windows" in plot.caption
 
 
 def test_the_answers_of_a_database_stand_beside_the_image_with_the_error_of_the_pose_that_each_means() -> None:
@@ -45,9 +45,9 @@ def test_the_answers_of_a_database_stand_beside_the_image_with_the_error_of_the_
     every = [None if n == 0 else answers for n in range(len(run.ticks))]
     images = [cv2.imencode(".jpg", picture)[1].tobytes() for picture in plain(*range(0, 5 * len(run.map), 5))]
     given = {"map": run.map, "thumbnails": joined(images), "answers": every}
-    figure = FrameByFrame().step(CTX, run.drive, shots, **given).figure
-    assert figure is not None
-    first, then = figure.slides[0], figure.slides[row]
+    plot = FrameByFrame().step(CTX, run.drive, shots, **given).plot
+    assert plot is not None
+    first, then = plot.slides[0], plot.slides[row]
     assert [caption for caption, _ in first.photographs] == ["image"]
     captions = [caption for caption, _ in then.photographs]
     apart = np.hypot(*(run.map.poses[near[0]] - run.drive.truth[row])[:2])
@@ -55,6 +55,6 @@ def test_the_answers_of_a_database_stand_beside_the_image_with_the_error_of_the_
     assert captions[:2] == ["image", f"match 1: 90 %, {apart:.1f} m, {turned:.0f}°"]
     assert len(captions) == 4
     assert [round(decoded(jpeg).mean() / 5) for _, jpeg in then.photographs[1:]] == near[:3].tolist()
-    without = FrameByFrame().step(CTX, run.drive, shots, **(given | {"thumbnails": None})).figure
+    without = FrameByFrame().step(CTX, run.drive, shots, **(given | {"thumbnails": None})).plot
     assert without is not None
     assert [len(slide.photographs) for slide in without.slides] == [1] * len(without.slides)

@@ -75,11 +75,11 @@ def test_an_image_without_a_fix_stays_as_it_is() -> None:
 def test_a_slide_says_how_many_matches_agree() -> None:
     run = small_run(frames=3)
     found = snapshot(fix_of([AHEAD, LEFT, BEHIND], [0, -1, 0]))
-    figure = FrameByFrame().step(CTX, run.drive, [found] * 3, run.beliefs, run.map).figure
-    assert ("landmarks", "2 of 3 matches agree") in figure.slides[0].facts
-    assert dict(figure.slides[0].photographs)["image"] != found.jpeg
-    assert "green where they agree" in figure.caption
-    plain = FrameByFrame().step(CTX, run.drive, [snapshot(None)] * 3, run.beliefs, run.map).figure
+    plot = FrameByFrame().step(CTX, run.drive, [found] * 3, run.beliefs, run.map).plot
+    assert ("landmarks", "2 of 3 matches agree") in plot.slides[0].facts
+    assert dict(plot.slides[0].photographs)["image"] != found.jpeg
+    assert "green where they agree" in plot.caption
+    plain = FrameByFrame().step(CTX, run.drive, [snapshot(None)] * 3, run.beliefs, run.map).plot
     assert "landmarks" not in dict(plain.slides[0].facts)
     assert "green where they agree" not in plain.caption
 
@@ -88,7 +88,7 @@ def test_landmarks_lie_under_the_trajectory_and_under_the_map() -> None:
     run = small_run(frames=6)
     map = mapped_room()
     for plot in (TrajectoryOverMap(), MapPlot()):
-        plain, drawn = (plot.step(CTX, run.drive, each).figure.content for each in (reference_graph(6), map))
+        plain, drawn = (plot.step(CTX, run.drive, each).plot.content for each in (reference_graph(6), map))
         assert b"<image" not in plain
         assert f"landmarks ({len(map.landmarks)})".encode() in drawn
         assert drawn.count(b"<image") == 1

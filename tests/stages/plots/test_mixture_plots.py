@@ -31,38 +31,38 @@ def learned(run):
     return mixture_run(run)
 
 
-def all_figures(run, learned):
+def all_plots(run, learned):
     map, _, events, after = learned
     kept = [ChangedMixtures().step(CTX, now, event).mixtures for now, event in zip(after, events, strict=True)]
     drive = run.drive
-    yield TrajectoryOverMap().step(CTX, drive, map).figure
-    yield MapEllipses().step(CTX, drive, map, PLAN).figure
-    yield MapGrowth().step(CTX, drive, events).figure
-    yield ReferenceLife().step(CTX, drive, events, kept, PLAN).figure
+    yield TrajectoryOverMap().step(CTX, drive, map).plot
+    yield MapEllipses().step(CTX, drive, map, PLAN).plot
+    yield MapGrowth().step(CTX, drive, events).plot
+    yield ReferenceLife().step(CTX, drive, events, kept, PLAN).plot
 
 
 def test_every_picture_can_be_decoded_is_small_and_the_same_each_time(run, learned):
-    figures = list(all_figures(run, learned))
-    for figure in figures:
-        if figure.media_type != "image/svg+xml":
-            pixels = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
-            assert pixels.std() > 5, f"{figure.name} is blank"
-        assert len(figure.content) < 150_000
-        assert figure.title
-        assert len(figure.caption) > 30
-    assert [figure.content for figure in all_figures(run, learned)] == [figure.content for figure in figures]
+    plots = list(all_plots(run, learned))
+    for plot in plots:
+        if plot.media_type != "image/svg+xml":
+            pixels = cv2.imdecode(np.frombuffer(plot.content, np.uint8), cv2.IMREAD_COLOR)
+            assert pixels.std() > 5, f"{plot.name} is blank"
+        assert len(plot.content) < 150_000
+        assert plot.title
+        assert len(plot.caption) > 30
+    assert [plot.content for plot in all_plots(run, learned)] == [plot.content for plot in plots]
 
 
 def test_an_empty_map_and_a_run_without_events_give_no_pictures(run):
     drive, nothing = run.drive, [None] * len(run.ticks)
-    assert MapEllipses().step(CTX, drive, ViewMixtures.empty()).figure is None
-    assert MapGrowth().step(CTX, drive, nothing).figure is None
-    assert ReferenceLife().step(CTX, drive, nothing, nothing).figure is None
-    assert TrajectoryOverMap().step(CTX, drive, ViewMixtures.empty()).figure is not None
+    assert MapEllipses().step(CTX, drive, ViewMixtures.empty()).plot is None
+    assert MapGrowth().step(CTX, drive, nothing).plot is None
+    assert ReferenceLife().step(CTX, drive, nothing, nothing).plot is None
+    assert TrajectoryOverMap().step(CTX, drive, ViewMixtures.empty()).plot is not None
 
 
 def test_without_truth_the_maps_picture_has_the_estimates_path_and_no_plan(run, learned):
-    caption = MapEllipses().step(CTX, run.blind, learned[0], PLAN).figure.caption
+    caption = MapEllipses().step(CTX, run.blind, learned[0], PLAN).plot.caption
     assert "line is the estimate" in caption
 
 

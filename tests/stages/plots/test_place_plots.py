@@ -25,18 +25,16 @@ TRUTH = [(1.01 + 0.15 * k, 1.1, 0.0) for k in range(20)]
 DRIVE, BLIND = made_drive(TRUTH, every_s=0.2), made_drive([None] * 20, every_s=0.2)
 
 
-def green(figure) -> int:
+def green(plot) -> int:
     """Points of what is drawn in the colour of ways and true places, but for the legend."""
-    marks = re.findall(
-        r'<(?:path d|rect x|circle cx)="([^"]*)"[^>]*--green', figure.content.decode().split("</svg>")[0]
-    )
+    marks = re.findall(r'<(?:path d|rect x|circle cx)="([^"]*)"[^>]*--green', plot.content.decode().split("</svg>")[0])
     return sum(max(1, len(re.findall("[ML]", words))) for words in marks)
 
 
 def drawn(contact=99, **rest):
     tallies = [EpisodeStatistics(int(k >= contact), 0.15 * k) for k in range(20)]
     drive = made_drive(TRUTH, motion=[(0.15, 0.0, 0.0)] * 20, every_s=0.2, tallies=tallies)
-    return TrajectoryOverMap().step(CTX, drive, plan=PLAN, **rest).figure
+    return TrajectoryOverMap().step(CTX, drive, plan=PLAN, **rest).plot
 
 
 def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
@@ -73,13 +71,13 @@ def believed() -> list[PlaceBelief | None]:
 
 def test_the_belief_in_every_place_is_drawn_with_the_truth_beside_it():
     stage = PlaceBeliefOverTime()
-    figure = stage.step(CTX, DRIVE, believed(), MAP).figure
-    blind = stage.step(CTX, BLIND, believed(), MAP).figure
-    assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
-    assert green(figure) > 10 > green(blind)
-    assert "In 100 % of the images" in figure.caption  # the nearest place and the belief change at the same time
+    plot = stage.step(CTX, DRIVE, believed(), MAP).plot
+    blind = stage.step(CTX, BLIND, believed(), MAP).plot
+    assert plot.content == stage.step(CTX, DRIVE, believed(), MAP).plot.content
+    assert green(plot) > 10 > green(blind)
+    assert "In 100 % of the images" in plot.caption  # the nearest place and the belief change at the same time
     assert "truly nearest." not in blind.caption
-    assert stage.step(CTX, DRIVE, [None] * 20, MAP).figure is None
+    assert stage.step(CTX, DRIVE, [None] * 20, MAP).plot is None
 
 
 def test_a_places_neighbours_are_those_that_it_is_linked_with():
@@ -107,9 +105,9 @@ def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
 
 def test_pictures_are_joined_with_the_places_believed():
     stage = TrueAndEstimatedPlace()
-    figure = stage.step(CTX, DRIVE, believed(), MAP).figure
-    wrong = stage.step(CTX, made_drive(TRUTH[::-1], every_s=0.2), believed(), MAP).figure
-    assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
-    assert green(figure) > 2 * green(wrong)
-    assert "green, 100 % of the images" in figure.caption
-    assert stage.step(CTX, BLIND, believed(), MAP).figure is None
+    plot = stage.step(CTX, DRIVE, believed(), MAP).plot
+    wrong = stage.step(CTX, made_drive(TRUTH[::-1], every_s=0.2), believed(), MAP).plot
+    assert plot.content == stage.step(CTX, DRIVE, believed(), MAP).plot.content
+    assert green(plot) > 2 * green(wrong)
+    assert "green, 100 % of the images" in plot.caption
+    assert stage.step(CTX, BLIND, believed(), MAP).plot is None

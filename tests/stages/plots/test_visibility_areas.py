@@ -35,24 +35,24 @@ def test_areas_are_drawn_over_the_grid_the_same_every_time(monkeypatch: pytest.M
     areas = visibility_areas(POSES, ROOM, axes_of(3))
     driven = made_drive(on_x((1.0 + 0.1 * k for k in range(10)), 1.0))
     monkeypatch.setattr("omninav.stages.plots.visibility_areas.EXAMPLES", 2)
-    figure = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
-    assert decoded(figure.content).std() > 20
-    assert "2 of 4 references" in figure.caption
-    assert "3 points lambda" in figure.caption
-    again = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).figure
-    assert again.content == figure.content
-    without = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM).figure
-    assert without.content != figure.content
+    plot = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).plot
+    assert decoded(plot.content).std() > 20
+    assert "2 of 4 references" in plot.caption
+    assert "3 points lambda" in plot.caption
+    again = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM, driven).plot
+    assert again.content == plot.content
+    without = ShowVisibilityAreas().step(CTX, MAP, areas, ROOM).plot
+    assert without.content != plot.content
 
 
 def test_a_stand_in_is_called_one(monkeypatch: pytest.MonkeyPatch):
     areas = visibility_areas(POSES, ROOM, axes_of(1))
     grid = OccupancyGrid(ROOM.cells, ROOM.resolution, ROOM.origin, "tour")
     monkeypatch.setattr("omninav.stages.plots.visibility_areas.EXAMPLES", 1)
-    assert "stand-in" in ShowVisibilityAreas().step(CTX, MAP, areas, grid).figure.caption
+    assert "stand-in" in ShowVisibilityAreas().step(CTX, MAP, areas, grid).plot.caption
 
 
 def test_a_grid_lies_under_paths_where_it_is_wired():
     run = small_run()
-    paths = [TrajectoryOverMap().step(CTX, run.drive, run.map, grid).figure for grid in (None, ROOM)]
+    paths = [TrajectoryOverMap().step(CTX, run.drive, run.map, grid).plot for grid in (None, ROOM)]
     assert paths[0].content != paths[1].content
