@@ -1,7 +1,7 @@
 """The framework: stages, graphs, runs and experiments. What they are about is in `omninav.stages`."""
 
 from .graph.problems import BadInput, Problem, ProblemsFound
-from .graph.results import Metrics, MetricStage, Plot, PlotStage, Quantity, Table
+from .graph.results import Metrics, MetricSpec, MetricStage, Plot, PlotStage, Table
 from .graph.stage import Bounds, Context, Outputs, Source, Stage, State, Truth
 from .graph.stored_rows import StoredRows
 from .graph.tool import Tool
@@ -11,6 +11,7 @@ __all__ = [
     "BadInput",
     "Bounds",
     "Context",
+    "MetricSpec",
     "MetricStage",
     "Metrics",
     "Outputs",
@@ -18,7 +19,6 @@ __all__ = [
     "PlotStage",
     "Problem",
     "ProblemsFound",
-    "Quantity",
     "Source",
     "Stage",
     "State",

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline import Metrics, Quantity
+from omninav.pipeline import Metrics, MetricSpec
 
 ERRORS = {"mean": 0.5, "median": 0.073, "p90": 0.81, "max": 12.34}
 VALUES = {
@@ -15,18 +15,18 @@ VALUES = {
     "odometry_alone": {"position_error_m": {**ERRORS, "median": 1.7}, "loss_rate": 0.5},
     "map": {"size_bytes": 168_000, "references": 200},
 }
-QUANTITIES = {
-    "position_error_m": Quantity(better="lower"),
-    "loss_rate": Quantity(better="lower"),
-    "converged_after_frames": Quantity(title="Converged", before="after", better="lower", absent="never"),
-    "frames": Quantity(),
+SPECS = {
+    "position_error_m": MetricSpec(better="lower"),
+    "loss_rate": MetricSpec(better="lower"),
+    "converged_after_frames": MetricSpec(title="Converged", before="after", better="lower", absent="never"),
+    "frames": MetricSpec(),
 }
 HEADLINES = ("after_convergence.position_error_m.median", "loss_rate", "converged_after_frames")
 
 
 def measured(**changes):
     """The sample metrics with some values changed."""
-    return Metrics({**VALUES, **changes}, QUANTITIES, HEADLINES, ("odometry_alone",))
+    return Metrics({**VALUES, **changes}, SPECS, HEADLINES, ("odometry_alone",))
 
 
 def sweep_row(job: int, metrics: Metrics | None, folder: Path = Path(), **manifest: Any) -> dict[str, Any]:

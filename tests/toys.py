@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Quantity, Source, Stage, State, Tick, Truth, Value
+from omninav.pipeline import Bounds, Context, MetricSpec, Outputs, Source, Stage, State, Tick, Truth, Value
 from omninav.pipeline.files import digest_text, write_whole
 from omninav.pipeline.graph.results import Metrics, Plot
 
@@ -266,7 +266,7 @@ class Collected(Stage):
         values = [n.value if n is not None else None for n in numbers]
         if ctx.folder is not None:
             write_whole(ctx.folder / self.name, repr(values))
-        described = {"numbers.present": Quantity(title="Present", context=True)}
+        described = {"numbers.present": MetricSpec(title="Present", context=True)}
         return self.Out(metrics=Metrics({"numbers": {"all": values, "present": len(present)}}, described))
 
 

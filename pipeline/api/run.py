@@ -14,7 +14,7 @@ from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.problems import BadInput, suggest
 from omninav.pipeline.graph.small_files import read_mapping
 from omninav.pipeline.graph.value import Value
-from omninav.pipeline.report.key_figures import key_figures
+from omninav.pipeline.report.headlines import headline_rows
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import key_table
 from omninav.pipeline.run.execution import execute
@@ -28,15 +28,15 @@ from .plain_errors import plain_errors
 from .read_only import read_only
 
 
-class Figures(dict[str, Any]):
-    """The figures of `metrics.json`: nested, and by path too: `figures["some_error_m.median"]`."""
+class NestedValues(dict[str, Any]):
+    """The values of `metrics.json`: nested, and by path too: `values["some_error_m.median"]`."""
 
     def __missing__(self, path: str) -> Any:
         inside: Any = dict(self)
         for name in str(path).split("."):
             if not isinstance(inside, dict) or name not in inside:
                 raise KeyError(
-                    f"no figure '{path}'; {suggest(name, inside if isinstance(inside, dict) else (), 'figures')}"
+                    f"no metric '{path}'; {suggest(name, inside if isinstance(inside, dict) else (), 'metrics')}"
                 )
             inside = inside[name]
         return inside
@@ -46,7 +46,7 @@ class Figures(dict[str, Any]):
         return self.get(path, nothing) is not nothing
 
     def get(self, path: Any, default: Any = None) -> Any:
-        """The figure at a path, as `figures[path]` gives it; `default` where there is none."""
+        """The value at a path, as `values[path]` gives it; `default` where there is none."""
         try:
             return self[path]
         except KeyError:
@@ -90,9 +90,9 @@ class Run:
         return read_mapping(self.folder / CONFIG)
 
     @property
-    def metrics(self) -> Figures:
-        """Its figures; `metrics["some_error_m.median"]`."""
-        return Figures(read_metrics(self.folder).values)
+    def metrics(self) -> NestedValues:
+        """Its metrics; `metrics["some_error_m.median"]`."""
+        return NestedValues(read_metrics(self.folder).values)
 
     @property
     def frames(self) -> Any:
@@ -150,7 +150,7 @@ class Run:
         return f"Run({str(self.folder)!r}: {self.manifest.get('variant')}, {self.status})"
 
     def __str__(self) -> str:
-        """The figures that one looks for first."""
+        """Its headlines."""
         import io
 
         from rich.console import Console
@@ -167,8 +167,8 @@ class Run:
         if not (self.folder / "metrics.json").is_file():
             return head
         rows = (
-            f'<tr><td style="text-align:left">{escape(figure.name)}</td><td>{escape(figure.text)}</td></tr>'
-            for figure in key_figures(read_metrics(self.folder), read_timing(self.folder))
+            f'<tr><td style="text-align:left">{escape(row.name)}</td><td>{escape(row.text)}</td></tr>'
+            for row in headline_rows(read_metrics(self.folder), read_timing(self.folder))
         )
         return f"{head}<table>{''.join(rows)}</table>"
 

@@ -28,7 +28,7 @@ from .run import Run
 PUSHED = "source=pushed"
 NOT_PUSHED = {
     "log": "a session has the frames that step() is given; omninav.run reads a log",
-    "objective": "a session has all figures in close().metrics; omninav.run and sweeps return one",
+    "objective": "a session has all metrics in close().metrics; omninav.run and sweeps return one",
 }
 """Settings that say nothing to a session, and what to use."""
 

@@ -29,7 +29,7 @@ class Sweep:
 
     @property
     def jobs(self) -> Any:
-        """A row for every job: number, status, what it overrides, and all its figures by path.
+        """A row for every job: number, status, what it overrides, and all its metrics by path.
 
         A `pandas.DataFrame` where pandas is installed, else a `pyarrow.Table`.
         """
@@ -37,7 +37,7 @@ class Sweep:
 
     @property
     def means(self) -> Any:
-        """A row for every condition: what it overrides, how many jobs (seeds) ended well, and for each figure its
+        """A row for every condition: what it overrides, how many jobs (seeds) ended well, and for each metric its
         mean over them and the ends `.low` and `.high` of that mean's 95 % interval.
         """
         return read_table(self.folder / "sweep_means.parquet")

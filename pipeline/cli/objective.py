@@ -1,4 +1,4 @@
-"""The figure that a job of a sweep returns to an optimiser."""
+"""The metric that a job of a sweep returns to an optimiser."""
 
 import ast
 import inspect
@@ -13,9 +13,9 @@ FRAMEWORK = __name__.partition(".pipeline.")[0] + ".pipeline."
 
 
 def check_objective(path: str | None, graph: Graph) -> None:
-    """Raise `BadInput` where no stage of the graph can give a figure of this name: before the run, not at its end.
+    """Raise `BadInput` where no stage of the graph can give a metric of this name: before the run, not at its end.
 
-    Stages name their figures when they have run. Until then the first part of the path has to stand in the source of a
+    Stages name their metrics when they have run. Until then the first part of the path has to stand in the source of a
     stage that measures, or of a module that it takes something from; of a name that is put together, one piece has to.
     """
     if not path:
@@ -37,18 +37,18 @@ def check_objective(path: str | None, graph: Graph) -> None:
 
 
 def objective_of(metrics: Metrics, path: str) -> float | None:
-    """The figure that an optimiser works on; None where it is no number. Raises `BadInput` where there is no figure."""
-    from omninav.pipeline.report.quantities import numbers
+    """The metric that an optimiser works on; None where it is no number. Raises `BadInput` where there is none."""
+    from omninav.pipeline.report.metrics import metric_values
 
-    found = numbers(metrics)
+    found = metric_values(metrics)
     if path not in found:
-        raise BadInput(f"objective={path}: this run has no such figure; {suggest(path, found, 'figures')}")
+        raise BadInput(f"objective={path}: this run has no such metric; {suggest(path, found, 'metrics')}")
     value = found[path].value
     return float(value) if isinstance(value, int | float) else None
 
 
 def _measuring_modules(node: Node) -> Iterator[str]:
-    """The modules in whose source a stage's figures are named; none of a stage that measures nothing."""
+    """The modules in whose source a stage's metrics are named; none of a stage that measures nothing."""
     if not any(port.type is Metrics for port in node.signature.outputs.values()):
         return
     module = type(node.stage).__module__

@@ -39,7 +39,7 @@ def show_results(folder: Path, metrics: Metrics, manifest: Mapping[str, Any]) ->
     show(key_table(metrics, read_timing(folder)))
     for sentence in grouped(warning_lines(manifest)):
         print(f"warning: {sentence}", file=sys.stderr, flush=True)
-    print(f"all figures: omninav report {shlex.quote(shown(folder))}")
+    print(f"all metrics: omninav report {shlex.quote(shown(folder))}")
     show_report(folder)
 
 

@@ -32,7 +32,7 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.jobs.job import Send
 from omninav.pipeline.jobs.progress import Heartbeat
-from omninav.pipeline.report.quantities import numbers
+from omninav.pipeline.report.metrics import metric_values
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.plan import ArtifactPlan, Plan, plan
 from omninav.pipeline.run.results import notes_of, results_of
@@ -172,7 +172,7 @@ def _repeat(given: Mapping[str, Any], run: RunFolder, send: Send) -> None:
         shared = recorded or shared
         metrics = results_of(engine)[0]
         result = {"key": given["key"], "seed": seed, "metrics": metrics.values}
-        result["context"] = {number.head: number.text for number in numbers(metrics).values() if number.is_context}
+        result["context"] = {each.head: each.text for each in metric_values(metrics).values() if each.is_context}
         result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts

@@ -19,8 +19,8 @@ from omninav.pipeline.jobs.job import Job, Outcome
 from omninav.pipeline.jobs.progress import JobProgress
 from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.jobs.throttle import Throttle
+from omninav.pipeline.report.metrics import title, unit
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.report.quantities import title, unit
 
 from .conditions import (
     Compose,

@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline.graph.problems import Problem, suggest
 from omninav.pipeline.graph.results import Metrics
-from omninav.pipeline.report.quantities import numbers
+from omninav.pipeline.report.metrics import metric_values
 
 from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
 from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of
@@ -106,7 +106,7 @@ def samples(experiment: Experiment, results: Results, measure: str, labels: Labe
 def unmeasured(experiment: Experiment, results: Results) -> Iterator[Problem]:
     """A problem for each measure of which no run has a figure."""
     runs = [result for of_condition in results.values() for result in of_condition.values() if result["metrics"]]
-    known = numbers(Metrics(runs[0]["metrics"])) if runs else {}
+    known = metric_values(Metrics(runs[0]["metrics"])) if runs else {}
     for name, measure in experiment.measures.items():
         if runs and all(figure_of(measure, result) is None for result in runs):
             path = " or ".join(measure.path)

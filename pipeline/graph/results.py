@@ -11,17 +11,17 @@ from .stage import Outputs, Stage
 from .value import Value
 
 
-class Quantity(Value):
-    """Presentation of one entry of the metrics. Whatever is not stated follows from the entry's name."""
+class MetricSpec(Value):
+    """Presentation of a metric. Whatever is not stated follows from its name."""
 
     title: str | None = None
     """Label. None: its name in words (`position_error_m` is `Position error`)."""
     unit: str | None = None
     """Its unit as shown: shares are shown in `%` (times 100), bytes in `kB`. None: from the end of its name."""
     better: Literal["lower", "higher"] | None = None
-    """Which numbers are better; None where neither is, so that a comparison marks none as best."""
+    """Which values are better; None where neither is, so that a comparison marks none as best."""
     absent: str = "–"
-    """Text in place of a value that is None. A word (`never`) is shown and marked as bad; with a dash the entry is
+    """Text in place of a value that is None. A word (`never`) is shown and marked as bad; with a dash the metric is
     left out."""
     zero: str | None = None
     """Shown where it stands by itself and is 0 (`at once`); None: the number."""
@@ -32,39 +32,39 @@ class Quantity(Value):
     most: float | None = None
     """Largest acceptable value, before it is scaled to its unit; a higher one is marked as bad. None: any."""
     setting: bool = False
-    """True for an entry that states how another was measured, and is not a result: only metrics.json holds it."""
+    """True for a value that states how another was measured, and is not a result: only metrics.json holds it."""
     context: bool = False
-    """True for a figure of the run's size (frames, length): an experiment's page states it for each condition."""
+    """True for a metric of the run's size (frames, length): an experiment's page states it for each condition."""
 
 
 class Metrics(Value):
-    """Figures of a run, merged into `metrics.json`, and how they are to be read.
+    """Metrics of a run, merged into `metrics.json`, and how they are to be read.
 
     The unit is the end of a name: `_m`, `_deg`, `_s`, `_ms`, `_px`, `_rate` (a share), `_bytes`, `_frames`. A mapping
     whose keys are all statistics (mean, std, median, p90, p95, max, rmse) is a distribution.
 
-    A stage that measures states the quantities once, beside its class, and passes them with the values::
+    A stage that measures states the specs once, beside its class, and passes them with the values::
 
-        QUANTITIES = {
-            "position_error_m": Quantity(better="lower"),
-            "success.at_end": Quantity(title="Correct at the end", better="higher"),
+        SPECS = {
+            "position_error_m": MetricSpec(better="lower"),
+            "success.at_end": MetricSpec(title="Correct at the end", better="higher"),
         }
         ...
-        return self.Out(metrics=Metrics(values, QUANTITIES, headlines=("position_error_m.median", "success.at_end")))
+        return self.Out(metrics=Metrics(values, SPECS, headlines=("position_error_m.median", "success.at_end")))
     """
 
     reported = True
     values: dict[str, Any]
     """Nested mappings of numbers, texts, None and lists."""
-    quantities: dict[str, Quantity] = field(default_factory=dict)
-    """Quantities by path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of
+    specs: dict[str, MetricSpec] = field(default_factory=dict)
+    """Specs by path (`success.at_end`), or by name for all metrics of that name (`position_error_m`). The title of
     a path is shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep
     this order."""
     headlines: tuple[str, ...] = ()
     """Paths of what one looks for first, with the statistic of a distribution: what a run prints, tiles of a report,
     columns of a sweep. Those that are not among the values are passed over."""
     details: tuple[str, ...] = ()
-    """Paths of entries or whole groups that only the run's own page shows, no comparison and no terminal."""
+    """Paths of metrics or whole groups that only the run's own page shows, no comparison and no terminal."""
     foremost: bool = False
     """Whether they say if the run did what it was for: their headlines stand before those of other stages."""
 
@@ -72,15 +72,15 @@ class Metrics(Value):
 def merged(parts: Iterable[Metrics]) -> Metrics:
     """The metrics of several stages as one; what two of them state under one name comes from the later one."""
     values: dict[str, Any] = {}
-    quantities: dict[str, Quantity] = {}
+    specs: dict[str, MetricSpec] = {}
     headlines: tuple[str, ...] = ()
     details: tuple[str, ...] = ()
     for part in parts:
         _merge(values, part.values)
-        quantities |= part.quantities
+        specs |= part.specs
         headlines = part.headlines + headlines if part.foremost else headlines + part.headlines
         details += part.details
-    return Metrics(values, quantities, tuple(dict.fromkeys(headlines)), tuple(dict.fromkeys(details)))
+    return Metrics(values, specs, tuple(dict.fromkeys(headlines)), tuple(dict.fromkeys(details)))
 
 
 def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
@@ -103,7 +103,7 @@ def by_path(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, 
 
 
 def _as_json(value: Any) -> Any:
-    """A figure as JSON holds it: a number of numpy's as one of Python's, and None for what is not a number."""
+    """A value as JSON holds it: a number of numpy's as one of Python's, and None for what is not a number."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -157,7 +157,7 @@ class MetricStage(Stage):
     """Base of stages that measure: `step` returns `self.Out(metrics=…)`, or `self.Out()` where nothing was measured."""
 
     class Out(Outputs):
-        """`metrics`: entries of metrics.json."""
+        """`metrics`: for metrics.json."""
 
         metrics: Metrics | None = None
 

@@ -1,4 +1,4 @@
-"""Where jobs run: factories of a `concurrent.futures.Executor`, found by their names."""
+"""Executors, which run jobs: factories of a `concurrent.futures.Executor`, found by their names."""
 
 import os
 import re

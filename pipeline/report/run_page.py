@@ -14,10 +14,10 @@ from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.results import Metrics, Plot, Slide, Table
 
 from .chart import BEGINNING
-from .key_figures import key_figures
-from .quantities import digits, head_of, headlines, per_log, title, unit
+from .headlines import headline_rows
+from .metrics import digits, head_of, headline_paths, per_log, title, unit
+from .metrics_table import metrics_table
 from .rendering import render
-from .results import results
 from .warning_lines import skipped, warning_lines
 
 LIFETIMES = {"before": "before the loop", "tick": "every tick", "after": "after the loop"}
@@ -35,7 +35,7 @@ def write_report(
     graph: Graph | None = None,
     shown_as: Path | None = None,
 ) -> Path:
-    """Write `report.html` into a run's folder: warnings, key figures and plots, then all else, folded.
+    """Write `report.html` into a run's folder: warnings, headlines and plots, then all else, folded.
 
     Nothing on the page is fetched from anywhere. Plots and tables stand in their order. The parameters are those of
     `graph`. The page names the folder `shown_as`, where that is another one.
@@ -52,8 +52,8 @@ def write_report(
         "report.html",
         title=(shown_as or folder).resolve().name,
         manifest=manifest,
-        tiles=key_figures(metrics, timing),
-        results=results(metrics),
+        tiles=headline_rows(metrics, timing),
+        results=metrics_table(metrics),
         logs=_log_table(metrics),
         warnings=warning_lines(manifest),
         facts=[_fact(str(name), value) for name, value in (manifest.get("facts") or {}).items()],
@@ -121,7 +121,7 @@ def _log_table(metrics: Metrics) -> dict[str, Any] | None:
     logs = per_log(metrics)
     if not logs:
         return None
-    paths = [path for path in ("frames", *headlines([metrics])) if any(path in log for log in logs)]
+    paths = [path for path in ("frames", *headline_paths([metrics])) if any(path in log for log in logs)]
     heads = ["log", *(head_of(path, logs) for path in paths)]
     rows = [[str(n), *(log[path].text if path in log else "–" for path in paths)] for n, log in enumerate(logs)]
     return {"columns": heads, "rows": rows}

@@ -9,13 +9,13 @@ from typing import Any
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.problems import counted
 
-from .quantities import best_of, numbers
+from .metrics import best_of, metric_values
 from .rendering import render
 from .sweep_table import overview_of, settings_of, write_sweep_tables
 
 
 def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Write `sweep.html`: a line per job with what it changed, how it ended, its main figures or its error, and means.
+    """Write `sweep.html`: a line per job with what it changed, how it ended, its headlines or its error, and means.
 
     Beside it lie the same numbers as tables (see `write_sweep_tables`).
 
@@ -23,7 +23,7 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     (`Metrics`, None where the job has none).
     """
     seen = overview_of(rows)
-    measured = [{} if row["metrics"] is None else numbers(row["metrics"]) for row in rows]
+    measured = [{} if row["metrics"] is None else metric_values(row["metrics"]) for row in rows]
     best = {path: best_of(path, measured) for path in seen.paths}
     names = [*seen.settings, *(["seed"] if seen.seeds else [])]
     lines = []

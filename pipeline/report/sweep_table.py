@@ -10,7 +10,7 @@ import numpy as np
 
 from omninav.pipeline.tables import write_table
 
-from .quantities import Number, head_of, headlines, numbers, with_unit
+from .metrics import MetricValue, head_of, headline_paths, metric_values, with_unit
 
 SEED = "seed"
 """The setting over which means are taken."""
@@ -18,7 +18,7 @@ SEED = "seed"
 
 @dataclass(frozen=True)
 class Mean:
-    """The mean of a figure over seeds with its 95 % interval (Student's t); without an interval for a single seed."""
+    """The mean of a metric over seeds with its 95 % interval (Student's t); without an interval for a single seed."""
 
     mean: float
     low: float | None
@@ -27,7 +27,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Row:
-    """A condition as people read it: a text for each setting that varies and for each figure."""
+    """A condition as people read it: a text for each setting that varies and for each metric."""
 
     settings: tuple[str, ...]
     jobs: int
@@ -45,7 +45,7 @@ class Overview:
     constant: tuple[str, ...]
     """Overrides of all jobs alike, as they were typed."""
     paths: tuple[str, ...]
-    """The figures that one looks for first, but those that are the same in all jobs."""
+    """Headlines, but those that are the same in all jobs."""
     heads: tuple[str, ...]
     """Their names and units."""
     same: tuple[str, ...]
@@ -71,13 +71,13 @@ def settings_of(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 def conditions(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
     """Jobs by what they override beside the seed, in the order in which these first come; rows as on the page."""
-    found: dict[tuple[tuple[str, str], ...], list[dict[str, Number]]] = {}
+    found: dict[tuple[tuple[str, str], ...], list[dict[str, MetricValue]]] = {}
     for row in rows:
         settings = settings_of(row["manifest"])
         settings.pop(SEED, None)
         jobs = found.setdefault(tuple(settings.items()), [])
         if row["metrics"] is not None:
-            jobs.append(numbers(row["metrics"]))
+            jobs.append(metric_values(row["metrics"]))
     return [Condition(dict(settings), len(jobs), _means(jobs)) for settings, jobs in found.items()]
 
 
@@ -88,8 +88,8 @@ def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
     varied = tuple(name for name, those in values.items() if len(those) > 1)
     settings = tuple(name for name in varied if name != SEED)
     runs = [row["metrics"] for row in rows if row["metrics"] is not None]
-    measured = [numbers(run) for run in runs]
-    every = [path for path in headlines(runs) if any(path in run for run in measured)]
+    measured = [metric_values(run) for run in runs]
+    every = [path for path in headline_paths(runs) if any(path in run for run in measured)]
     same = [p for p in every if len(measured) > 1 and len({run[p].text if p in run else "" for run in measured}) == 1]
     paths = tuple(path for path in every if path not in same)
     return Overview(
@@ -110,23 +110,23 @@ def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
     )
 
 
-def _stated(number: Number) -> str:
-    return f"{number.name}: {with_unit(*number.entry.in_words(number.value))}"
+def _stated(value: MetricValue) -> str:
+    return f"{value.name}: {with_unit(*value.metric.in_words(value.value))}"
 
 
-def _shown(mean: Mean | None, path: str, runs: Sequence[Mapping[str, Number]]) -> str:
+def _shown(mean: Mean | None, path: str, runs: Sequence[Mapping[str, MetricValue]]) -> str:
     if mean is None:
         return ""
-    entry = next(run[path] for run in runs if path in run).entry
+    metric = next(run[path] for run in runs if path in run).metric
     if mean.low is None or mean.high is None:
-        return entry.text(mean.mean)
+        return metric.text(mean.mean)
     low, high = mean.mean - mean.low, mean.high - mean.mean
     if math.isclose(low, high, rel_tol=1e-9, abs_tol=1e-12):
-        return f"{entry.text(mean.mean)} ± {entry.text(high)}"
-    return f"{entry.text(mean.mean)} ({entry.text(mean.low)} to {entry.text(mean.high)})"
+        return f"{metric.text(mean.mean)} ± {metric.text(high)}"
+    return f"{metric.text(mean.mean)} ({metric.text(mean.low)} to {metric.text(mean.high)})"
 
 
-def _means(jobs: Sequence[Mapping[str, Number]]) -> dict[str, Mean]:
+def _means(jobs: Sequence[Mapping[str, MetricValue]]) -> dict[str, Mean]:
     found = {}
     for path in dict.fromkeys(path for job in jobs for path in job):
         there = [job[path] for job in jobs if path in job]
@@ -149,15 +149,15 @@ def mean_of(values: Sequence[float], most: float = math.inf) -> Mean:
 
 
 def write_sweep_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write `sweep.csv`, a line per job with all figures, and `sweep_means.csv`, one per condition; also Parquet."""
+    """Write `sweep.csv`, a line per job with all metrics, and `sweep_means.csv`, one per condition; also Parquet."""
     jobs = []
     for row in rows:
         manifest = row["manifest"]
-        figures = {} if row["metrics"] is None else numbers(row["metrics"])
+        values = {} if row["metrics"] is None else metric_values(row["metrics"])
         jobs.append(
             {"job": int(row["job"]), "status": str(manifest.get("status", ""))}
             | settings_of(manifest)
-            | {path: value for path, one in figures.items() if (value := _number(one.value)) is not None}
+            | {path: value for path, one in values.items() if (value := _number(one.value)) is not None}
         )
     means = []
     for each in conditions(rows):

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from omninav.pipeline.graph.results import Metrics, by_path
 
-from .key_figures import key_figures
-from .quantities import best_of, head_of, is_detail, numbers
-from .results import results
+from .headlines import headline_rows
+from .metrics import best_of, head_of, is_detail, metric_values
+from .metrics_table import metrics_table
 from .sweep_table import Overview
 
 if TYPE_CHECKING:
@@ -22,33 +22,33 @@ COLUMN_EDGE = 3
 
 
 def key_table(metrics: Metrics, timing: Mapping[str, Any]) -> "TerminalTable":
-    """The figures that one looks for first, a line each with its unit; what is off in colour, where there is any."""
+    """Headlines, a line each with its unit; what is off in colour, where there is any."""
     from rich.table import Table as TerminalTable
     from rich.text import Text
 
     table = TerminalTable.grid(padding=(0, 3))
-    for figure in key_figures(metrics, timing):
-        table.add_row(Text(figure.name), Text(figure.text, "bold red" if figure.off else ""))
+    for row in headline_rows(metrics, timing):
+        table.add_row(Text(row.name), Text(row.text, "bold red" if row.off else ""))
     return table
 
 
 def results_table(metrics: Metrics) -> "TerminalTable":
-    """All of a run's figures with units, without their details."""
+    """All of a run's metrics with units, without their details."""
     from rich.table import Table as TerminalTable
 
-    found = results(metrics, details=False)
+    found = metrics_table(metrics, details=False)
     table = TerminalTable(title="Results", title_justify="left", header_style="bold")
     table.add_column("")
     for column in found.columns or ("",):
         table.add_column(column, justify="right")
-    for quantity in found.quantities:
-        name = f"{quantity.name} ({quantity.unit})" if quantity.unit else quantity.name
-        if len(quantity.rows) == 1:
-            table.add_row(name, *quantity.rows[0].cells, style="bold cyan" if quantity.rows[0].plain else "")
+    for distribution in found.distributions:
+        name = f"{distribution.name} ({distribution.unit})" if distribution.unit else distribution.name
+        if len(distribution.rows) == 1:
+            table.add_row(name, *distribution.rows[0].cells, style="bold cyan" if distribution.rows[0].plain else "")
             continue
         table.add_section()
         table.add_row(f"[bold]{name}[/bold]")
-        for row in quantity.rows:
+        for row in distribution.rows:
             table.add_row(f"  {row.condition}", *row.cells, style="bold cyan" if row.plain else "")
         table.add_section()
     for single in found.singles:
@@ -57,7 +57,7 @@ def results_table(metrics: Metrics) -> "TerminalTable":
 
 
 def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
-    """Means over the seeds of each condition, with their 95 % intervals: as many figures as fit in `width` columns."""
+    """Means over the seeds of each condition, with their 95 % intervals: as many metrics as fit in `width` columns."""
     from rich.table import Table as TerminalTable
 
     table = TerminalTable(title="Means over seeds" if sweep.seeds else None, title_justify="left", header_style="bold")
@@ -79,7 +79,7 @@ def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
 
 
 def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
-    """Several runs' figures side by side, the best of each marked with *, and the settings in which they differ.
+    """Several runs' metrics side by side, the best of each marked with *, and the settings in which they differ.
 
     A run holds `name`, `metrics` (`Metrics`), `config` and `manifest`.
     """
@@ -103,7 +103,7 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
     table.add_row("variant", *(str(run["manifest"].get("variant", "")) for run in runs))
     table.add_row("status", *(str(run["manifest"].get("status", "")) for run in runs))
     table.add_section()
-    measured = [numbers(run["metrics"]) for run in runs]
+    measured = [metric_values(run["metrics"]) for run in runs]
     shown = [
         [path for path in found if not is_detail(path, run["metrics"])]
         for run, found in zip(runs, measured, strict=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 from omninav.pipeline.graph.problems import counted
 
-from .quantities import words
+from .metrics import humanise
 
 PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
 """Parts of a sentence that say where something was found: the names in front, numbers, files."""
@@ -14,7 +14,7 @@ PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Kinds of data that were skipped: `kind`, `count`, and the `first` case as text."""
-    return [{"kind": words(kind), **entry} for kind, entry in (manifest.get("dropped") or {}).items()]
+    return [{"kind": humanise(kind), **entry} for kind, entry in (manifest.get("dropped") or {}).items()]
 
 
 def warning_lines(manifest: Mapping[str, Any]) -> list[str]:

@@ -31,7 +31,7 @@ def read_inputs(config: Mapping[str, Any]) -> dict[str, Input]:
 
 
 def not_taken(config: Mapping[str, Any], settings: Iterable[str]) -> Iterator[Problem]:
-    """Which of some settings are given and not taken by this variant: its figures would be of something else."""
+    """Which of some settings are given and not taken by this variant: its metrics would be of something else."""
     inputs = read_inputs(config)
     for name in settings:
         if config.get(name) is not None and name not in inputs:

@@ -9,7 +9,7 @@ from typing import Any
 
 from omninav.pipeline.files import Damaged, digest_file, read_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.results import Metrics, Quantity
+from omninav.pipeline.graph.results import Metrics, MetricSpec
 
 MANIFEST = "manifest.json"
 
@@ -17,7 +17,7 @@ MANIFEST = "manifest.json"
 def write_metrics(folder: Path, metrics: Metrics) -> None:
     """Write both files into a run's folder."""
     described = {
-        "quantities": {path: dataclasses.asdict(quantity) for path, quantity in metrics.quantities.items()},
+        "quantities": {path: dataclasses.asdict(spec) for path, spec in metrics.specs.items()},
         "headlines": metrics.headlines,
         "details": metrics.details,
     }
@@ -38,8 +38,8 @@ def read_metrics(folder: Path) -> Metrics:
         return Metrics(values)
     described = _read(description)
     try:
-        quantities = {path: Quantity(**plain) for path, plain in described["quantities"].items()}
-        return Metrics(values, quantities, tuple(described["headlines"]), tuple(described["details"]))
+        specs = {path: MetricSpec(**plain) for path, plain in described["quantities"].items()}
+        return Metrics(values, specs, tuple(described["headlines"]), tuple(described["details"]))
     except (LookupError, TypeError, AttributeError, ValueError):
         raise _damaged(description) from None
 

@@ -23,7 +23,7 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
     """Write a complete run's report again with `plots` (few, all or none); all else in its folder stays as it is.
 
     The run is computed once more, from the caches where they hold its features, because a run keeps no more than its
-    results. Raises `BadInput` where it is not complete, where its inputs have changed, or where it gives other figures
+    results. Raises `BadInput` where it is not complete, where its inputs have changed, or where it gives other metrics
     now.
     """
     run, config = complete_run(folder)
@@ -39,8 +39,8 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
         again = start(planned, run.manifest["argv"], place)
         again.manifest["started"], again.shown_as = run.manifest["started"], run.folder
         execute(again, planned, display)
-        if _figures(place) != _figures(run.folder):
-            raise BadInput(f"{folder}: it gives other figures now (the code has changed): start a new run")
+        if _metrics(place) != _metrics(run.folder):
+            raise BadInput(f"{folder}: it gives other metrics now (the code has changed): start a new run")
         write_whole(run.folder / REPORT, (place / REPORT).read_text(encoding="utf-8"))
     finally:
         shutil.rmtree(place, ignore_errors=True)
@@ -48,5 +48,5 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
     run.save()
 
 
-def _figures(folder: Path) -> object:
+def _metrics(folder: Path) -> object:
     return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))

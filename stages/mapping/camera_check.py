@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Context, Quantity
+from omninav.pipeline import Context, MetricSpec
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import turned
 from omninav.stages.camera.self_calibration import AXIS, TILT, adjustable, corrected, leaning, observed, with_tilt
@@ -18,12 +18,12 @@ from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.local_features import LocalFeatures
 
-CAMERA_QUANTITIES = {
-    "camera.axis_beside_px": Quantity(title="Camera's axis beside where it is described", unit="px", context=True),
-    "camera.tilt_deg": Quantity(title="Camera's tilt", unit="deg", context=True),
-    "camera.yaw_beside_deg": Quantity(title="Camera turned against its description", unit="deg", context=True),
-    "camera.delay_beside_s": Quantity(title="Images later than their description says", unit="s", context=True),
-    "camera.position_beside_m": Quantity(
+CAMERA_SPECS = {
+    "camera.axis_beside_px": MetricSpec(title="Camera's axis beside where it is described", unit="px", context=True),
+    "camera.tilt_deg": MetricSpec(title="Camera's tilt", unit="deg", context=True),
+    "camera.yaw_beside_deg": MetricSpec(title="Camera turned against its description", unit="deg", context=True),
+    "camera.delay_beside_s": MetricSpec(title="Images later than their description says", unit="s", context=True),
+    "camera.position_beside_m": MetricSpec(
         title="Camera's position on the robot beside its description", unit="m", context=True
     ),
 }

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage, Tick
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
@@ -42,18 +42,18 @@ from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.visual_words import VisualWords
 
-from .camera_check import CAMERA_QUANTITIES, CameraCheck
+from .camera_check import CAMERA_SPECS, CameraCheck
 
-QUANTITIES = {
-    "landmarks.number": Quantity(title="Landmarks", context=True),
-    "landmarks.sightings": Quantity(title="References that see a landmark, mean", context=True),
-    "landmarks.sigma_deg": Quantity(title="Standard deviation of a bearing", unit="deg", context=True),
-    "landmarks.found_rate": Quantity(title="Map's own images found by landmarks", unit="%", context=True),
-    "landmarks.variance_factor": Quantity(title="Errors of poses squared, over what bearings say", context=True),
-    "landmarks.pose_sigma_m": Quantity(title="Standard deviation of the map's own poses, median", context=True),
-    "landmarks.moved_median_m": Quantity(title="References moved by, median", context=True),
-    "landmarks.moved_max_m": Quantity(title="References moved by, largest", context=True),
-    **CAMERA_QUANTITIES,
+SPECS = {
+    "landmarks.number": MetricSpec(title="Landmarks", context=True),
+    "landmarks.sightings": MetricSpec(title="References that see a landmark, mean", context=True),
+    "landmarks.sigma_deg": MetricSpec(title="Standard deviation of a bearing", unit="deg", context=True),
+    "landmarks.found_rate": MetricSpec(title="Map's own images found by landmarks", unit="%", context=True),
+    "landmarks.variance_factor": MetricSpec(title="Errors of poses squared, over what bearings say", context=True),
+    "landmarks.pose_sigma_m": MetricSpec(title="Standard deviation of the map's own poses, median", context=True),
+    "landmarks.moved_median_m": MetricSpec(title="References moved by, median", context=True),
+    "landmarks.moved_max_m": MetricSpec(title="References moved by, largest", context=True),
+    **CAMERA_SPECS,
 }
 
 
@@ -154,7 +154,7 @@ class LearnLandmarks(Stage):
             values["pose_sigma_m"] = float(np.median(np.hypot(*landmarks.pose_sigmas[:, :2].T)))
         if not adjusted.problem:
             values |= {"moved_median_m": float(np.median(moved)), "moved_max_m": float(moved.max())}
-        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted, late)}, QUANTITIES)
+        metrics = Metrics({"landmarks": values, **check.metrics(adjusted.camera, mount - mounted, late)}, SPECS)
         return self.Out(map=replace(map, poses=poses, landmarks=landmarks), metrics=metrics)
 
 

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage, Tick
 from omninav.stages.geometry.appearance.closures import closures_by_appearance
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.plane.drive_graph import closure_sigmas, straightened_drives
 from omninav.stages.geometry.plane.se2 import distances_along
 from omninav.stages.values.maps import ReferenceGraph
 
-QUANTITIES = {
-    "straightened.closures": Quantity(title="Loop closures found", context=True),
-    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
-    "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
-    "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
+SPECS = {
+    "straightened.closures": MetricSpec(title="Loop closures found", context=True),
+    "straightened.rejected": MetricSpec(title="Loop closures rejected, as the others contradict them", context=True),
+    "straightened.moved_median_m": MetricSpec(title="References moved by, median", context=True),
+    "straightened.moved_max_m": MetricSpec(title="References moved by, largest", context=True),
 }
 
 
@@ -61,5 +61,5 @@ class StraightenMap(Stage):
             "moved_max_m": float(moved.max()),
         }
         ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
-        metrics = Metrics({"straightened": values}, QUANTITIES)
+        metrics = Metrics({"straightened": values}, SPECS)
         return self.Out(map=map.moved(poses), metrics=metrics)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage, Tick
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.drive_graph import closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import compose
@@ -17,13 +17,13 @@ from omninav.stages.values.views import NoveltyThreshold
 
 from .session_closures import closures_between
 
-QUANTITIES = {
-    "straightened.sessions": Quantity(title="Drives that the map was learned from", context=True),
-    "straightened.joined": Quantity(title="Drives joined by places that look alike", context=True),
-    "straightened.closures": Quantity(title="Loop closures found", context=True),
-    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
-    "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
-    "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
+SPECS = {
+    "straightened.sessions": MetricSpec(title="Drives that the map was learned from", context=True),
+    "straightened.joined": MetricSpec(title="Drives joined by places that look alike", context=True),
+    "straightened.closures": MetricSpec(title="Loop closures found", context=True),
+    "straightened.rejected": MetricSpec(title="Loop closures rejected, as the others contradict them", context=True),
+    "straightened.moved_rms_m": MetricSpec(title="Views moved by, root mean square", context=True),
+    "straightened.moved_max_m": MetricSpec(title="Views moved by, largest", context=True),
 }
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
@@ -100,7 +100,7 @@ class StraightenSessions(Stage):
         relearn = MapUpdates(
             self._updates(sessions, poses, ~apart | sessions.sure), relearn=True, sessions=sessions if last else None
         )
-        return self.Out(updates=relearn, metrics=Metrics({"straightened": values}, QUANTITIES) if last else None)
+        return self.Out(updates=relearn, metrics=Metrics({"straightened": values}, SPECS) if last else None)
 
     def _as_it_is(self, ctx: Context, sessions: Sessions, updates: MapUpdates | None, last: bool) -> Out:
         ctx.fact(

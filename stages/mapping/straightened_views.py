@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage
 from omninav.stages.geometry.appearance.visual_distance import compare
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
@@ -15,11 +15,11 @@ MIN_GAP = 10
 """Views of one tour between the two of a closure."""
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
-QUANTITIES = {
-    "straightened.closures": Quantity(title="Loop closures found", context=True),
-    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
-    "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
-    "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
+SPECS = {
+    "straightened.closures": MetricSpec(title="Loop closures found", context=True),
+    "straightened.rejected": MetricSpec(title="Loop closures rejected, as the others contradict them", context=True),
+    "straightened.moved_rms_m": MetricSpec(title="Views moved by, root mean square", context=True),
+    "straightened.moved_max_m": MetricSpec(title="Views moved by, largest", context=True),
 }
 
 
@@ -64,7 +64,7 @@ class StraightenViews(Stage):
             "moved_max_m": float(moved.max()),
         }
         ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
-        return self.Out(views=replace(views, poses=poses), metrics=Metrics({"straightened": values}, QUANTITIES))
+        return self.Out(views=replace(views, poses=poses), metrics=Metrics({"straightened": values}, SPECS))
 
     def _closures(self, views: ComparedViews, usual: Array) -> Closures:
         # For each view the most alike of those before it that are no neighbours along its tour.

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.probability.calibration import (
     area_under_roc,
@@ -21,15 +21,15 @@ MIN_SHARE_IN_ELLIPSE = 0.85
 other (in a drive, those some metres apart) right ellipses hold 17 or more with a probability of 0.98."""
 MOST_MISCALIBRATED = 0.1
 """Calibration error of a confidence above which it is shown as off: as much as one of the ten bins is wide."""
-QUANTITIES = {
-    "calibration.lost_auroc": Quantity(title="Lost frames told by a low confidence (AUROC)", better="higher"),
-    "calibration.wrong_auroc": Quantity(title="Wrong frames told by a low confidence (AUROC)", better="higher"),
-    "calibration.expected_error": Quantity(
+SPECS = {
+    "calibration.lost_auroc": MetricSpec(title="Lost frames told by a low confidence (AUROC)", better="higher"),
+    "calibration.wrong_auroc": MetricSpec(title="Wrong frames told by a low confidence (AUROC)", better="higher"),
+    "calibration.expected_error": MetricSpec(
         title="Calibration error of the confidence (ECE)", unit="%", better="lower", most=MOST_MISCALIBRATED
     ),
-    "calibration.ellipse_50": Quantity(title="50 % ellipse holds", unit="%"),
-    "calibration.ellipse_95": Quantity(title="95 % ellipse holds", unit="%", least=MIN_SHARE_IN_ELLIPSE),
-    "calibration.nees": Quantity(title="Squared error over covariance (NEES, 2 is right)"),
+    "calibration.ellipse_50": MetricSpec(title="50 % ellipse holds", unit="%"),
+    "calibration.ellipse_95": MetricSpec(title="95 % ellipse holds", unit="%", least=MIN_SHARE_IN_ELLIPSE),
+    "calibration.nees": MetricSpec(title="Squared error over covariance (NEES, 2 is right)"),
 }
 
 
@@ -77,14 +77,14 @@ class Calibration(Stage):
             held = ConfidenceReliability(*found, self.within_m, self.within_deg)
         if not values:
             return self.Out()
-        quantities = QUANTITIES | {
-            "calibration.right_share": Quantity(
+        specs = SPECS | {
+            "calibration.right_share": MetricSpec(
                 title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
             )
         }
         too_small = values.get("ellipse_95", 1.0) < MIN_SHARE_IN_ELLIPSE
         headlines = (*(("calibration.ellipse_95",) if too_small else ()), "calibration.expected_error")
-        return self.Out(metrics=Metrics({"calibration": values}, quantities, headlines), reliability=held)
+        return self.Out(metrics=Metrics({"calibration": values}, specs, headlines), reliability=held)
 
 
 def covered(drive: Drive) -> dict[str, Any]:

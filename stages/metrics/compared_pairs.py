@@ -7,22 +7,22 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.appearance.visual_distance import MAX_GLOBAL_DISTANCE, colour_distances
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.rooms import Rooms
 
-QUANTITIES = {
-    "comparison.passed_rate": Quantity(title="Pairs of views that pass the colours", unit="%"),
-    "comparison.other_rooms_left_out": Quantity(title="Pairs of two rooms left out by colours", unit="%"),
-    "comparison.own_room_left_out": Quantity(title="Pairs of one room left out by colours", unit="%"),
-    "comparison.two_lights.passed_rate": Quantity(title="Pairs of one place in two lights that pass the colours"),
-    "comparison.two_lights.change": Quantity(
+SPECS = {
+    "comparison.passed_rate": MetricSpec(title="Pairs of views that pass the colours", unit="%"),
+    "comparison.other_rooms_left_out": MetricSpec(title="Pairs of two rooms left out by colours", unit="%"),
+    "comparison.own_room_left_out": MetricSpec(title="Pairs of one room left out by colours", unit="%"),
+    "comparison.two_lights.passed_rate": MetricSpec(title="Pairs of one place in two lights that pass the colours"),
+    "comparison.two_lights.change": MetricSpec(
         title="Change of colours with the light, relative to that between two rooms"
     ),
-    "comparison.rank_correlation": Quantity(title="Rank correlation of visual distance and metres"),
+    "comparison.rank_correlation": MetricSpec(title="Rank correlation of visual distance and metres"),
 }
 WITHIN_M = 8.0
 """Distance of views up to which visual distances are looked at, metres."""
@@ -65,7 +65,7 @@ class ComparedPairs(MetricStage):
             found |= against_metres(views.distances[one, other][near], metres[near], WITHIN_M)
         if other_light:
             found["two_lights"] = self._two_lights(views, colours, other_light, of_two_rooms)
-        return self.Out(metrics=Metrics({"comparison": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"comparison": found}, SPECS))
 
     def _two_lights(
         self, views: ComparedViews, colours: Array, other_light: Sequence[GlobalDescriptor | None], of_two_rooms: Array

@@ -4,27 +4,27 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.drive import Drive, known
 
-QUANTITIES = {
-    "confidence.confident_share": Quantity(title="Images with a concentrated belief", unit="%", better="higher"),
-    "confidence.first_confident_frame": Quantity(
+SPECS = {
+    "confidence.confident_share": MetricSpec(title="Images with a concentrated belief", unit="%", better="higher"),
+    "confidence.first_confident_frame": MetricSpec(
         title="First image with a concentrated belief", better="lower", absent="never"
     ),
-    "confidence.probability": Quantity(title="Confidence, median", unit="%", better="higher", least=0.5),
-    "confidence.doubtful_share": Quantity(title="Images with a confidence below a half", unit="%", better="lower"),
-    "confidence.spread_m": Quantity(title="Spread of the belief, median", better="lower"),
-    "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
-    "confidence.path_m": Quantity(title="Length of the estimated path", context=True),
-    "confidence.odometry_path_m": Quantity(title="Length of odometry's path", context=True),
-    "confidence.step_off_odometry_m": Quantity(title="Difference of step from odometry, median", better="lower"),
-    "confidence.turn_off_odometry_deg": Quantity(title="Difference of turn from odometry, median", better="lower"),
-    "confidence.similarity": Quantity(title="Similarity of the best match, median"),
-    "confidence.similarity_p10": Quantity(title="Similarity of the best match, 10th percentile"),
+    "confidence.probability": MetricSpec(title="Confidence, median", unit="%", better="higher", least=0.5),
+    "confidence.doubtful_share": MetricSpec(title="Images with a confidence below a half", unit="%", better="lower"),
+    "confidence.spread_m": MetricSpec(title="Spread of the belief, median", better="lower"),
+    "confidence.weight": MetricSpec(title="Belief in the estimate, median", unit="%", better="higher"),
+    "confidence.path_m": MetricSpec(title="Length of the estimated path", context=True),
+    "confidence.odometry_path_m": MetricSpec(title="Length of odometry's path", context=True),
+    "confidence.step_off_odometry_m": MetricSpec(title="Difference of step from odometry, median", better="lower"),
+    "confidence.turn_off_odometry_deg": MetricSpec(title="Difference of turn from odometry, median", better="lower"),
+    "confidence.similarity": MetricSpec(title="Similarity of the best match, median"),
+    "confidence.similarity_p10": MetricSpec(title="Similarity of the best match, 10th percentile"),
 }
 MIN_WEIGHT = 0.5
 """Share of the belief that a confident estimate holds: more than everything else together."""
@@ -60,7 +60,7 @@ class Confidence(MetricStage):
             "similarity",
         )
         headlines = tuple(f"confidence.{name}" for name in shown if name in values)
-        return self.Out(metrics=Metrics({"confidence": values}, QUANTITIES, headlines or ("confidence.path_m",)))
+        return self.Out(metrics=Metrics({"confidence": values}, SPECS, headlines or ("confidence.path_m",)))
 
 
 def sigmas_of(drive: Drive) -> Array:

@@ -4,19 +4,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Metrics, MetricStage, Outputs, Quantity, Stage, Value
+from omninav.pipeline import BadInput, Context, Metrics, MetricSpec, MetricStage, Outputs, Stage, Value
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import Similarities
 
-QUANTITIES = {
-    "descriptor_contrast.similarity": Quantity(title="Similarity to the view of the same place", better="higher"),
-    "descriptor_contrast.similarity_nearby": Quantity(title="Similarity to views taken nearby", better="higher"),
-    "descriptor_contrast.similarity_elsewhere": Quantity(title="Similarity to views of other places"),
-    "descriptor_contrast.lost": Quantity(title="Similarity lost at the same place", better="lower"),
-    "descriptor_contrast.lost_nearby": Quantity(title="Similarity lost nearby", better="lower"),
-    "descriptor_contrast.recognition_rate": Quantity(
+SPECS = {
+    "descriptor_contrast.similarity": MetricSpec(title="Similarity to the view of the same place", better="higher"),
+    "descriptor_contrast.similarity_nearby": MetricSpec(title="Similarity to views taken nearby", better="higher"),
+    "descriptor_contrast.similarity_elsewhere": MetricSpec(title="Similarity to views of other places"),
+    "descriptor_contrast.lost": MetricSpec(title="Similarity lost at the same place", better="lower"),
+    "descriptor_contrast.lost_nearby": MetricSpec(title="Similarity lost nearby", better="lower"),
+    "descriptor_contrast.recognition_rate": MetricSpec(
         title="More similar to its own place than to all others", better="higher"
     ),
 }
@@ -96,4 +96,4 @@ class DescriptorRecognition(MetricStage):
             "lost_nearby": float(((1.0 - nearby) / room)[beside].mean()) if beside.any() else None,
             "recognition_rate": float((own > most).mean()),
         }
-        return self.Out(metrics=Metrics({"descriptor_contrast": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"descriptor_contrast": found}, SPECS))

@@ -4,17 +4,17 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.drive import Drive
 
 MIN_SPEED = 0.03
 """m/s, below which a robot makes no way: more than the noise of its wheels."""
 
-QUANTITIES = {
-    "drive.collisions": Quantity(title="Collisions", better="lower", most=0.0),
-    "drive.distance_m": Quantity(title="Distance driven", context=True),
-    "drive.stopped_share": Quantity(title="Time standing or turning on the spot", unit="%", better="lower"),
-    "drive.duration_s": Quantity(title="Duration", context=True),
+SPECS = {
+    "drive.collisions": MetricSpec(title="Collisions", better="lower", most=0.0),
+    "drive.distance_m": MetricSpec(title="Distance driven", context=True),
+    "drive.stopped_share": MetricSpec(title="Time standing or turning on the spot", unit="%", better="lower"),
+    "drive.duration_s": MetricSpec(title="Duration", context=True),
 }
 
 
@@ -37,7 +37,7 @@ class DriveSummary(MetricStage):
         if stopped is not None:
             values["stopped_share"] = stopped
         headlines = ("drive.collisions", "drive.distance_m", "drive.duration_s", "drive.stopped_share")
-        return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, headlines))
+        return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, SPECS, headlines))
 
 
 def stopped_share(drive: Drive) -> float | None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, match_patches
@@ -49,13 +49,13 @@ class Seen(NamedTuple):
 
 APART_M = (0.5, 1.0, 2.0)
 """Distances between the images of a pair, metres."""
-QUANTITIES = {
-    "matches.all.right_share": Quantity(title="Matches, share right", unit="%", better="higher"),
-    "matches.all.first_right": Quantity(title="Matches right before the first wrong one, median", better="higher"),
-    "matches.all.found_again": Quantity(title="Features found again", unit="%", better="higher"),
-    "matches.all.right": Quantity(title="Matches right, median", better="higher"),
-    "matches.all.by_chance": Quantity(title="Matches with wrong images that pass as right", unit="%"),
-    "matches.all.pairs": Quantity(title="Pairs of images", context=True),
+SPECS = {
+    "matches.all.right_share": MetricSpec(title="Matches, share right", unit="%", better="higher"),
+    "matches.all.first_right": MetricSpec(title="Matches right before the first wrong one, median", better="higher"),
+    "matches.all.found_again": MetricSpec(title="Features found again", unit="%", better="higher"),
+    "matches.all.right": MetricSpec(title="Matches right, median", better="higher"),
+    "matches.all.by_chance": MetricSpec(title="Matches with wrong images that pass as right", unit="%"),
+    "matches.all.pairs": MetricSpec(title="Pairs of images", context=True),
 }
 
 
@@ -122,7 +122,7 @@ class FirstMatches(MetricStage):
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
         found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(APART_M, judged, strict=True)]
         found["all"] = summary([pair for pairs in judged for pair in pairs])
-        return self.Out(metrics=Metrics({"matches": found}, QUANTITIES, ("matches.all.right_share",)))
+        return self.Out(metrics=Metrics({"matches": found}, SPECS, ("matches.all.right_share",)))
 
     def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> Judged:
         x, y, turn = (float(number) for number in between(one.pose, other.pose))

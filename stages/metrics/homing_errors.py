@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
@@ -14,15 +14,15 @@ from .kidnap_recovery import lifted
 
 CARRIED_M = 0.5
 """Distance between true motion and odometry of one tick from which the robot was carried."""
-QUANTITIES = {
-    "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
-    "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
-    "homing.reached": Quantity(title="Target reached", unit="%", better="higher", least=1.0),
-    "homing.arrived": Quantity(title="Arrival reported", unit="%", better="higher"),
-    "homing.time_s": Quantity(title="Time until arrival", better="lower", absent="never"),
-    "homing.lost_rate": Quantity(title="Images in which the target was lost or doubtful", better="lower"),
-    "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
-    "homing.start_m": Quantity(title="Distance to the target at the start", context=True),
+SPECS = {
+    "homing.end_error_m": MetricSpec(title="Distance to the target at the end", better="lower"),
+    "homing.end_turn_deg": MetricSpec(title="Heading error at the end", better="lower"),
+    "homing.reached": MetricSpec(title="Target reached", unit="%", better="higher", least=1.0),
+    "homing.arrived": MetricSpec(title="Arrival reported", unit="%", better="higher"),
+    "homing.time_s": MetricSpec(title="Time until arrival", better="lower", absent="never"),
+    "homing.lost_rate": MetricSpec(title="Images in which the target was lost or doubtful", better="lower"),
+    "homing.direction_error_deg": MetricSpec(title="Error of the homing direction", better="lower"),
+    "homing.start_m": MetricSpec(title="Distance to the target at the start", context=True),
 }
 HEADLINES = tuple(
     f"homing.{name}"
@@ -89,9 +89,7 @@ class HomingErrors(MetricStage):
                 "inliers": after[first].inliers,
             },
         }
-        return self.Out(
-            metrics=Metrics({"homing": values}, QUANTITIES, HEADLINES, details=("homing.end",), foremost=True)
-        )
+        return self.Out(metrics=Metrics({"homing": values}, SPECS, HEADLINES, details=("homing.end",), foremost=True))
 
 
 def _errors_deg(vector: HomingVector, target: np.ndarray) -> tuple[float, float]:

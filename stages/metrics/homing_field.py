@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import pose_rows
@@ -15,12 +15,12 @@ from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.homing_field import HomingField
 from omninav.stages.values.pose import Pose
 
-QUANTITIES = {
-    "homing_field.views": Quantity(title="Views", context=True),
-    "homing_field.found_rate": Quantity(title="Views with a homing vector", better="higher"),
-    "homing_field.median_deg": Quantity(title="Error of the direction, median", better="lower"),
-    "homing_field.of_found_deg": Quantity(title="Error of the direction where found, median", better="lower"),
-    "homing_field.turn_deg": Quantity(title="Error of the turn, median", better="lower"),
+SPECS = {
+    "homing_field.views": MetricSpec(title="Views", context=True),
+    "homing_field.found_rate": MetricSpec(title="Views with a homing vector", better="higher"),
+    "homing_field.median_deg": MetricSpec(title="Error of the direction, median", better="lower"),
+    "homing_field.of_found_deg": MetricSpec(title="Error of the direction where found, median", better="lower"),
+    "homing_field.turn_deg": MetricSpec(title="Error of the turn, median", better="lower"),
 }
 WIDTH_M = 1.0
 """Width of a ring, metres."""
@@ -61,7 +61,7 @@ class HomingFieldErrors(Stage):
                 **{key: [each[key] for each in summaries] for key in summaries[0]},
             }
         headlines = ("homing_field.median_deg", "homing_field.found_rate")
-        return self.Out(metrics=Metrics({"homing_field": values}, QUANTITIES, headlines), field=found)
+        return self.Out(metrics=Metrics({"homing_field": values}, SPECS, headlines), field=found)
 
 
 def field_of(poses: Array, target: Array, vectors: Sequence[HomingVector | None]) -> tuple[HomingField, Array]:

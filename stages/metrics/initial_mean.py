@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.grid import FreeSpace
 
-QUANTITIES = {
-    "initial_mean.from_middle_m": Quantity(title="Mean of the first belief, distance from the middle of the floor")
+SPECS = {
+    "initial_mean.from_middle_m": MetricSpec(title="Mean of the first belief, distance from the middle of the floor")
 }
 
 
@@ -25,4 +25,4 @@ class InitialMean(MetricStage):
         if not len(means):
             return self.Out()
         away = float(np.hypot(*(means[0, :2] - free.centres.mean(axis=0))))
-        return self.Out(metrics=Metrics({"initial_mean": {"from_middle_m": away}}, QUANTITIES))
+        return self.Out(metrics=Metrics({"initial_mean": {"from_middle_m": away}}, SPECS))

@@ -5,15 +5,15 @@ import math
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 
-QUANTITIES = {
-    "lifts.number": Quantity(title="Times lifted", context=True),
-    "lifts.never": Quantity(title="Times lifted and not right again", better="lower"),
+SPECS = {
+    "lifts.number": MetricSpec(title="Times lifted", context=True),
+    "lifts.never": MetricSpec(title="Times lifted and not right again", better="lower"),
 }
 
 JUMP_M = 0.5
@@ -52,7 +52,7 @@ class KidnapRecovery(MetricStage):
             "step": log.frames[starts].tolist(),
             "seconds": (log.seconds[until] - log.seconds[starts]).tolist(),
         }
-        return self.Out(metrics=Metrics({"lifts": values}, QUANTITIES))
+        return self.Out(metrics=Metrics({"lifts": values}, SPECS))
 
 
 def lifted(log: Drive, jump_m: float, jump_deg: float) -> Ints:

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import distances_along
@@ -15,15 +15,15 @@ THRESHOLDS = {"fine": (0.25, 2.0), "medium": (0.5, 5.0), "coarse": (5.0, 10.0)}
 FOUND_M = 1.0
 """Position error (m) below which a lost robot has found itself, or `lost_m` where that is smaller."""
 
-QUANTITIES = {
+SPECS = {
     **{
-        f"localised.{name}": Quantity(title=f"Frames within {metres:g} m and {degrees:g}°", unit="%", better="higher")
+        f"localised.{name}": MetricSpec(title=f"Frames within {metres:g} m and {degrees:g}°", unit="%", better="higher")
         for name, (metres, degrees) in THRESHOLDS.items()
     },
-    "relocalisation.times_lost": Quantity(title="Times lost", better="lower"),
-    "relocalisation.frames": Quantity(title="Images until found again, median", better="lower"),
-    "relocalisation.metres": Quantity(title="Metres until found again, median", unit="m", better="lower"),
-    "relocalisation.never": Quantity(title="Times not found again", better="lower"),
+    "relocalisation.times_lost": MetricSpec(title="Times lost", better="lower"),
+    "relocalisation.frames": MetricSpec(title="Images until found again, median", better="lower"),
+    "relocalisation.metres": MetricSpec(title="Metres until found again, median", unit="m", better="lower"),
+    "relocalisation.never": MetricSpec(title="Times not found again", better="lower"),
 }
 
 
@@ -48,12 +48,12 @@ class LocalisedShare(MetricStage):
             return self.Out()
         last = last.at(known(last.truth) & known(last.estimate))
         if not len(last):
-            return self.Out(metrics=Metrics({"localised": dict.fromkeys(THRESHOLDS, 0.0)}, QUANTITIES))
+            return self.Out(metrics=Metrics({"localised": dict.fromkeys(THRESHOLDS, 0.0)}, SPECS))
         metres, degrees = position_errors(last.estimate, last.truth), heading_errors_deg(last.estimate, last.truth)
         within = {name: int(((metres <= m) & (degrees <= d)).sum()) for name, (m, d) in THRESHOLDS.items()}
         shares = {name: number / placed for name, number in within.items()}
         found = relocalisations(metres, degrees, last.truth, self.lost_m)
-        return self.Out(metrics=Metrics({"localised": shares, "relocalisation": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"localised": shares, "relocalisation": found}, SPECS))
 
 
 def relocalisations(position_m: Array, heading_deg: Array, truth: Array, lost_m: float) -> dict[str, Any]:

@@ -5,26 +5,26 @@ from typing import Any
 import networkx
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Plot, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Plot, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.probability.dempster_shafer import SUPPORT, UNKNOWN
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
-QUANTITIES = {
-    "loops.loop_closures.precision": Quantity(title="Loop closures, precision", unit="%", better="higher"),
-    "loops.loop_closures.recall": Quantity(title="Loop closures, recall", unit="%", better="higher"),
-    "loops.loop_closures.average_precision": Quantity(
+SPECS = {
+    "loops.loop_closures.precision": MetricSpec(title="Loop closures, precision", unit="%", better="higher"),
+    "loops.loop_closures.recall": MetricSpec(title="Loop closures, recall", unit="%", better="higher"),
+    "loops.loop_closures.average_precision": MetricSpec(
         title="Loop closures, average precision", unit="%", better="higher"
     ),
-    "precision": Quantity(unit="%", better="higher"),
-    "recall": Quantity(unit="%", better="higher"),
-    "wrong": Quantity(title="Loop closures accepted wrongly", better="lower"),
-    "map.places": Quantity(title="Places in the map", context=True),
-    "map.size_bytes": Quantity(title="Map size", better="lower"),
-    "map.place_size_bytes": Quantity(title="Size of a place", better="lower"),
-    "map.step_m": Quantity(title="Distance between path images"),
+    "precision": MetricSpec(unit="%", better="higher"),
+    "recall": MetricSpec(unit="%", better="higher"),
+    "wrong": MetricSpec(title="Loop closures accepted wrongly", better="lower"),
+    "map.places": MetricSpec(title="Places in the map", context=True),
+    "map.size_bytes": MetricSpec(title="Map size", better="lower"),
+    "map.place_size_bytes": MetricSpec(title="Size of a place", better="lower"),
+    "map.step_m": MetricSpec(title="Distance between path images"),
 }
 HEADLINES = ("loops.loop_closures.precision", "loops.loop_closures.recall")
 NEAR_M = 2.5
@@ -85,7 +85,7 @@ class LoopClosures(Stage):
             "at_supports": at_supports(supports, closed),
         }
         plot = None if some is None else _drawn(supports, some)
-        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), plot=plot)
+        return self.Out(metrics=Metrics({"map": held, "loops": loops}, SPECS, HEADLINES), plot=plot)
 
 
 def parts_of(map: TopologicalMap) -> int:

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
@@ -14,10 +14,10 @@ from omninav.stages.values.view_mixtures import ViewEvent
 from .error_curves import HOME_M, lap_ends
 from .trajectory_errors import spread
 
-QUANTITIES = {
-    "map.inserted": Quantity(title="References added"),
-    "map.removed": Quantity(title="References removed"),
-    "map.new_after_first_lap_rate": Quantity(title="References added after the first lap", better="lower"),
+SPECS = {
+    "map.inserted": MetricSpec(title="References added"),
+    "map.removed": MetricSpec(title="References removed"),
+    "map.new_after_first_lap_rate": MetricSpec(title="References added after the first lap", better="lower"),
 }
 
 
@@ -73,7 +73,7 @@ class MapHistory(MetricStage):
         }
         if logs[0].has_truth:
             values["first_map"] = first_map(logs[0], HOME_M)
-        return self.Out(metrics=Metrics(values, QUANTITIES, details=("first_map",)))
+        return self.Out(metrics=Metrics(values, SPECS, details=("first_map",)))
 
 
 def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = None) -> Ints:

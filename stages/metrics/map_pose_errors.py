@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Pose
 
 from .relative_errors import absolute_trajectory_errors
 
-QUANTITIES = {
-    "map_error.as_driven_m": Quantity(title="Map: error of the positions by odometry", better="lower"),
-    "map_error.straightened_m": Quantity(title="Map: error of the positions straightened", better="lower"),
+SPECS = {
+    "map_error.as_driven_m": MetricSpec(title="Map: error of the positions by odometry", better="lower"),
+    "map_error.straightened_m": MetricSpec(title="Map: error of the positions straightened", better="lower"),
 }
 
 
@@ -46,4 +46,4 @@ class MapPoseErrors(MetricStage):
         values: dict[str, Any] = {"references": int(known.sum())}
         for name, poses in (("as_driven_m", map.poses), ("straightened_m", straightened.poses)):
             values[name] = float(np.sqrt((absolute_trajectory_errors(poses[known], where[known]) ** 2).mean()))
-        return self.Out(metrics=Metrics({"map_error": values}, QUANTITIES))
+        return self.Out(metrics=Metrics({"map_error": values}, SPECS))

@@ -1,14 +1,14 @@
 """Size of a map."""
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.maps import ReferenceGraph
 
-QUANTITIES = {
-    "map.references": Quantity(title="References in the map", context=True),
-    "map.edges": Quantity(title="Edges of the map"),
-    "map.size_bytes": Quantity(title="Map size", better="lower"),
-    "map.pose_source": Quantity(setting=True),
-    "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
+SPECS = {
+    "map.references": MetricSpec(title="References in the map", context=True),
+    "map.edges": MetricSpec(title="Edges of the map"),
+    "map.size_bytes": MetricSpec(title="Map size", better="lower"),
+    "map.pose_source": MetricSpec(setting=True),
+    "map.reference_size_bytes": MetricSpec(title="Size of a reference", better="lower"),
 }
 
 
@@ -25,4 +25,4 @@ class MapSize(MetricStage):
             "reference_size_bytes": size / len(map) if len(map) else None,
             "pose_source": map.pose_source,
         }
-        return self.Out(metrics=Metrics({"map": values}, QUANTITIES))
+        return self.Out(metrics=Metrics({"map": values}, SPECS))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
@@ -16,12 +16,12 @@ from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 
-QUANTITIES = {
-    "pairs.kept": Quantity(title="Right tracks / right matches", better="higher"),
-    "pairs.matched.right": Quantity(title="Right matches of a local map", better="higher"),
-    "pairs.tracked.right": Quantity(title="Right tracks in a local map's last image", better="higher"),
-    "pairs.matched.noise_deg": Quantity(title="Angle by which right matches miss the epipolar plane", better="lower"),
-    "pairs.tracked.noise_deg": Quantity(title="Angle by which right tracks miss the epipolar plane", better="lower"),
+SPECS = {
+    "pairs.kept": MetricSpec(title="Right tracks / right matches", better="higher"),
+    "pairs.matched.right": MetricSpec(title="Right matches of a local map", better="higher"),
+    "pairs.tracked.right": MetricSpec(title="Right tracks in a local map's last image", better="higher"),
+    "pairs.matched.noise_deg": MetricSpec(title="Angle by which right matches miss the epipolar plane", better="lower"),
+    "pairs.tracked.noise_deg": MetricSpec(title="Angle by which right tracks miss the epipolar plane", better="lower"),
 }
 RIGHT_DEG = 1.0
 """Largest angle of a pair to the true epipolar plane that is right, degrees."""
@@ -93,7 +93,7 @@ class MatchedAndTracked(MetricStage):
         }
         noise, other = values["matched"]["noise_deg"], values["tracked"]["noise_deg"]
         values["noise_ratio"] = noise / other if noise is not None and other else None
-        return self.Out(metrics=Metrics({"pairs": values}, QUANTITIES, ("pairs.kept",)))
+        return self.Out(metrics=Metrics({"pairs": values}, SPECS, ("pairs.kept",)))
 
     def _tracked(
         self,

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
-QUANTITIES = {
-    "mislocalised_references.references": Quantity(title="References learned at a wrong place", better="lower"),
-    "mislocalised_references.kept": Quantity(title="Wrong places kept to the end", better="lower"),
+SPECS = {
+    "mislocalised_references.references": MetricSpec(title="References learned at a wrong place", better="lower"),
+    "mislocalised_references.kept": MetricSpec(title="Wrong places kept to the end", better="lower"),
 }
 WRONG_M = 2.0
 """Distance from the true position beyond which a place is wrong, metres."""
@@ -58,7 +58,7 @@ class MislocalisedReferences(MetricStage):
                 "weight": [_mean_of_those(shares[:, step], came <= step) for step in steps],
                 "example": {"step": steps.tolist(), "weight": shares[0, steps].tolist()},
             }
-        return self.Out(metrics=Metrics({"mislocalised_references": values}, QUANTITIES))
+        return self.Out(metrics=Metrics({"mislocalised_references": values}, SPECS))
 
 
 def wrong_shares(

@@ -9,32 +9,32 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 
-QUANTITIES = {
-    "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),
-    "navigation.goals_reached_rate": Quantity(title="Share of the goals reached", better="higher", least=1.0),
-    "navigation.collision_free_rate": Quantity(title="Goal reached without a collision", better="higher"),
-    "navigation.collisions": Quantity(title="Collisions", better="lower", most=0.0),
-    "navigation.end_error_m": Quantity(title="Distance to the goal at the end", better="lower"),
-    "navigation.reached_error_m": Quantity(title="Distance to the goal, where reached", better="lower"),
-    "navigation.path_length_ratio": Quantity(title="Path length / shortest path", better="lower"),
-    "navigation.time_per_metre_s": Quantity(title="Time per metre of the shortest path", better="lower"),
-    "navigation.time_s": Quantity(title="Time", better="lower"),
-    "navigation.path_length_m": Quantity(title="Path length"),
-    "navigation.shortest_m": Quantity(title="Shortest path", context=True),
-    "navigation.lost_m_per_km": Quantity(title="Metres driven while lost, per kilometre", better="lower"),
-    "navigation.routes": Quantity(title="Routes planned", better="lower"),
-    "navigation.goal": Quantity(setting=True),
-    "navigation.goals": Quantity(setting=True),
-    "navigation.state": Quantity(title="Route at the end"),
-    "navigation.reason": Quantity(title="Why it gave up"),
-    "navigation.reached": Quantity(setting=True),
+SPECS = {
+    "navigation.reached_rate": MetricSpec(title="Goal reached", better="higher", least=1.0),
+    "navigation.goals_reached_rate": MetricSpec(title="Share of the goals reached", better="higher", least=1.0),
+    "navigation.collision_free_rate": MetricSpec(title="Goal reached without a collision", better="higher"),
+    "navigation.collisions": MetricSpec(title="Collisions", better="lower", most=0.0),
+    "navigation.end_error_m": MetricSpec(title="Distance to the goal at the end", better="lower"),
+    "navigation.reached_error_m": MetricSpec(title="Distance to the goal, where reached", better="lower"),
+    "navigation.path_length_ratio": MetricSpec(title="Path length / shortest path", better="lower"),
+    "navigation.time_per_metre_s": MetricSpec(title="Time per metre of the shortest path", better="lower"),
+    "navigation.time_s": MetricSpec(title="Time", better="lower"),
+    "navigation.path_length_m": MetricSpec(title="Path length"),
+    "navigation.shortest_m": MetricSpec(title="Shortest path", context=True),
+    "navigation.lost_m_per_km": MetricSpec(title="Metres driven while lost, per kilometre", better="lower"),
+    "navigation.routes": MetricSpec(title="Routes planned", better="lower"),
+    "navigation.goal": MetricSpec(setting=True),
+    "navigation.goals": MetricSpec(setting=True),
+    "navigation.state": MetricSpec(title="Route at the end"),
+    "navigation.reason": MetricSpec(title="Why it gave up"),
+    "navigation.reached": MetricSpec(setting=True),
 }
 HEADLINES = tuple(
     f"navigation.{name}"
@@ -128,7 +128,7 @@ class Navigation(MetricStage):
                 found |= {"goals": len(of_goals), "goals_reached_rate": float(np.mean(of_goals))}
         if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
             found["lost_m_per_km"] = lost_metres(drive)
-        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
+        return self.Out(metrics=Metrics({"navigation": found}, SPECS, HEADLINES, foremost=True))
 
 
 def goals_reached(

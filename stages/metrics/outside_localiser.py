@@ -14,7 +14,7 @@ from typing import IO
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import BadInput, Context, Metrics, MetricSpec, Outputs, Stage, Tick
 from omninav.pipeline.files import digest_file, digest_text
 from omninav.pipeline.graph.problems import cut
 from omninav.pipeline.graph.registry import refuse_untyped
@@ -42,13 +42,13 @@ code = process.wait()
 os._exit(code if code >= 0 else 128 - code)
 """
 """Program that runs another, and ends it with all that it has started when its own standard input is closed."""
-QUANTITIES = {
-    "peer.image_cpu_ms": Quantity(title="Processor time of an image", unit="ms", better="lower"),
-    "peer.map_cpu_s": Quantity(title="Processor time of all the rest, the map", unit="s", better="lower"),
-    "peer.cpu_s": Quantity(title="Processor time of the localiser", unit="s", better="lower"),
-    "peer.kept_mb": Quantity(title="Files that the localiser keeps", unit="MB", better="lower"),
-    "peer.lines": Quantity(title="Lines of its program", better="lower"),
-    "peer.without_pose": Quantity(title="Images without a pose", unit="%", better="lower"),
+SPECS = {
+    "peer.image_cpu_ms": MetricSpec(title="Processor time of an image", unit="ms", better="lower"),
+    "peer.map_cpu_s": MetricSpec(title="Processor time of all the rest, the map", unit="s", better="lower"),
+    "peer.cpu_s": MetricSpec(title="Processor time of the localiser", unit="s", better="lower"),
+    "peer.kept_mb": MetricSpec(title="Files that the localiser keeps", unit="MB", better="lower"),
+    "peer.lines": MetricSpec(title="Lines of its program", better="lower"),
+    "peer.without_pose": MetricSpec(title="Images without a pose", unit="%", better="lower"),
 }
 
 
@@ -118,7 +118,7 @@ class OutsideLocaliser(Stage):
             "without_pose": float(np.isnan(poses[:, 0]).mean()),
         }
         missing = ("peer.without_pose",) if values["without_pose"] else ()
-        return self.Out(drive=drive, metrics=Metrics({"peer": values}, QUANTITIES, missing))
+        return self.Out(drive=drive, metrics=Metrics({"peer": values}, SPECS, missing))
 
     def _words(self) -> list[str]:
         try:

@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
-QUANTITIES = {
-    "localisation.accuracy": Quantity(title="Right place", unit="%", better="higher"),
-    "localisation.adjacent_accuracy": Quantity(title="Right or an adjacent place", unit="%", better="higher"),
-    "localisation.place_distance_m": Quantity(title="Distance to the believed place, median", better="lower"),
-    "localisation.nearest_place_distance_m": Quantity(title="Distance to the nearest place, median"),
-    "localisation.images": Quantity(title="Images localised", context=True),
+SPECS = {
+    "localisation.accuracy": MetricSpec(title="Right place", unit="%", better="higher"),
+    "localisation.adjacent_accuracy": MetricSpec(title="Right or an adjacent place", unit="%", better="higher"),
+    "localisation.place_distance_m": MetricSpec(title="Distance to the believed place, median", better="lower"),
+    "localisation.nearest_place_distance_m": MetricSpec(title="Distance to the nearest place, median"),
+    "localisation.images": MetricSpec(title="Images localised", context=True),
 }
 HEADLINES = tuple(f"localisation.{name}" for name in ("accuracy", "adjacent_accuracy", "place_distance_m", "images"))
 
@@ -74,7 +74,7 @@ class PlaceAccuracy(MetricStage):
             "place_distance_m": float(np.median(metres_off)),
             "nearest_place_distance_m": float(np.median(least)),
         }
-        return self.Out(metrics=Metrics({"localisation": found}, QUANTITIES, HEADLINES))
+        return self.Out(metrics=Metrics({"localisation": found}, SPECS, HEADLINES))
 
 
 def _after(hits: np.ndarray, after: np.ndarray, updates: int) -> list[float | None]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Table, Value
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage, Table, Value
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Drive, known
@@ -76,21 +76,21 @@ class PlaceRecognition(Stage):
         rows = [recalls(*given, distance) for distance in DISTANCES_M]
         found["at_distances"] = {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
         headlines = ("place_recognition.recall_at_1",)
-        metrics = Metrics({"place_recognition": found}, quantities(self.distance_m), headlines)
+        metrics = Metrics({"place_recognition": found}, specs(self.distance_m), headlines)
         return self.Out(metrics=metrics, table=_tabled(rows))
 
 
-def quantities(distance_m: float) -> dict[str, Quantity]:
+def specs(distance_m: float) -> dict[str, MetricSpec]:
     """Titles of the figures, of references within a distance (m)."""
     recalled = {
-        f"place_recognition.recall_at_{rank}": Quantity(
+        f"place_recognition.recall_at_{rank}": MetricSpec(
             title=f"Recall@{rank} within {distance_m:g} m", unit="%", better="higher"
         )
         for rank in RANKS
     }
     return recalled | {
-        "place_recognition.queries": Quantity(title="Images that have a reference close by", context=True),
-        "place_recognition.distance_m": Quantity(setting=True),
+        "place_recognition.queries": MetricSpec(title="Images that have a reference close by", context=True),
+        "place_recognition.distance_m": MetricSpec(setting=True),
     }
 
 

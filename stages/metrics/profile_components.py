@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.local_features import VerticalSegments
 
 COLOURS = 3
 """Entries of a segment's descriptor before its profile's coefficients."""
-QUANTITIES = {
-    "profiles.least_ratio": Quantity(
+SPECS = {
+    "profiles.least_ratio": MetricSpec(
         title="Least variance kept by cosines, of what principal components keep", better="higher"
     )
 }
@@ -46,7 +46,7 @@ class ProfileComponents(MetricStage):
             "principal": principal[:-1].tolist(),
             "least_ratio": float(ratio.min()),
         }
-        return self.Out(metrics=Metrics({"profiles": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"profiles": found}, SPECS))
 
 
 def components(rows: Array) -> Array:

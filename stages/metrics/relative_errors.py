@@ -4,25 +4,27 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between, distances_along
 from omninav.stages.values.drive import Drive, known
 
 
-def quantities(distance_m: float) -> dict[str, Quantity]:
+def specs(distance_m: float) -> dict[str, MetricSpec]:
     """Titles of the figures; relative errors are those over `distance_m`."""
     return {
-        "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
-        "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),
-        "relative_position_error_m": Quantity(
+        "absolute_trajectory_error_m": MetricSpec(title="Absolute trajectory error (ATE), aligned", better="lower"),
+        "unaligned_trajectory_error_m": MetricSpec(
+            title="Absolute trajectory error (ATE), not aligned", better="lower"
+        ),
+        "relative_position_error_m": MetricSpec(
             title=f"Relative pose error (RPE) over {distance_m:g} m, position", better="lower"
         ),
-        "relative_heading_error_deg": Quantity(
+        "relative_heading_error_deg": MetricSpec(
             title=f"Relative pose error (RPE) over {distance_m:g} m, heading", better="lower"
         ),
-        "relative_error_distance_m": Quantity(setting=True),
+        "relative_error_distance_m": MetricSpec(setting=True),
     }
 
 
@@ -41,9 +43,7 @@ class RelativeErrors(MetricStage):
     """Metres of true path between the two frames of a relative pose error."""
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        return self.Out(
-            metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), quantities(self.distance_m))
-        )
+        return self.Out(metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), specs(self.distance_m)))
 
 
 def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
 
-QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles, after resampling / before")}
+SPECS = {"resampling.ratio": MetricSpec(title="Spread of the particles, after resampling / before")}
 AGREE_ABOVE = 0.0001
 """Mean density above which both agree, 1/(m² rad)."""
 
@@ -43,7 +43,7 @@ class ResamplingSpread(MetricStage):
         if spreads:
             before_m, after_m = np.mean(spreads, axis=0)
             values |= {"before_m": float(before_m), "after_m": float(after_m), "ratio": float(after_m / before_m)}
-        return self.Out(metrics=Metrics({"resampling": values}, QUANTITIES))
+        return self.Out(metrics=Metrics({"resampling": values}, SPECS))
 
 
 def agreement(particles: Particles, hypothesis: GaussianMixture) -> float:

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers
 
-QUANTITIES = {
-    "answers.nearby_rate": Quantity(title="Retrieved images taken nearby", better="higher"),
-    "answers.first_nearby_rate": Quantity(title="First retrieved image taken nearby", better="higher"),
-    "answers.background_rate": Quantity(title="All images of the map taken nearby"),
-    "answers.first_similarity": Quantity(title="Similarity of the first retrieved image"),
-    "answers.last_similarity": Quantity(title="Similarity of the last retrieved image"),
+SPECS = {
+    "answers.nearby_rate": MetricSpec(title="Retrieved images taken nearby", better="higher"),
+    "answers.first_nearby_rate": MetricSpec(title="First retrieved image taken nearby", better="higher"),
+    "answers.background_rate": MetricSpec(title="All images of the map taken nearby"),
+    "answers.first_similarity": MetricSpec(title="Similarity of the first retrieved image"),
+    "answers.last_similarity": MetricSpec(title="Similarity of the last retrieved image"),
 }
 WITHIN_M = 5.0
 """Distance up to which an image was taken near by, metres."""
@@ -52,4 +52,4 @@ class RetrievalPrecision(MetricStage):
             return self.Out()
         names = ("nearby_rate", "first_nearby_rate", "background_rate", "first_similarity", "last_similarity")
         means = np.array(rows, np.float64).mean(axis=0).tolist()
-        return self.Out(metrics=Metrics({"answers": dict(zip(names, means, strict=True))}, QUANTITIES))
+        return self.Out(metrics=Metrics({"answers": dict(zip(names, means, strict=True))}, SPECS))

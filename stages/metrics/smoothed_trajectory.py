@@ -10,7 +10,7 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.smoothing import smoothed, smoothed_with_lag
 from omninav.stages.values.drive import Drive, known
 
-from .trajectory_errors import pose_errors, quantities
+from .trajectory_errors import pose_errors, specs
 
 WINDOW = 50
 """Frames before it that a pose uses, with a `lag`."""
@@ -49,7 +49,7 @@ class SmoothTrajectory(Stage):
         if not len(last):
             return self.Out(drive=smooth)
         values: dict[str, Any] = {"smoothed": pose_errors(last.estimate, last.truth, self.lost_m)}
-        return self.Out(drive=smooth, metrics=Metrics(values, quantities(self.lost_m)))
+        return self.Out(drive=smooth, metrics=Metrics(values, specs(self.lost_m)))
 
     def _smoothed(self, log: Drive) -> Array:
         trust = np.where(np.isfinite(log.confidence), log.confidence, 1.0)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Bools, Ints
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import compose
@@ -18,14 +18,16 @@ WITHIN_M = 2.0
 """Largest position error of a good frame, metres."""
 WITHIN_DEG = 35.0
 """Largest heading error of a good frame, degrees."""
-QUANTITIES = {
-    "success.within_rate": Quantity(title=f"Frames within {WITHIN_M:g} m and {WITHIN_DEG:g}°", better="higher"),
-    "success.at_end": Quantity(title=f"Last pose within {WITHIN_M:g} m and {WITHIN_DEG:g}°", unit="%", better="higher"),
-    "success.unimodal_after_frames": Quantity(
+SPECS = {
+    "success.within_rate": MetricSpec(title=f"Frames within {WITHIN_M:g} m and {WITHIN_DEG:g}°", better="higher"),
+    "success.at_end": MetricSpec(
+        title=f"Last pose within {WITHIN_M:g} m and {WITHIN_DEG:g}°", unit="%", better="higher"
+    ),
+    "success.unimodal_after_frames": MetricSpec(
         title="Images until one hypothesis is left", unit="", better="lower", absent="never"
     ),
-    "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
-    "success.recovered_after_frames": Quantity(
+    "success.kidnapped_at": MetricSpec(title="Kidnapped before frame"),
+    "success.recovered_after_frames": MetricSpec(
         title="Images until found again after the kidnapping", unit="", better="lower", absent="never"
     ),
 }
@@ -65,7 +67,7 @@ class SuccessRate(MetricStage):
                 "kidnapped_at": at,
                 "recovered_after_frames": None if again is None else int(frames[later + again]) - at,
             }
-        return self.Out(metrics=Metrics({"success": found}, QUANTITIES, ("success.recovered_after_frames",)))
+        return self.Out(metrics=Metrics({"success": found}, SPECS, ("success.recovered_after_frames",)))
 
 
 def is_good(drive: Drive) -> Bools:

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.drive import Drive, known
 
 from .success_rate import is_good
 
-QUANTITIES = {
-    "tracking_success.after_frames": Quantity(
+SPECS = {
+    "tracking_success.after_frames": MetricSpec(
         title="Images until right for the first time", unit="", better="lower", absent="never"
     ),
-    "tracking_success.right_rate": Quantity(title="Right once it was right for the first time", better="higher"),
+    "tracking_success.right_rate": MetricSpec(title="Right once it was right for the first time", better="higher"),
 }
 
 
@@ -35,4 +35,4 @@ class TrackingSuccess(MetricStage):
             "after_frames": None if first is None else int(np.flatnonzero(scored)[first]),
             "right_rate": None if first is None else float(right[first:].mean()),
         }
-        return self.Out(metrics=Metrics({"tracking_success": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"tracking_success": found}, SPECS))

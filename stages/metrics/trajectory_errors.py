@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
@@ -21,18 +21,18 @@ MOST_LOST = 0.05
 """Share of lost frames above which a page shows it as off: more than the few that a start at an unknown pose takes."""
 
 
-def quantities(lost_m: float) -> dict[str, Quantity]:
+def specs(lost_m: float) -> dict[str, MetricSpec]:
     """Titles of the figures; a robot counts as lost above an error of `lost_m`."""
     return {
-        "position_error_m": Quantity(better="lower"),
-        "heading_error_deg": Quantity(better="lower"),
-        "loss_rate": Quantity(title=f"Lost, by more than {lost_m:g} m", better="lower", most=MOST_LOST),
-        "converged_after_frames": Quantity(
+        "position_error_m": MetricSpec(better="lower"),
+        "heading_error_deg": MetricSpec(better="lower"),
+        "loss_rate": MetricSpec(title=f"Lost, by more than {lost_m:g} m", better="lower", most=MOST_LOST),
+        "converged_after_frames": MetricSpec(
             title="Converged", better="lower", absent="never", zero="at once", before="after"
         ),
-        "frames": Quantity(context=True),
-        "driven_m": Quantity(title="Distance driven", context=True),
-        "odometry_alone.final_error_m": Quantity(title="Odometry drift at the end", better="lower"),
+        "frames": MetricSpec(context=True),
+        "driven_m": MetricSpec(title="Distance driven", context=True),
+        "odometry_alone.final_error_m": MetricSpec(title="Odometry drift at the end", better="lower"),
     }
 
 
@@ -64,7 +64,7 @@ class TrajectoryErrors(MetricStage):
         if len(per_log) > 1:
             values["logs"] = per_log
         details = ("mean_pose", "odometry_alone.after_convergence")
-        return self.Out(metrics=Metrics(values, quantities(self.lost_m), HEADLINES, details))
+        return self.Out(metrics=Metrics(values, specs(self.lost_m), HEADLINES, details))
 
 
 def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) -> dict[str, Any]:

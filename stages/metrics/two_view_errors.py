@@ -5,14 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.two_views import RelativeView
 
-QUANTITIES = {
-    "two_views.success_rate": Quantity(title="Solved", better="higher"),
-    "two_views.rotation_error_deg": Quantity(title="Rotation error", better="lower"),
-    "two_views.direction_error_deg": Quantity(title="Error of the translation's direction", better="lower"),
-    "two_views.samples": Quantity(title="RANSAC samples, median", better="lower"),
+SPECS = {
+    "two_views.success_rate": MetricSpec(title="Solved", better="higher"),
+    "two_views.rotation_error_deg": MetricSpec(title="Rotation error", better="lower"),
+    "two_views.direction_error_deg": MetricSpec(title="Error of the translation's direction", better="lower"),
+    "two_views.samples": MetricSpec(title="RANSAC samples, median", better="lower"),
 }
 WITHIN_DEG = 3.0
 """Largest error of rotation and of direction at which a problem counts as solved, degrees."""
@@ -39,7 +39,7 @@ class TwoViewErrors(MetricStage):
             "direction_error_deg": _spread(ways),
             "samples": float(np.median([view.samples for _, view in solved])) if solved else None,
         }
-        return self.Out(metrics=Metrics({"two_views": values}, QUANTITIES, ("two_views.success_rate",)))
+        return self.Out(metrics=Metrics({"two_views": values}, SPECS, ("two_views.success_rate",)))
 
 
 def _spread(errors: np.ndarray) -> dict[str, float | None]:

@@ -4,18 +4,18 @@ import dataclasses
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-QUANTITIES = {
-    "map.references": Quantity(title="References in the map", context=True),
-    "map.size_bytes": Quantity(title="Map size", better="lower"),
-    "map.pose_source": Quantity(setting=True),
-    "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
-    "map.visited_area_m2": Quantity(title="Visited area", unit="m²"),
-    "map.references_per_m2": Quantity(title="References per m²"),
+SPECS = {
+    "map.references": MetricSpec(title="References in the map", context=True),
+    "map.size_bytes": MetricSpec(title="Map size", better="lower"),
+    "map.pose_source": MetricSpec(setting=True),
+    "map.reference_size_bytes": MetricSpec(title="Size of a reference", better="lower"),
+    "map.visited_area_m2": MetricSpec(title="Visited area", unit="m²"),
+    "map.references_per_m2": MetricSpec(title="References per m²"),
 }
 NEAR_M = 1.0
 """Distance from the true path (from the estimates where there is no truth) up to which the area is visited, metres."""
@@ -44,7 +44,7 @@ class ViewMapSize(MetricStage):
             "visited_area_m2": area,
             "references_per_m2": len(map) / area if area else None,
         }
-        return self.Out(metrics=Metrics({"map": figures}, QUANTITIES, ("map.references", "map.size_bytes")))
+        return self.Out(metrics=Metrics({"map": figures}, SPECS, ("map.references", "map.size_bytes")))
 
 
 def stored_bytes(map: ViewMixtures) -> int:

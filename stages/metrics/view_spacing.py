@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricStage, Quantity
+from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
 
-QUANTITIES = {
-    "spacing.between_views.unevenness": Quantity(title="Unevenness of the map among views", better="lower"),
-    "spacing.between_places_m.unevenness": Quantity(title="Unevenness of the map on the floor", better="lower"),
+SPECS = {
+    "spacing.between_views.unevenness": MetricSpec(title="Unevenness of the map among views", better="lower"),
+    "spacing.between_places_m.unevenness": MetricSpec(title="Unevenness of the map on the floor", better="lower"),
     **{
-        f"spacing.{between}.{key}": Quantity(title=f"{title}, {word}", unit=unit)
+        f"spacing.{between}.{key}": MetricSpec(title=f"{title}, {word}", unit=unit)
         for between, title, unit in (
             ("between_places_m", "Distance of a place to the nearest one", "m"),
             ("between_views", "Distance of a view to the nearest one (its own measure)", None),
@@ -49,7 +49,7 @@ class ViewSpacing(MetricStage):
         rows = np.unique(np.linspace(0, len(map) - 1, min(MAX_VIEWS, len(map))).round().astype(np.int64))
         among, apart = nearest_views(map, view, rows), nearest_places(map)[rows]
         found = {"between_views": spaced(among), "between_places_m": spaced(apart)}
-        return self.Out(metrics=Metrics({"spacing": found}, QUANTITIES))
+        return self.Out(metrics=Metrics({"spacing": found}, SPECS))
 
 
 def nearest_views(map: ViewMixtures, view: WholeView, rows: Ints) -> Array:

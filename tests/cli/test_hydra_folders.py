@@ -157,7 +157,7 @@ def test_values_with_spaces_are_whole_in_the_table_of_a_sweep_and_in_the_command
 
 def test_what_is_said_to_be_typed_is_quoted_for_the_shell(toy, omninav, tmp_path: Path):
     ended = toy("--config-dir=mine", "hydra.run.dir='a b'", check=True)
-    assert "all figures: omninav report 'a b'\n" in ended.stdout
+    assert "all metrics: omninav report 'a b'\n" in ended.stdout
     folder = tmp_path / "a b"
     (folder / "report.html").unlink()
     assert f"`omninav resume '{folder}'` goes on" in omninav("report", "a b").stderr

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from omninav.pipeline.report.quantities import STATISTICS, title, words
+from omninav.pipeline.report.metrics import STATISTICS, humanise, title
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = "## Figures of a run"
@@ -39,7 +39,7 @@ def described() -> Iterator[tuple[str, dict[str, ast.expr]]]:
                 else []
             )
             for key, value in pairs:
-                if key is not None and isinstance(value, ast.Call) and getattr(value.func, "id", "") == "Quantity":
+                if key is not None and isinstance(value, ast.Call) and getattr(value.func, "id", "") == "MetricSpec":
                     yield text_of(key), {word.arg or "": word.value for word in value.keywords}
 
 
@@ -67,5 +67,5 @@ def test_every_name_that_is_shown_as_it_is_stands_in_the_glossary():
         groups, _, name = of.rpartition(".")
         stated = [given for key, given in known if any(map(key.fullmatch, (path, of, name)))]
         if not any("setting" in given or "title" in given for given in stated):
-            missing |= {title(name), *map(words, filter(None, groups.split(".")))} - rows
+            missing |= {title(name), *map(humanise, filter(None, groups.split(".")))} - rows
     assert not missing, "\n".join(sorted(missing))

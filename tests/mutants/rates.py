@@ -12,7 +12,7 @@ ENOUGH = 0.90
 """Least share of mutants that the tests of a folder kill."""
 
 
-NO_STEP = re.compile(r"^-(?!--).*(Annotated\[|strict=|Quantity\()", re.MULTILINE)
+NO_STEP = re.compile(r"^-(?!--).*(Annotated\[|strict=|MetricSpec\()", re.MULTILINE)
 """A changed line that is of types, of a check of our own, or of how pages name a figure."""
 
 

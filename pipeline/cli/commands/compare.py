@@ -10,7 +10,7 @@ from omninav.pipeline.run.metrics_files import read_metrics
 
 
 def command(arguments: list[str]) -> int:
-    """Print the figures of two or more runs, and what they differ in."""
+    """Print the metrics of two or more runs, and what they differ in."""
     words = [run for given in arguments for run in runs_in(given)]
     if len(words) < 2:
         raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")

@@ -49,7 +49,7 @@ def test_what_is_not_there_is_said_with_what_to_type(run, tmp_path):
         run.values("fusion.belief")
     with pytest.raises(AttributeError, match="there is no mapp; did you mean 'map'"):
         run.mapp  # noqa: B018
-    with pytest.raises(KeyError, match="no figure 'position_eror_m'; did you mean 'position_error_m'"):
+    with pytest.raises(KeyError, match="no metric 'position_eror_m'; did you mean 'position_error_m'"):
         run.metrics["position_eror_m"]
     with pytest.raises(omninav.BadInput, match="not a run folder"):
         omninav.open_run(tmp_path)

@@ -3,16 +3,16 @@ import math
 
 import numpy as np
 
-from omninav.pipeline import Metrics, Quantity
+from omninav.pipeline import Metrics, MetricSpec
 from omninav.pipeline.graph.results import merged
 
 
 def test_metrics_of_several_stages_are_merged_group_by_group():
-    one = Metrics({"group": {"a": 1, "b": 1}}, {"a": Quantity(title="A")}, ("group.a",), ("group",))
-    two = Metrics({"group": {"b": 2}, "c": 3}, {"c": Quantity(title="C")}, ("c", "group.a"))
+    one = Metrics({"group": {"a": 1, "b": 1}}, {"a": MetricSpec(title="A")}, ("group.a",), ("group",))
+    two = Metrics({"group": {"b": 2}, "c": 3}, {"c": MetricSpec(title="C")}, ("c", "group.a"))
     both = merged([one, two])
     assert both.values == {"group": {"a": 1, "b": 2}, "c": 3}
-    assert [quantity.title for quantity in both.quantities.values()] == ["A", "C"]
+    assert [spec.title for spec in both.specs.values()] == ["A", "C"]
     assert both.headlines == ("group.a", "c")
     assert both.details == ("group",)
     assert one.values == {"group": {"a": 1, "b": 1}}

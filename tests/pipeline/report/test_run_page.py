@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sample_metrics import VALUES, measured
 
-from omninav.pipeline import Bounds, Context, Metrics, Plot, Quantity, Stage, Table
+from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Plot, Stage, Table
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.report.chart import Chart
@@ -113,7 +113,7 @@ def test_tables_of_stages_are_shown(tmp_path):
     assert "&lt;b&gt;" in page
 
 
-GOAL = {"goal.reached": Quantity(title="Goal reached"), "goal.time_s": Quantity(title="Time to the goal")}
+GOAL = {"goal.reached": MetricSpec(title="Goal reached"), "goal.time_s": MetricSpec(title="Time to the goal")}
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_settings_that_belong_together_are_compared_one_by_one_and_long_values_t
 
 
 def test_a_figure_that_is_not_as_it_should_be_is_a_tile_in_another_colour(tmp_path):
-    described = {"held": Quantity(title="95 % ellipse holds", unit="%", least=0.85)}
+    described = {"held": MetricSpec(title="95 % ellipse holds", unit="%", least=0.85)}
     for share, style in ((0.36, "tile off"), (0.95, "tile")):
         page = report(tmp_path, metrics=Metrics({"held": share}, described, ("held",)))
         assert f'<div class="{style}"><b>{100 * share:.1f} <small>%</small></b><span>95 % ellipse holds' in page

@@ -3,7 +3,7 @@ import io
 from rich.console import Console
 from sample_metrics import compared, measured, sweep_row
 
-from omninav.pipeline import Metrics, Quantity
+from omninav.pipeline import Metrics, MetricSpec
 from omninav.pipeline.report.sweep_table import overview_of
 from omninav.pipeline.report.terminal_tables import (
     compare_table,
@@ -29,7 +29,7 @@ def test_results_have_units_and_no_details():
 
 
 def test_each_figure_of_a_run_is_one_line_with_what_is_off_in_colour():
-    described = {"lost_rate": Quantity(title="Lost [at all]", most=0.0), "error_m": Quantity()}
+    described = {"lost_rate": MetricSpec(title="Lost [at all]", most=0.0), "error_m": MetricSpec()}
     metrics = Metrics({"lost_rate": 0.5, "error_m": 0.2}, described, ("error_m", "lost_rate"))
     for width in (80, 120):
         said = io.StringIO()
@@ -43,8 +43,8 @@ def test_each_figure_of_a_run_is_one_line_with_what_is_off_in_colour():
 
 
 def test_no_two_rows_of_the_results_have_one_name_and_none_is_empty():
-    described = {"error_m": Quantity(title="Error"), "found_again": Quantity()}
-    described |= {"smoothed.loss_rate": Quantity(title="Lost, smoothed")}
+    described = {"error_m": MetricSpec(title="Error"), "found_again": MetricSpec()}
+    described |= {"smoothed.loss_rate": MetricSpec(title="Lost, smoothed")}
     spread = {"mean": 0.2, "max": 3.0}
     values = {"error_m": spread, "loss_rate": 0.1, "found_again": None}
     values |= {"smoothed": {"error_m": spread, "loss_rate": 0.2}, "rotation": {"error_deg": spread}}
@@ -90,7 +90,7 @@ def test_a_comparison_marks_the_best_and_shows_differing_settings():
 
 
 def test_where_more_is_better_the_largest_is_marked():
-    described = {"goal.reached_rate": Quantity(better="higher"), "goal.end_error_m": Quantity(better="lower")}
+    described = {"goal.reached_rate": MetricSpec(better="higher"), "goal.end_error_m": MetricSpec(better="lower")}
     runs = [
         compared(f"runs/{share}", Metrics({"goal": {"reached_rate": share, "end_error_m": 2.0 - share}}, described))
         for share in (1.0, 0.0)

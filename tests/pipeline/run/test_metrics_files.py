@@ -1,26 +1,26 @@
 import pytest
 
-from omninav.pipeline import BadInput, Metrics, Quantity
+from omninav.pipeline import BadInput, Metrics, MetricSpec
 from omninav.pipeline.files import digest_file, write_json
 from omninav.pipeline.run.metrics_files import read_metrics, write_metrics
 
 
 def test_metrics_are_read_back_with_their_descriptions(tmp_path):
-    described = {"reached_rate": Quantity(title="Reached", better="higher"), "error_m": Quantity(absent="never")}
+    described = {"reached_rate": MetricSpec(title="Reached", better="higher"), "error_m": MetricSpec(absent="never")}
     written = Metrics({"reached_rate": 0.5, "error_m": None}, described, ("reached_rate",), ("error_m",))
     write_metrics(tmp_path, written)
     read = read_metrics(tmp_path)
     assert (read.values, read.headlines, read.details) == (written.values, written.headlines, written.details)
-    assert list(read.quantities) == ["reached_rate", "error_m"]
-    assert read.quantities["reached_rate"].better == "higher"
-    assert read.quantities["error_m"].absent == "never"
+    assert list(read.specs) == ["reached_rate", "error_m"]
+    assert read.specs["reached_rate"].better == "higher"
+    assert read.specs["error_m"].absent == "never"
 
 
 def test_metrics_without_descriptions_are_read_undescribed_and_a_folder_without_metrics_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no metrics"):
         read_metrics(tmp_path)
     (tmp_path / "metrics.json").write_text('{"error_m": 1.0}')
-    assert (read_metrics(tmp_path).values, read_metrics(tmp_path).quantities) == ({"error_m": 1.0}, {})
+    assert (read_metrics(tmp_path).values, read_metrics(tmp_path).specs) == ({"error_m": 1.0}, {})
 
 
 @pytest.mark.parametrize(

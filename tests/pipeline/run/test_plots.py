@@ -55,7 +55,7 @@ def test_a_run_that_gives_other_figures_now_is_not_drawn(tmp_path: Path) -> None
     run = ended(CONFIG | {"runs": str(tmp_path)})
     (run.folder / "metrics.json").write_text('{"other": 1}')
     page = (run.folder / "report.html").read_bytes()
-    with pytest.raises(BadInput, match="it gives other figures now"):
+    with pytest.raises(BadInput, match="it gives other metrics now"):
         redraw(run.folder, "all")
     assert (run.folder / "report.html").read_bytes() == page
     assert read_json(run.folder / "manifest.json")["status"] == "complete"

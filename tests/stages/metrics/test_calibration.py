@@ -6,7 +6,7 @@ from measured_drives import AT_ORIGIN, Row, figures, made_drive
 from scipy.stats import mannwhitneyu
 
 from omninav.pipeline import Context
-from omninav.pipeline.report.key_figures import key_figures
+from omninav.pipeline.report.headlines import headline_rows
 from omninav.stages.geometry.probability.calibration import (
     area_under_roc,
     expected_calibration_error,
@@ -132,10 +132,10 @@ def test_an_estimate_at_both_tolerances_is_right() -> None:
 
 
 @pytest.mark.parametrize(("sigma", "first"), [(0.3, ()), (0.1, ("calibration.ellipse_95",))])
-def test_ellipses_are_among_the_first_figures_where_they_are_too_small(sigma, first):
+def test_ellipses_are_among_the_headlines_where_they_are_too_small(sigma, first):
     drive = made([0.9] * 400, sigma)
     metrics = Calibration().step(Context("c"), drive.at(np.arange(400) < 300)).metrics
     assert metrics.headlines == (*first, "calibration.expected_error")
-    shown = {figure.name: figure for figure in key_figures(metrics, {})}
+    shown = {row.name: row for row in headline_rows(metrics, {})}
     assert all(shown["95 % ellipse holds"].off for _ in first)
-    assert metrics.quantities["calibration.right_share"].title == "Frames within 0.5 m and 10°"
+    assert metrics.specs["calibration.right_share"].title == "Frames within 0.5 m and 10°"

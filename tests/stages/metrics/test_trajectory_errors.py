@@ -3,7 +3,7 @@ import pytest
 from measured_drives import AT_ORIGIN, Row, figures, made_drive, on_x
 
 from omninav.pipeline import Context
-from omninav.pipeline.report.key_figures import key_figures
+from omninav.pipeline.report.headlines import headline_rows
 from omninav.stages.metrics.trajectory_errors import TrajectoryErrors
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.drive import Drive
@@ -123,7 +123,7 @@ def test_windows_say_how_many_frames_they_have_and_odometry_is_measured_over_the
 def test_the_first_figures_say_how_far_off_whether_lost_and_when_it_converged():
     def first(*off: float) -> list[tuple[str, str, bool]]:
         metrics = TrajectoryErrors(lost_m=2.0).step(Context("errors"), off_by(*off)).metrics
-        return [(figure.name, figure.text, figure.off) for figure in key_figures(metrics, {})]
+        return [(row.name, row.text, row.off) for row in headline_rows(metrics, {})]
 
     assert first(*[0.5] * 12) == [
         ("Position error, median", "0.500 m", False),

@@ -1,14 +1,14 @@
-"""Metrics as people read them: titles and units as their stages state them or as the entries' names say."""
+"""Metrics as people read them: titles and units as their stages state them or as their names say."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from omninav.pipeline.graph.results import Metrics, Quantity
+from omninav.pipeline.graph.results import Metrics, MetricSpec
 
 STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
-"""An entry with no other keys than these is a distribution."""
+"""A metric with no other keys than these is a distribution."""
 SPELLED = {"p90": "90th percentile", "p95": "95th percentile"}
 PER_LOG = "logs"
 """The list of each log's own metrics, where there are several logs."""
@@ -29,16 +29,16 @@ SCALES = {"%": 100.0, "kB": 1e-3}
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One entry of metrics.json: its groups (`after_convergence`, …), its name, and a number, text, None or statistics.
+class Metric:
+    """A metric of metrics.json: its groups (`after_convergence`, …), its name, and a number, text, None or statistics.
 
-    `quantity` is how it is described, `by_path` whether under its own path.
+    `spec` is how it is described, `by_path` whether under its own path.
     """
 
     groups: tuple[str, ...]
     name: str
     value: Any
-    quantity: Quantity
+    spec: MetricSpec
     by_path: bool = False
 
     @property
@@ -48,28 +48,28 @@ class Entry:
 
     @property
     def statistics(self) -> dict[str, float] | None:
-        """Mean, median and so on, where the entry is a distribution."""
+        """Mean, median and so on, where it is a distribution."""
         return self.value if isinstance(self.value, dict) else None
 
     @property
     def title(self) -> str:
         """Its name without its groups."""
-        return self.quantity.title or title(self.name)
+        return self.spec.title or title(self.name)
 
     @property
     def unit(self) -> str:
         """The unit in which it is shown, '' where there is none."""
-        return unit(self.name) if self.quantity.unit is None else self.quantity.unit
+        return unit(self.name) if self.spec.unit is None else self.spec.unit
 
     @property
     def where(self) -> str:
         """Its groups in words; nothing where its title is complete."""
-        return "" if self.by_path and self.quantity.title else ", ".join(words(part) for part in self.groups)
+        return "" if self.by_path and self.spec.title else ", ".join(humanise(part) for part in self.groups)
 
     def text(self, value: Any) -> str:
         """The value, or one of its statistics, as shown, without its unit."""
         if value is None:
-            return self.quantity.absent
+            return self.spec.absent
         if isinstance(value, bool | str) or not isinstance(value, int | float):
             return str(value)
         scale = SCALES.get(self.unit)
@@ -77,72 +77,72 @@ class Entry:
 
     def in_words(self, value: Any) -> tuple[str, str]:
         """The value as it stands by itself, and its unit: (`0.19`, `m`), (`after 1`, `frame`), (`at once`, '')."""
-        if value == 0 and self.quantity.zero is not None:
-            return self.quantity.zero, ""
+        if value == 0 and self.spec.zero is not None:
+            return self.spec.zero, ""
         if value is None or isinstance(value, str):
             return self.text(value), ""
         unit = self.unit.removesuffix("s") if value == 1 and len(self.unit) > 2 else self.unit
-        return " ".join(part for part in (self.quantity.before, self.text(value)) if part), unit
+        return " ".join(part for part in (self.spec.before, self.text(value)) if part), unit
 
-    def has_figure(self, value: Any) -> bool:
-        """Whether there is anything to show: a value, or a word for its absence."""
-        return value is not None or self.quantity.absent != Quantity().absent
+    def is_shown(self, value: Any) -> bool:
+        """Tells if there is a value, or a word for its absence."""
+        return value is not None or self.spec.absent != MetricSpec().absent
 
     def is_off(self, value: Any) -> bool:
-        """Whether a value, or its absence, is not as it should be."""
+        """Tells if a value, or its absence, is not acceptable."""
         if value is None:
-            return self.has_figure(value)
+            return self.is_shown(value)
         if not isinstance(value, int | float):
             return False
-        least, most = self.quantity.least, self.quantity.most
+        least, most = self.spec.least, self.spec.most
         return (least is not None and value < least) or (most is not None and value > most)
 
 
 @dataclass(frozen=True)
-class Number:
-    """A single number (or text) of metrics.json; of a distribution each statistic is one."""
+class MetricValue:
+    """The value of a metric: a number or text; of a distribution, one of its statistics."""
 
     name: str
-    entry: Entry
+    metric: Metric
     value: float | int | str | None
 
     @property
     def unit(self) -> str:
         """The unit in which it is shown, '' where there is none."""
-        return self.entry.unit
+        return self.metric.unit
 
     @property
     def text(self) -> str:
-        """The number as shown, without its unit."""
-        return self.entry.text(self.value)
+        """The value as shown, without its unit."""
+        return self.metric.text(self.value)
 
     @property
     def head(self) -> str:
         """Name and unit: the head of a row or column."""
-        name = f"{self.name} {self.entry.quantity.before}".rstrip()
+        name = f"{self.name} {self.metric.spec.before}".rstrip()
         return f"{name} ({self.unit})" if self.unit else name
 
     @property
     def better(self) -> Literal["lower", "higher"] | None:
-        """Which numbers are better, where that is known."""
-        return self.entry.quantity.better
+        """Which values are better, where that is known."""
+        return self.metric.spec.better
 
     @property
     def is_context(self) -> bool:
-        """Whether it is about how large the run was."""
-        return self.entry.by_path and self.entry.quantity.context
+        """True if it states the size of the run."""
+        return self.metric.by_path and self.metric.spec.context
 
 
-def entries(metrics: Metrics) -> list[Entry]:
-    """All results but those of single logs: described ones in their order, then by name; groups after what is in none.
+def in_order(metrics: Metrics) -> list[Metric]:
+    """All metrics but those of single logs: described ones in their order, then by name; groups after what is in none.
 
     Those of a group follow the same order.
     """
-    return [entry for entry in _entries(metrics, metrics.values, ()) if not entry.quantity.setting]
+    return [metric for metric in _in_order(metrics, metrics.values, ()) if not metric.spec.setting]
 
 
-def _entries(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...]) -> Iterator[Entry]:
-    ranks = {path: rank for rank, path in enumerate(metrics.quantities)}
+def _in_order(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...]) -> Iterator[Metric]:
+    ranks = {path: rank for rank, path in enumerate(metrics.specs)}
 
     def order(name: str) -> tuple[int, str]:
         path = ".".join((*groups, name))
@@ -151,41 +151,41 @@ def _entries(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...
     deeper = []
     for name in sorted(values, key=order):
         value, path = values[name], ".".join((*groups, name))
-        quantity = metrics.quantities.get(path) or metrics.quantities.get(name) or Quantity()
-        by_path = path in metrics.quantities
+        spec = metrics.specs.get(path) or metrics.specs.get(name) or MetricSpec()
+        by_path = path in metrics.specs
         if isinstance(value, Mapping):
             if value and all(key in STATISTICS for key in value):
                 spread = {key: value[key] for key in STATISTICS if key in value}
-                yield Entry(groups, name, spread, quantity, by_path)
+                yield Metric(groups, name, spread, spec, by_path)
             else:
                 deeper.append((name, value))
         elif not isinstance(value, list | tuple):
-            yield Entry(groups, name, value, quantity, by_path)
+            yield Metric(groups, name, value, spec, by_path)
     for name, value in deeper:
-        yield from _entries(metrics, value, (*groups, name))
+        yield from _in_order(metrics, value, (*groups, name))
 
 
-def numbers(metrics: Metrics) -> dict[str, Number]:
-    """Every single number by its path."""
+def metric_values(metrics: Metrics) -> dict[str, MetricValue]:
+    """Every value by its path."""
     flat = {}
-    for entry in entries(metrics):
-        for statistic, value in (entry.statistics or {"": entry.value}).items():
-            name = ", ".join(part for part in (entry.title, SPELLED.get(statistic, statistic), entry.where) if part)
-            path = f"{entry.path}.{statistic}" if statistic else entry.path
-            flat[path] = Number(name, entry, value)
+    for metric in in_order(metrics):
+        for statistic, value in (metric.statistics or {"": metric.value}).items():
+            name = ", ".join(part for part in (metric.title, SPELLED.get(statistic, statistic), metric.where) if part)
+            path = f"{metric.path}.{statistic}" if statistic else metric.path
+            flat[path] = MetricValue(name, metric, value)
     return flat
 
 
-def per_log(metrics: Metrics) -> list[dict[str, Number]]:
-    """The numbers of each log, where there are several; they are described as those of the run are."""
+def per_log(metrics: Metrics) -> list[dict[str, MetricValue]]:
+    """The values of each log, where there are several; they are described as those of the run are."""
     logs = metrics.values.get(PER_LOG)
     if not isinstance(logs, list | tuple):
         return []
-    return [numbers(Metrics(values, metrics.quantities)) for values in logs]
+    return [metric_values(Metrics(values, metrics.specs)) for values in logs]
 
 
-def headlines(runs: Sequence[Metrics]) -> list[str]:
-    """Paths of what one looks for first in any of several runs, in the order in which their stages state them."""
+def headline_paths(runs: Sequence[Metrics]) -> list[str]:
+    """Paths of the headlines of any of several runs, in the order in which their stages state them."""
     return list(dict.fromkeys(path for run in runs for path in run.headlines))
 
 
@@ -194,8 +194,8 @@ def is_detail(path: str, metrics: Metrics) -> bool:
     return any(f"{path}.".startswith(f"{detail}.") for detail in metrics.details)
 
 
-def best_of(path: str, runs: Sequence[Mapping[str, Number]]) -> set[int]:
-    """Which runs have the best number, where it is known which is; none where all have the same."""
+def best_of(path: str, runs: Sequence[Mapping[str, MetricValue]]) -> set[int]:
+    """Which runs have the best value, where it is known which is; none where all have the same."""
     better = next((run[path].better for run in runs if path in run), None)
     found = {n: run[path].value for n, run in enumerate(runs) if path in run and better}
     known = {n: float(value) for n, value in found.items() if isinstance(value, int | float)}
@@ -205,7 +205,7 @@ def best_of(path: str, runs: Sequence[Mapping[str, Number]]) -> set[int]:
     return {number for number, value in known.items() if value == best}
 
 
-def head_of(path: str, runs: Sequence[Mapping[str, Number]]) -> str:
+def head_of(path: str, runs: Sequence[Mapping[str, MetricValue]]) -> str:
     """Name and unit of what stands at a path of any of several runs."""
     return next(run[path] for run in runs if path in run).head
 
@@ -222,11 +222,11 @@ def with_unit(value: str, unit: str) -> str:
 
 def title(name: str) -> str:
     """`position_error_m` -> `Position error`."""
-    text = words(next((name.removesuffix(end) for end in UNITS if name.endswith(end) and end != "_rate"), name))
+    text = humanise(next((name.removesuffix(end) for end in UNITS if name.endswith(end) and end != "_rate"), name))
     return text[:1].upper() + text[1:]
 
 
-def words(name: str) -> str:
+def humanise(name: str) -> str:
     """`after_convergence` -> `after convergence`."""
     return name.replace("_", " ")
 
