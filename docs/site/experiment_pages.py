@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from omninav.pipeline.cli.experiments import judged_experiments
-from omninav.pipeline.experiment.page import figure_table
+from omninav.pipeline.experiment.page import measure_table
 from omninav.pipeline.experiment.pages import Judged, counts, pages, sources
 from omninav.pipeline.experiment.plots import measure_plot
 from omninav.pipeline.report.rendering import render
@@ -69,7 +69,7 @@ def _included(match: re.Match[str]) -> str:
         return f"![{drawn.title}]({drawn.file})\n\n{drawn.caption}"
     name, measure = words.split()
     experiment, result = judged()[by_name()[name]]
-    return render("figure_table.md", table=figure_table(experiment, result, measure))
+    return render("measure_table.md", table=measure_table(experiment, result, measure))
 
 
 @functools.cache

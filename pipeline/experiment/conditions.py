@@ -143,7 +143,7 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
 def results_by_condition(runs: Sequence[ConditionRun], development: bool = False) -> Results:
     """Returns the runs by condition, scenario and seed: of the scenarios that count, or of those of development.
 
-    A repetition of a condition that failed has a result without figures.
+    A repetition of a condition that failed has a result without values.
     """
     found: dict[tuple[tuple[str, str], ...], dict[tuple[str, int], dict[str, Any]]] = {}
     for run in runs:

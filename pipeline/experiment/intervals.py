@@ -10,15 +10,15 @@ Array = npt.NDArray[np.float64]
 RESAMPLES = 4999
 CONFIDENCE = 0.95
 MIN_GROUPS = 6
-"""Groups from which on they are resampled: of fewer no resample lies outside the figures, which enclose the mean less
+"""Groups from which on they are resampled: of fewer no resample lies outside the values, which enclose the mean less
 often than 95 % of the times (of five, 94 %; of two, half)."""
 
 
 def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = None) -> tuple[float, float]:
-    """95 % interval of the mean over all figures, by resampling groups and then the figures in each (always the same).
+    """95 % interval of the mean over all values, by resampling groups and then the values in each (always the same).
 
-    `groups`: the figures (n_g,) of each scenario. With `over`, figures of the same shapes: that of the ratio of the two
-    means, resampled in pairs. Equal figures, or a single one, give an interval of no width. Of two to five scenarios it
+    `groups`: the values (n_g,) of each scenario. With `over`, values of the same shapes: that of the ratio of the two
+    means, resampled in pairs. Equal values, or a single one, give an interval of no width. Of two to five scenarios it
     is Student's t of their means.
 
     The two-stage bootstrap of hierarchical data (Davison & Hinkley, Bootstrap Methods and their Application, 1997). Its
@@ -35,13 +35,13 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
         return student_interval([float(group.mean()) for group in columns[0]])
     drawn, there = _draws(counts)
     sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
-    figures = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
+    values = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
     independent = len(counts) if len(counts) > 1 else counts[0]
     shares = _expanded(independent)
-    if np.isfinite(figures).all():
-        low, high = np.quantile(figures, shares)
-    else:  # between infinite figures there is nothing
-        low, high = np.quantile(figures, shares, method="nearest")
+    if np.isfinite(values).all():
+        low, high = np.quantile(values, shares)
+    else:  # between infinite values there is nothing
+        low, high = np.quantile(values, shares, method="nearest")
     return float(low), float(high)
 
 
@@ -54,7 +54,7 @@ def share_interval(met: int, of: int) -> tuple[float, float]:
 
 
 def student_interval(means: Sequence[float]) -> tuple[float, float]:
-    """95 % interval of the mean of a few independent figures."""
+    """95 % interval of the mean of a few independent values."""
     from scipy.stats import t  # type: ignore[attr-defined]
 
     half = float(t.ppf((1.0 + CONFIDENCE) / 2.0, len(means) - 1)) * float(np.std(means, ddof=1)) / len(means) ** 0.5
@@ -69,7 +69,7 @@ def _ratios(of: Array, over: Array) -> Array:
 
 
 def _draws(counts: Sequence[int]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """Places in the padded figures that each resample draws (RESAMPLES, groups, n), and which of them count."""
+    """Places in the padded values that each resample draws (RESAMPLES, groups, n), and which of them count."""
     rng, number, longest = np.random.default_rng(0), len(counts), max(counts)
     of_group = np.asarray(counts)
     group = rng.integers(number, size=(RESAMPLES, number))
@@ -83,7 +83,7 @@ def _padded(groups: Sequence[Array]) -> Array:
 
 
 def _expanded(independent: int) -> tuple[float, float]:
-    """The two percentiles, as shares, for this many independent figures."""
+    """The two percentiles, as shares, for this many independent values."""
     from scipy.stats import norm, t  # type: ignore[attr-defined]
 
     tail = (1.0 - CONFIDENCE) / 2.0

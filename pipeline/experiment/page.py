@@ -1,4 +1,4 @@
-"""An experiment as one page: verdicts, the paper's figures next to ours, failures, and how to reproduce it."""
+"""An experiment as one page: verdicts, the paper's values next to ours, failures, and how to reproduce it."""
 
 import base64
 import math
@@ -51,7 +51,7 @@ def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[Pa
         "experiment": experiment,
         "result": result,
         "verdicts": [_verdict(experiment, experiment.claims[key], verdict) for key, verdict in verdicts.items()],
-        "tables": [figure_table(experiment, result, name) for name in experiment.measures if name in result.cells],
+        "tables": [measure_table(experiment, result, name) for name in experiment.measures if name in result.cells],
         "context_columns": list(dict.fromkeys(name for row in result.conditions for name in row.context)),
         "styles": STYLES,
         "tiles": _tiles(experiment, result, list(verdicts.values())),
@@ -61,20 +61,20 @@ def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[Pa
 
 
 def number(value: float | None, digits: int) -> str:
-    """A figure with a measure's digits, more where it would look like 0 and is not; a dash where there is none."""
+    """A value with a measure's digits, more where it would look like 0 and is not; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.1g}" if 0.0 < abs(value) <= 0.5 * 10.0**-digits else f"{value:.{digits}f}"
 
 
 def summary(measure: Measure, cell: Cell) -> str:
-    """Mean ± standard deviation, or the figure that the measure judges; a dash where there is nothing."""
+    """Mean ± standard deviation, or the value that the measure judges; a dash where there is nothing."""
     mean = number(cell.figure, measure.digits)
     return mean if cell.spread is None else f"{mean} ± {number(cell.spread, measure.digits)}"
 
 
 def beyond_the_mean(measure: Measure, cell: Cell) -> list[str]:
-    """Note under a mean: the median where it differs, and how many of those that ran have a figure at all."""
+    """Note under a mean: the median where it differs, and how many of those that ran have a value at all."""
     digits = measure.digits
     parts = []
     if cell.median is not None and number(cell.median, digits) != number(cell.figure, digits):
@@ -122,8 +122,8 @@ def _case(case: Case, measure: Measure) -> dict[str, str]:
     }
 
 
-def figure_table(experiment: Experiment, result: ExperimentResult, name: str) -> dict[str, Any]:
-    """A measure's table: the page's rows and columns, with the paper's figures beside ours."""
+def measure_table(experiment: Experiment, result: ExperimentResult, name: str) -> dict[str, Any]:
+    """A measure's table: the page's rows and columns, with the paper's values beside ours."""
     measure, page = experiment.measures[name], experiment.page
     columns = experiment.labels(page.columns)
     rows = []
@@ -131,7 +131,7 @@ def figure_table(experiment: Experiment, result: ExperimentResult, name: str) ->
         cells = []
         for column in columns:
             cell = result.cell(name, (*labels.values(), column))
-            paper = experiment.published_figure(name, labels | {page.columns: column})
+            paper = experiment.published_value(name, labels | {page.columns: column})
             ours, more = summary(measure, cell), ", ".join(beyond_the_mean(measure, cell))
             cells.append({"ours": ours, "more": more, "paper": number(paper, measure.digits)})
         rows.append({"head": list(labels.values()) or ["all"], "cells": cells})

@@ -52,7 +52,7 @@ def scenarios_of(result: ExperimentResult) -> str:
 
 
 def claims_page(judged: Judged) -> str:
-    """The papers' claims, paper by paper: each with its place, the experiment that judges it, verdict and figure."""
+    """The papers' claims, paper by paper: each with its place, the experiment that judges it, verdict and value."""
     blocks = ["# What the papers claim, and what we find", by_chance(judged)]
     for source in sources(judged):
         rows = [
@@ -127,7 +127,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _ours(experiment: Experiment, claim: Claim, verdict: Verdict) -> str:
-    """The measure, our figure, what it is compared with and the difference's interval; of several cases the range."""
+    """The measure, our value, what it is compared with and the difference's interval; of several cases the range."""
     title = experiment.measures[claim.measure].title
     known = [(case, case.ours) for case in verdict.cases if case.ours is not None]
     if not known:
@@ -135,17 +135,17 @@ def _ours(experiment: Experiment, claim: Claim, verdict: Verdict) -> str:
     case, ours = known[0]
     measure = f"{title}{', ratio' if case.ratio else ''}"
     if len(verdict.cases) == 1:
-        beside = "" if case.other is None else f", beside {_figure(case.other)} ({case.against})"
-        between = "" if case.interval is None else f", difference {' to '.join(map(_figure, case.interval))}"
-        return f"{measure}: {_figure(ours)}{beside}{between}"
-    figures = sorted(figure for _, figure in known)
+        beside = "" if case.other is None else f", beside {_value(case.other)} ({case.against})"
+        between = "" if case.interval is None else f", difference {' to '.join(map(_value, case.interval))}"
+        return f"{measure}: {_value(ours)}{beside}{between}"
+    values = sorted(value for _, value in known)
     held = [case.holds for case in verdict.cases]
     undecided = f", {held.count(None)} undecided" if None in held else ""
     cases = f"{held.count(True)} of {len(held)} cases hold{undecided}"
-    return f"{measure}: {_figure(figures[0])} to {_figure(figures[-1])}; {cases}"
+    return f"{measure}: {_value(values[0])} to {_value(values[-1])}; {cases}"
 
 
-def _figure(value: float) -> str:
+def _value(value: float) -> str:
     """Three digits or four; whole numbers as such."""
     whole = float(value).is_integer() or abs(value) >= 100.0
     return number(value, 0 if whole else 1 if abs(value) >= 10.0 else 2)

@@ -114,7 +114,7 @@ def _lines(experiment: Experiment, result: ExperimentResult, name: str, along: s
         for axes, panel in zip(grid, panel_labels, strict=True):
             for index, chosen in enumerate(combinations):
                 labels = dict(zip(series, chosen, strict=True)) | ({panels: panel} if panels else {})
-                means, spreads = _figures(experiment, result, name, [labels | {along: x} for x in places])
+                means, spreads = _values(experiment, result, name, [labels | {along: x} for x in places])
                 known = ~np.isnan(means)
                 heights += means[known].tolist()
                 axes.errorbar(
@@ -139,7 +139,7 @@ def _lines(experiment: Experiment, result: ExperimentResult, name: str, along: s
 
 
 def _bars(experiment: Experiment, result: ExperimentResult, name: str) -> bytes:
-    """Bars; error bars are the spread, hollow diamonds the paper's figures."""
+    """Bars; error bars are the spread, hollow diamonds the paper's values."""
     measure = experiment.measures[name]
     columns, rows = experiment.labels(experiment.page.columns), rows_of(experiment)
     width = 0.8 / len(rows)
@@ -150,7 +150,7 @@ def _bars(experiment: Experiment, result: ExperimentResult, name: str) -> bytes:
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
             by = experiment.page.columns
-            heights, spreads = _figures(experiment, result, name, [labels | {by: column} for column in columns])
+            heights, spreads = _values(experiment, result, name, [labels | {by: column} for column in columns])
             all_heights += heights.tolist()
             colour = PALETTE[index % len(PALETTE)]
             title = ", ".join(labels.values())
@@ -164,7 +164,7 @@ def _bars(experiment: Experiment, result: ExperimentResult, name: str) -> bytes:
                 label=title,
                 error_kw={"elinewidth": 0.8},
             )
-            paper = [experiment.published_figure(name, labels | {by: column}) for column in columns]
+            paper = [experiment.published_value(name, labels | {by: column}) for column in columns]
             shown = [(x, value) for x, value in zip(at, paper, strict=True) if value is not None]
             if shown:
                 axes.plot(
@@ -187,13 +187,13 @@ def _points(experiment: Experiment, result: ExperimentResult, name: str) -> byte
     """A line of points for each row of the table, one for each column; error bars are the spread."""
     columns, rows = experiment.labels(experiment.page.columns), rows_of(experiment)
     places = -np.arange(len(rows), dtype=np.float64)  # the first row on top
-    figures: list[float] = []
+    values: list[float] = []
     with plot(8.0, 1.3 + 0.28 * len(rows)) as drawn:
         axes = drawn.canvas.subplots()
         for index, column in enumerate(columns):
             of_column = [labels | {experiment.page.columns: column} for labels in rows]
-            means, spreads = _figures(experiment, result, name, of_column)
-            figures += means.tolist()
+            means, spreads = _values(experiment, result, name, of_column)
+            values += means.tolist()
             axes.errorbar(
                 means,
                 places - 0.1 * (index - (len(columns) - 1) / 2),
@@ -207,15 +207,15 @@ def _points(experiment: Experiment, result: ExperimentResult, name: str) -> byte
             )
         axes.set_yticks(places, [", ".join(labels.values()) for labels in rows])
         axes.set_xlabel(experiment.measures[name].title)
-        _scale(axes, figures, axis="x")
+        _scale(axes, values, axis="x")
         _legend_above(drawn.canvas, [axes])
     return drawn.content
 
 
-def _figures(
+def _values(
     experiment: Experiment, result: ExperimentResult, name: str, conditions: Sequence[Labels]
 ) -> tuple[Array, Array]:
-    """A measure's figures in some conditions, and their spreads: 0 of one repetition; NaN where there is none."""
+    """A measure's values in some conditions, and their spreads: 0 of one repetition; NaN where there is none."""
     factors = (*experiment.page.rows, experiment.page.columns)
     cells = [result.cell(name, [labels[factor] for factor in factors]) for labels in conditions]
     spreads = [0.0 if cell.spread is None and cell.found == 1 else cell.spread for cell in cells]
@@ -244,14 +244,14 @@ def _legend_above(canvas: Any, grid: Any) -> None:
     canvas.set_figheight(canvas.get_figheight() + max(0.0, size.height / canvas.dpi - LEGEND_LINES_IN))
 
 
-def _scale(axes: Any, figures: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:
+def _scale(axes: Any, values: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:
     """Scales an axis from zero up; in powers of ten where the highest is more than `ratio` times the lowest above zero.
 
     Where one is zero, the axis is linear up to the lowest above zero, so that a line at zero is seen.
     """
-    above = [figure for figure in figures if figure > 0]
+    above = [value for value in values if value > 0]
     if above and max(above) > ratio * min(above):
-        if 0.0 in figures:
+        if 0.0 in values:
             getattr(axes, f"set_{axis}scale")("symlog", linthresh=min(above), linscale=0.5)
             axes.set(**{f"{axis}lim": (-0.2 * min(above), None)})
         else:

@@ -1,4 +1,4 @@
-"""The result of an experiment as one file: verdicts, figures and curves, from which its page and plots are made."""
+"""The result of an experiment as one file: verdicts, values and curves, from which its page and plots are made."""
 
 import dataclasses
 import itertools
@@ -32,16 +32,16 @@ class Cell:
     at: tuple[str, ...]
     """The condition's labels: of the table's rows, then of its columns."""
     figure: float | None = None
-    """The mean, or the figure that the measure judges."""
+    """The mean, or the value that the measure judges."""
     spread: float | None = None
-    """Standard deviation of the repetitions; of one repetition, or of a largest figure, there is none."""
+    """Standard deviation of the repetitions; of one repetition, or of a largest value, there is none."""
     median: float | None = None
     found: int = 0
-    """Repetitions that have a figure."""
+    """Repetitions that have a value."""
     ran: int = 0
     """Repetitions that have run."""
     development: float | None = None
-    """The figure in the scenarios of development: their mean, or that of the worst."""
+    """The value in the scenarios of development: their mean, or that of the worst."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class ExperimentResult:
     verdicts: Mapping[str, tuple[Case, ...]]
     """Key of a claim -> its cases."""
     cells: Mapping[str, tuple[Cell, ...]]
-    """Measure -> its figures, in the order of the table's rows and columns."""
+    """Measure -> its values, in the order of the table's rows and columns."""
     curves: tuple[tuple[Line, ...], ...] = ()
     """Lines of each of the file's curves; none in results that were kept without."""
     recordings: Mapping[str, str] = field(default_factory=dict)
@@ -99,7 +99,7 @@ class ExperimentResult:
     """Overrides of all conditions."""
 
     def cell(self, measure: str, at: Sequence[str]) -> Cell:
-        """A measure's figure of one condition; one without a figure where there is none."""
+        """A measure's value of one condition; one without a value where there is none."""
         return next((cell for cell in self.cells.get(measure, ()) if cell.at == tuple(at)), Cell(tuple(at)))
 
     def judged(self, experiment: Experiment) -> dict[str, Verdict]:
@@ -113,7 +113,7 @@ def rows_of(experiment: Experiment) -> list[Labels]:
     return [dict(zip(rows, chosen, strict=True)) for chosen in itertools.product(*(experiment.labels(f) for f in rows))]
 
 
-def figures_of(
+def summary_of(
     experiment: Experiment, results: Results, development: Results
 ) -> tuple[dict[str, tuple[Case, ...]], dict[str, tuple[Cell, ...]], tuple[tuple[Line, ...], ...]]:
     """Verdicts, cells and curves of what has run. Those of `development` stand in the cells only."""
@@ -134,12 +134,12 @@ def _cells(experiment: Experiment, results: Results, development: Results, name:
             yield Cell(at, ran=ran, development=beside)
             continue
         spread = _spread(found) if len(found) > 1 and measure.over_runs == "mean" else None
-        figure, median = over_runs(measure, found), float(np.median(found))
-        yield Cell(at, figure, spread, median, len(found), ran, beside)
+        value, median = over_runs(measure, found), float(np.median(found))
+        yield Cell(at, value, spread, median, len(found), ran, beside)
 
 
 def _spread(values: Sequence[float]) -> float:
-    """Standard deviation; 0 of figures that are equal but for rounding."""
+    """Standard deviation; 0 of values that are equal but for rounding."""
     spread = float(np.std(values))
     return spread if spread > 1e-9 * abs(float(np.mean(values))) else 0.0
 
@@ -169,7 +169,7 @@ def _lines(experiment: Experiment, results: Results, curve: Curve) -> Iterator[L
 
 
 def _floats(values: Any) -> tuple[float, ...]:
-    """Figures of a curve, in six digits: no plot shows more."""
+    """Values of a curve, in six digits: no plot shows more."""
     return tuple(float(f"{value:.6g}") for value in values)
 
 
@@ -180,7 +180,7 @@ def _named(condition: Condition, factors: Sequence[str]) -> str:
 def series_of(runs: Sequence[Mapping[str, Any]], path: str, at_path: str = "") -> tuple[Array, Array]:
     """Positions of the entries of a series (N,), and the series of all runs that have it (runs, N); NaN where one ends.
 
-    Entries that no run has a figure for are left out.
+    Entries that no run has a value for are left out.
     """
     found = [(series_at(space_of(run), path), series_at(space_of(run), at_path) if at_path else []) for run in runs]
     found = [(y, x or [float(n + 1) for n in range(len(y))]) for y, x in found if y]

@@ -33,7 +33,7 @@ from .conditions import (
 )
 from .page import write_page
 from .repetition import finished
-from .result import ConditionRow, ExperimentResult, figures_of
+from .result import ConditionRow, ExperimentResult, summary_of
 from .shared_inputs import Recording, artifacts_of, recordings_of
 from .specification import FULL, Experiment, read_experiment
 from .verdicts import Verdict, judge
@@ -89,7 +89,7 @@ class ExperimentRun:
         """The results as things stand. Those of development stand in the tables, and nothing else is made of them."""
         experiment, conditions = self.experiment, self.conditions
         results, beside = results_by_condition(conditions), results_by_condition(conditions, development=True)
-        verdicts, cells, curves = figures_of(experiment, results, beside)
+        verdicts, cells, curves = summary_of(experiment, results, beside)
         common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
         return ExperimentResult(
             name=experiment.name,

@@ -1,4 +1,4 @@
-"""Figures out of nested results: a path leads to a number or to a series of them, of which one figure is taken."""
+"""Values out of nested results: a path leads to a number or to a series of them, of which one value is taken."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 Aggregate = Literal["mean", "median", "min", "max", "first", "last", "change", "ratio", "slope", "largest_rise"]
-"""Figures of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
+"""Values of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
 line that fits best (per entry), `largest_rise` the largest step upwards from one entry to the next."""
 
 
@@ -35,7 +35,7 @@ def series_at(result: Any, path: str) -> list[float | None]:
     return [float(each) if _is_number(each) else None for each in found] if isinstance(found, list | tuple) else []
 
 
-def figure_at(
+def value_at(
     result: Any, path: str, aggregate: Aggregate = "mean", window: tuple[float, float] = (0.0, 1.0)
 ) -> float | None:
     """The number at a path, or the aggregate of the series there; several paths joined by + are added.
@@ -43,21 +43,21 @@ def figure_at(
     `window` is the share of a series that counts, from its start: (0.75, 1) is its last quarter. None where there is
     nothing.
     """
-    figures = []
+    values = []
     for each in path.split("+"):
         found = at(result, each.strip())
         if isinstance(found, list | tuple):
             found = aggregated([float(value) if _is_number(value) else None for value in found], aggregate, window)
         if not _is_number(found):
             return None
-        figures.append(float(found))
-    return sum(figures)
+        values.append(float(found))
+    return sum(values)
 
 
 def aggregated(
     series: Sequence[float | None], aggregate: Aggregate, window: tuple[float, float] = (0.0, 1.0)
 ) -> float | None:
-    """One figure of a series. Entries that are None are left out; None where too few are there."""
+    """One value of a series. Entries that are None are left out; None where too few are there."""
     first, last = int(np.floor(window[0] * len(series))), int(np.ceil(window[1] * len(series)))
     places = [place for place in range(first, last) if series[place] is not None]
     values = np.array([series[place] for place in places], dtype=np.float64)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from omninav.pipeline.graph.ports import convert, convert_fields
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown, suggest
 
-from .series import Aggregate, figure_at
+from .series import Aggregate, value_at
 
 TYPED = ("common", "set", "scenarios", "development", "sweep")
 """Entries of a file that are overrides, or labels of overrides."""
@@ -36,30 +36,30 @@ Labels = dict[str, str]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure of each run, read from its metrics.json (or from `timing.` or `facts.`)."""
+    """A value read from each run's metrics.json (or from `timing.` or `facts.`)."""
 
     title: str
     path: tuple[str, ...]
     """Paths to look at, of which the first that is there counts; paths joined by + are added. With `stages` it is
     `p50_ms`, `p95_ms` or `max_ms`."""
     scale: float = 1.0
-    """The figure is multiplied by it, for another unit."""
+    """The value is multiplied by it, for another unit."""
     digits: int = 1
     """Decimals that are shown."""
     aggregate: Aggregate = "mean"
-    """Rule by which a series (`laps.*.error_m.mean`) becomes one figure."""
+    """Rule by which a series (`laps.*.error_m.mean`) becomes one value."""
     window: tuple[float, float] = (0.0, 1.0)
     """The share of the series that counts."""
     stages: tuple[str, ...] = ()
-    """Stages whose time together (ms), step by step, is the figure."""
+    """Stages whose time together (ms), step by step, is the value."""
     over_runs: Literal["mean", "largest", "smallest"] = "mean"
-    """Which figure of the repetitions' is shown: with `largest`, that of the worst of them. Claims about a worst figure
+    """Which value of the repetitions' is shown: with `largest`, that of the worst of them. Claims about a worst value
     count the runs that keep to the limit."""
     margin: float | None = None
     """Largest difference that does not matter, in the measure's unit; None: that of `MARGINS`."""
 
     def margin_beside(self, other: float) -> float:
-        """The largest difference to a figure that does not matter."""
+        """The largest difference to a value that does not matter."""
         unit = self.title.rstrip(")").rpartition("(")[2].split()[-1:] if self.title.endswith(")") else []
         known = MARGINS.get(unit[0]) if unit else None
         margin = known if self.margin is None else self.margin
@@ -89,15 +89,15 @@ class Claim:
     above: Other | None = None
     not_above: Other | None = None
     lowest: bool = False
-    """Whether the figure is `not_above` that of each other condition."""
+    """Whether the value is `not_above` that of each other condition."""
     among: tuple[str, ...] = ()
     """Factors in which the other conditions of `lowest` differ; by default those of `of`."""
     scale: float = 1.0
     """The other side is multiplied by it."""
     ratio_to: Mapping[str, Any] | None = None
-    """Labels of a condition: the figure is then the ratio of the two means, and is compared with a number."""
+    """Labels of a condition: the value is then the ratio of the two means, and is compared with a number."""
     paper: str = ""
-    """The paper's statement that it judges, in our words, with its figure."""
+    """The paper's statement that it judges, in our words, with its value."""
     where: str = ""
     """Place in the paper: section, figure, table, equation. With it the claim is listed among those of `source`."""
     quote: str = ""
@@ -168,7 +168,7 @@ class Experiment:
     without: tuple[Mapping[str, Any], ...] = ()
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
-    """Measure -> labels in the order of the page's rows and column -> the paper's figure."""
+    """Measure -> labels in the order of the page's rows and column -> the paper's value."""
     source: str = ""
     """The paper that its claims are from: `Porta & Kröse 2004`."""
     claims: Mapping[str, Claim] = field(default_factory=dict)
@@ -176,7 +176,7 @@ class Experiment:
     curves: tuple[Curve, ...] = ()
     notes: tuple[str, ...] = ()
     best: tuple[str, ...] = ()
-    """Measures by which the best condition over the scenarios of development is named: that with the least figure of
+    """Measures by which the best condition over the scenarios of development is named: that with the least value of
     the first, among equals of the next."""
     shared: bool = True
     """Whether the repetitions of a condition share what does not depend on the seed (not where time is measured)."""
@@ -216,8 +216,8 @@ class Experiment:
         """The labels of a factor, in the file's order."""
         return [str(label) for label in self.sweep[factor]]
 
-    def published_figure(self, measure: str, labels: Labels) -> float | None:
-        """The paper's figure of a condition, None where it prints none."""
+    def published_value(self, measure: str, labels: Labels) -> float | None:
+        """The paper's value of a condition, None where it prints none."""
         found: Any = self.published.get(measure)
         for factor in (*self.page.rows, self.page.columns):
             found = _entry(found, labels[factor]) if isinstance(found, Mapping) else None
@@ -389,15 +389,15 @@ def _entry(mapping: Mapping[Any, Any], label: str) -> Any:
     return next((value for key, value in mapping.items() if str(key) == label), None)
 
 
-def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
-    """A measure's figure in a repetition's result, in the measure's unit; None where it holds none."""
+def value_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
+    """A measure's value in a repetition's result, in the measure's unit; None where it holds none."""
     space = space_of(result)
     if measure.stages:
         space = result["timing"].get("together", {}).get("+".join(measure.stages), {})
     for path in measure.path:
-        figure = figure_at(space, path, measure.aggregate, measure.window)
-        if figure is not None:
-            return figure * measure.scale
+        value = value_at(space, path, measure.aggregate, measure.window)
+        if value is not None:
+            return value * measure.scale
     return None
 
 

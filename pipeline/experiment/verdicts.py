@@ -11,14 +11,14 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.report.metrics import metric_values
 
 from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
-from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of
+from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, value_of
 
 Repetition = tuple[str, int]
 """Scenario ('' where there is none) and seed."""
 Results = Mapping[tuple[tuple[str, str], ...], Mapping[Repetition, Mapping[str, Any]]]
 """Labels of a condition (as `key_of` gives them) -> repetition -> result."""
 Samples = Mapping[Repetition, float]
-"""A measure's figure in each repetition."""
+"""A measure's value in each repetition."""
 
 ROUNDING = 1e-9
 RUNS_SHARE = 0.75
@@ -28,12 +28,12 @@ twelve runs can show, when all do."""
 
 @dataclass(frozen=True)
 class Case:
-    """A claim for one condition: our figure, what it is compared with, the difference's interval, whether it holds.
+    """A claim for one condition: our value, what it is compared with, the difference's interval, whether it holds.
 
     `difference` is ours less the other side; `interval` its 95 % interval over `scenarios` and the seeds in each. Of a
-    largest figure there is none: `kept` of the `repetitions` keep to the limit, and the interval of that share decides.
+    largest value there is none: `kept` of the `repetitions` keep to the limit, and the interval of that share decides.
     `holds` is None where a condition has no results, and where the repetitions cannot decide. `judged` of `repetitions`
-    have a figure: steps until converged are those of the ones that converged. `ratio`: the figures are ratios of means.
+    have a value: steps until converged are those of the ones that converged. `ratio`: the values are ratios of means.
     """
 
     where: str
@@ -94,29 +94,29 @@ def key_of(labels: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
 
 
 def samples(experiment: Experiment, results: Results, measure: str, labels: Labels) -> dict[Repetition, float]:
-    """A measure's figure in each repetition of a condition; those without one are left out."""
+    """A measure's value in each repetition of a condition; those without one are left out."""
     found = {}
     for repetition, result in sorted(results.get(key_of(labels), {}).items()):
-        figure = figure_of(experiment.measures[measure], result)
-        if figure is not None:
-            found[repetition] = figure
+        value = value_of(experiment.measures[measure], result)
+        if value is not None:
+            found[repetition] = value
     return found
 
 
 def unmeasured(experiment: Experiment, results: Results) -> Iterator[Problem]:
-    """A problem for each measure of which no run has a figure."""
+    """A problem for each measure of which no run has a value."""
     runs = [result for of_condition in results.values() for result in of_condition.values() if result["metrics"]]
     known = metric_values(Metrics(runs[0]["metrics"])) if runs else {}
     for name, measure in experiment.measures.items():
-        if runs and all(figure_of(measure, result) is None for result in runs):
+        if runs and all(value_of(measure, result) is None for result in runs):
             path = " or ".join(measure.path)
-            yield Problem(f"experiment.measures.{name}.path", f"no run has {path}", suggest(path, known, "figures"))
+            yield Problem(f"experiment.measures.{name}.path", f"no run has {path}", suggest(path, known, "metrics"))
 
 
-def over_runs(measure: Measure, figures: Iterable[float]) -> float:
-    """One figure of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
+def over_runs(measure: Measure, values: Iterable[float]) -> float:
+    """One value of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
     name = {"mean": "mean", "largest": "max", "smallest": "min"}[measure.over_runs]
-    return float(getattr(np, name)(np.fromiter(figures, dtype=np.float64)))
+    return float(getattr(np, name)(np.fromiter(values, dtype=np.float64)))
 
 
 def judge(experiment: Experiment, results: Results) -> dict[str, Verdict]:
@@ -141,7 +141,7 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
         return _against_condition(experiment, claim, side, labels, other, results)
     where, against = _where(experiment, labels), "the paper's figure" if other == "published" else "the limit"
     measure = experiment.measures[claim.measure]
-    limit = experiment.published_figure(claim.measure, labels) if other == "published" else float(other)
+    limit = experiment.published_value(claim.measure, labels) if other == "published" else float(other)
     limit = None if limit is None else claim.scale * limit
     ours, theirs = samples(experiment, results, claim.measure, labels), None
     ran = _ran(results, labels, labels)
@@ -157,7 +157,7 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
         return Case(where, None if ratio else _mean(measure, ours), limit, against, None, None, None)
     found = over_runs(measure, ours.values()) / (over_runs(measure, theirs.values()) if theirs is not None else 1.0)
     if measure.over_runs != "mean":
-        kept = sum(_keeps(side, figure - limit, measure.margin_beside(limit)) for figure in ours.values())
+        kept = sum(_keeps(side, value - limit, measure.margin_beside(limit)) for value in ours.values())
         holds = decided_by_share(kept, ran) if _scenarios(ours) > 1 else None
         case = Case(where, found, limit, against, found - limit, None, holds, len(ours), ran, ratio, _scenarios(ours))
         return replace(case, kept=kept)
@@ -200,7 +200,7 @@ def _against_samples(
 def decided(side: Side, interval: tuple[float, float], margin: float, scenarios: int) -> bool | None:
     """Judges a comparison by the whole interval of the difference: true, false, or None where that leaves it open.
 
-    One scenario says nothing of the next one, and nor do equal figures of fewer than six.
+    One scenario says nothing of the next one, and nor do equal values of fewer than six.
     """
     low, high = interval
     if scenarios < 2 or (scenarios < MIN_GROUPS and low == high):
@@ -229,14 +229,14 @@ def _keeps(side: Side, difference: float, margin: float) -> bool:
             return difference <= (margin if side == "not_above" else 0.0) + ROUNDING
 
 
-def _by_scenario(figures: Samples) -> list[Array]:
-    """The figures of each scenario, both in order."""
-    names = sorted({scenario for scenario, _ in figures})
-    return [np.array([figures[each] for each in sorted(figures) if each[0] == name]) for name in names]
+def _by_scenario(values: Samples) -> list[Array]:
+    """The values of each scenario, both in order."""
+    names = sorted({scenario for scenario, _ in values})
+    return [np.array([values[each] for each in sorted(values) if each[0] == name]) for name in names]
 
 
-def _scenarios(figures: Samples) -> int:
-    return len({scenario for scenario, _ in figures})
+def _scenarios(values: Samples) -> int:
+    return len({scenario for scenario, _ in values})
 
 
 def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Results) -> Case:

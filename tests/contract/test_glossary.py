@@ -1,4 +1,4 @@
-"""Every figure that a run prints is explained in docs/glossary.md."""
+"""Every metric that a run prints is explained in docs/glossary.md."""
 
 import ast
 import json
@@ -9,12 +9,12 @@ from pathlib import Path
 from omninav.pipeline.report.metrics import STATISTICS, humanise, title
 
 ROOT = Path(__file__).resolve().parents[2]
-HEAD = "## Figures of a run"
+HEAD = "## Metrics of a run"
 HOLE = "…"
 
 
 def explained() -> set[str]:
-    """The first column of the glossary's tables of figures; a number that a parameter sets stands there as `…`."""
+    """The first column of the glossary's tables of metrics; a number that a parameter sets stands there as `…`."""
     _, _, section = (ROOT / "docs/glossary.md").read_text().partition(HEAD)
     rows = [line.split("|")[1].strip() for line in section.splitlines() if line.startswith("| ")]
     return {label for row in rows for label in row.split("; ")}

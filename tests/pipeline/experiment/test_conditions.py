@@ -3,7 +3,7 @@ from pathlib import Path
 from made_experiments import experiment, run_with
 
 from omninav.pipeline.experiment.conditions import ConditionRun, results_by_condition
-from omninav.pipeline.experiment.result import Cell, figures_of
+from omninav.pipeline.experiment.result import Cell, summary_of
 from omninav.pipeline.experiment.specification import Condition
 from omninav.pipeline.experiment.verdicts import key_of
 
@@ -23,5 +23,5 @@ def test_a_cell_has_mean_and_median_the_spread_of_several_runs_and_the_figure_of
     runs = {("w", n): run_with(**given) for n, given in enumerate(({"error": 3.0}, {"error": 5.0}, {}))}
     results = {one: {("w", 0): run_with(error=3.0)}, several: runs}
     compared = experiment(sweep={"method": {"a": "", "b": ""}})
-    _, cells, _ = figures_of(compared, results, {several: {("d", 0): run_with(error=9.0)}})
+    _, cells, _ = summary_of(compared, results, {several: {("d", 0): run_with(error=9.0)}})
     assert cells["error"] == (Cell(("a",), 3.0, None, 3.0, 1, 1), Cell(("b",), 4.0, 1.0, 4.0, 2, 3, 9.0))

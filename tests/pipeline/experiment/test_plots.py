@@ -11,7 +11,7 @@ from made_experiments import experiment, run_with
 
 from omninav.pipeline.experiment import plots
 from omninav.pipeline.experiment.plots import plots_of
-from omninav.pipeline.experiment.result import ExperimentResult, figures_of
+from omninav.pipeline.experiment.result import ExperimentResult, summary_of
 from omninav.pipeline.experiment.verdicts import key_of
 from omninav.pipeline.report.plot_style import plot
 
@@ -38,7 +38,7 @@ def drawn(methods: int, levels: tuple[float, ...] = (1.0,), **page: object) -> l
             (f"world {d}", 0): run_with(error=10.0 * number**2 + d, along=3 * [level * (1 + d / 2)], odo=[7.0] * 3)
             for d in (-1, 1)
         }
-    result = ExperimentResult("test", "", "full", "", "", *figures_of(plotted, results, {}))
+    result = ExperimentResult("test", "", "full", "", "", *summary_of(plotted, results, {}))
     return [cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_COLOR) for p in plots_of(plotted, result)]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from omninav.pipeline.experiment.series import aggregated, at, figure_at, series_at
+from omninav.pipeline.experiment.series import aggregated, at, series_at, value_at
 
 RESULT = {
     "error_m": {"mean": 2.0},
@@ -39,12 +39,12 @@ def test_a_path_leads_through_names_numbers_and_stars():
     ],
 )
 def test_what_is_taken_of_a_series(take, figure):
-    assert figure_at(RESULT, "growth.references", take) == pytest.approx(figure)
+    assert value_at(RESULT, "growth.references", take) == pytest.approx(figure)
 
 
 def test_a_part_of_a_series_counts_from_its_start():
-    assert figure_at(RESULT, "growth.references", "change", (0.5, 1.0)) == 1.0
-    assert figure_at(RESULT, "growth.references", "mean", (0.0, 0.5)) == 15.0
+    assert value_at(RESULT, "growth.references", "change", (0.5, 1.0)) == 1.0
+    assert value_at(RESULT, "growth.references", "mean", (0.0, 0.5)) == 15.0
 
 
 def test_an_entry_that_lies_partly_in_the_window_counts():
@@ -62,17 +62,17 @@ def test_one_entry_is_enough_where_nothing_is_compared():
 def test_what_is_no_number_is_not_there():
     series = [True, "3", float("nan"), float("inf"), 2, None]
     assert series_at({"a": series}, "a") == [None, None, None, None, 2.0, None]
-    assert figure_at({"a": True}, "a") is None
-    assert figure_at({"a": series}, "a") == 2.0
+    assert value_at({"a": True}, "a") is None
+    assert value_at({"a": series}, "a") == 2.0
 
 
 def test_entries_that_are_not_there_are_left_out_and_too_few_give_nothing():
-    assert figure_at(RESULT, "laps.*.error_m.mean", "slope") == pytest.approx(-0.15)
+    assert value_at(RESULT, "laps.*.error_m.mean", "slope") == pytest.approx(-0.15)
     assert aggregated([None, 1.0], "change") is None
     assert aggregated([None], "mean") is None
     assert aggregated([0.0, 1.0], "ratio") is None
 
 
 def test_paths_joined_by_plus_are_added_and_one_that_is_missing_leaves_none():
-    assert figure_at(RESULT, "error_m.mean + logs.0.error_m.mean") == 5.0
-    assert figure_at(RESULT, "error_m.mean + logs.5.error_m.mean") is None
+    assert value_at(RESULT, "error_m.mean + logs.0.error_m.mean") == 5.0
+    assert value_at(RESULT, "error_m.mean + logs.5.error_m.mean") is None

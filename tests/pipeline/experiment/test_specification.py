@@ -3,7 +3,7 @@
 import made_experiments
 import pytest
 
-from omninav.pipeline.experiment.specification import figure_of, read_experiment
+from omninav.pipeline.experiment.specification import read_experiment, value_of
 from omninav.pipeline.graph.problems import ProblemsFound
 
 FILE = made_experiments.FILE | {
@@ -194,9 +194,9 @@ def test_a_profile_may_bring_a_mapping_that_the_file_does_not_have():
 def test_the_paper_s_figure_of_a_condition_lies_under_its_row_and_column():
     file = FILE | {"published": {"error": {"first": {"a": 3, "b": 1.5}, "second": {"a": "none"}}}}
     found = read_experiment(file, "full")
-    figures = [found.published_figure("error", condition.labels) for condition in found.conditions()]
+    figures = [found.published_value("error", condition.labels) for condition in found.conditions()]
     assert figures == [3.0, None, 1.5, None]
-    assert found.published_figure("time", found.conditions()[0].labels) is None
+    assert found.published_value("time", found.conditions()[0].labels) is None
 
 
 RESULT = {
@@ -222,7 +222,7 @@ RESULT = {
 )
 def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, object], figure: float | None):
     measures = {"error": {"title": "Error", **measure}}
-    assert figure_of(read_experiment(FILE | {"measures": measures}, "full").measures["error"], RESULT) == figure
+    assert value_of(read_experiment(FILE | {"measures": measures}, "full").measures["error"], RESULT) == figure
 
 
 def test_what_a_file_leaves_out():
