@@ -11,8 +11,8 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.config_text import config_text
 from omninav.pipeline.run.plan import Plan, check_inputs, plan
 
+from .arguments import arguments_of
 from .plain_errors import plain_errors
-from .words import words_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +64,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
     are settings. Nothing runs, and no log is opened. Raises `ProblemsFound` with everything that is wrong, and
     `BadInput`.
     """
-    typed = words_of(words, settings)
+    typed = arguments_of(words, settings)
     if any(word.lstrip("+").startswith("experiment=") for word in typed):
         raise BadInput(f"{' '.join(typed)}: experiments run on the command line: omninav {' '.join(typed)}")
     with composed(typed) as config:

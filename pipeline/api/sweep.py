@@ -7,15 +7,15 @@ from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.cli.arguments import number_of, value_text
 from omninav.pipeline.cli.commands.run import command
 from omninav.pipeline.cli.overrides import MAX_JOBS
-from omninav.pipeline.cli.words import number_of, word_of
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.tables import read_table
 
+from .arguments import arguments_of
 from .plain_errors import plain_errors
 from .run import Run
-from .words import words_of
 
 
 class Sweep:
@@ -71,7 +71,7 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     """
     fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
     swept = [f"{name}={_values(name, values)}" for name, values in settings.items() if name not in fixed]
-    place = [f"hydra.sweep.dir={word_of(Path(folder))}"] if folder else []
+    place = [f"hydra.sweep.dir={value_text(Path(folder))}"] if folder else []
     made: list[Path] = []
     before = sys.argv
     try:
@@ -79,7 +79,7 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
             if not progress:
                 quiet.enter_context(redirect_stdout(io.StringIO()))
                 quiet.enter_context(redirect_stderr(io.StringIO()))
-            command(["-m", *words_of(words, fixed), *swept, *place], on_sweep=made.append)
+            command(["-m", *arguments_of(words, fixed), *swept, *place], on_sweep=made.append)
     finally:
         sys.argv = before  # it is what the manifests of jobs say
     if not made:
@@ -93,7 +93,7 @@ def _values(name: str, values: list[Any] | tuple[Any, ...] | range) -> str:
         raise BadInput(f"{name}: a sweep of {number:,} values, expected 1 to {MAX_JOBS:,}")
     if isinstance(values, range):
         return f"range({values.start},{values.stop},{values.step})"
-    return ",".join(map(word_of, values))
+    return ",".join(map(value_text, values))
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> Sweep:

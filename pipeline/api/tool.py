@@ -6,8 +6,8 @@ from omninav.pipeline.cli.commands.tool import run_tool
 from omninav.pipeline.cli.tools import tools
 from omninav.pipeline.graph.problems import BadInput, suggest
 
+from .arguments import setting_argument
 from .plain_errors import plain_errors
-from .words import setting_word
 
 
 @plain_errors()
@@ -19,4 +19,4 @@ def tool(name: str, *words: str, **arguments: Any) -> None:
     """
     if name not in tools():
         raise BadInput(f"'{name}': there is no such tool; {suggest(name, tools(), 'tools')}")
-    run_tool(name, [*words, *(setting_word(key, value) for key, value in arguments.items())])
+    run_tool(name, [*words, *(setting_argument(key, value) for key, value in arguments.items())])

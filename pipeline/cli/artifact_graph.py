@@ -14,9 +14,9 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import signature
 
+from .arguments import value_text
 from .composition_cache import parsed
 from .config_groups import LEARN, node_option, option_content
-from .words import word_of
 
 MAKING = ("choices", "nodes", "wires")
 """Keys of an artifact's specification that change the graph which makes it."""
@@ -71,7 +71,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
     groups = words_of_graph(str(variant.variant), {**options, **spec["choices"]})
     return [
         *(word for word in groups if word.lstrip("+~").partition("=")[0] not in set_by_hand),
-        *(f"++nodes.{name}={word_of(OmegaConf.to_container(node, resolve=False))}" for name, node in shared.items()),
+        *(f"++nodes.{name}={value_text(OmegaConf.to_container(node, resolve=False))}" for name, node in shared.items()),
         *(change for each in specs for change in _changes(name, each, swapped)),
         *(f"++saves.{key}={each['output']}" for key, each in {name: spec, **beside}.items() if each.get("output")),
         *(text for key, text in typed if key not in (LEARN, "variant")),
@@ -89,7 +89,7 @@ def _changes(name: str, spec: Mapping[str, Any], swapped: Mapping[str, Any]) -> 
     for block in ("nodes", "wires"):
         for node, change in (spec.get(block) or {}).items():
             if block == "wires" or not unfit_changes(name, {node: change}, swapped):
-                yield f"++{block}.{node}={word_of(change)}"
+                yield f"++{block}.{node}={value_text(change)}"
 
 
 def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any]) -> list[Problem]:

@@ -21,13 +21,13 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
+from .arguments import read_flags
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
 from .composition_cache import TYPED
 from .config_groups import config_file, listed_groups, replaced, settings_left_open, stand_ins
 from .hydra_session import hydra_started
 from .overrides import composed_of
 from .stand_ins import contradictions, take_stand_ins
-from .words import read_flags
 
 OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """Keys that a variant's file sets; everything else in a configuration is a setting."""

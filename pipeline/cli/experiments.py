@@ -19,13 +19,13 @@ from omninav.pipeline.experiment.specification import FULL, Experiment, read_exp
 from omninav.pipeline.experiment.verdicts import Verdict, unmeasured
 from omninav.pipeline.graph.problems import BadInput, counted
 
+from .arguments import condition_arguments
 from .composition import complete, read_words
 from .composition_cache import compose
 from .config_groups import config_file, listed_groups
 from .hydra_session import hydra_started
 from .overrides import composed_of
 from .terminal import show, shown
-from .words import condition_words
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -114,5 +114,5 @@ def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     def composed(words: Sequence[str]) -> dict[str, Any]:
         return complete(composed_of(words, folders))
 
-    words = [*condition_words(typed), f"cache={plain['cache'] or 'null'}"]
+    words = [*condition_arguments(typed), f"cache={plain['cache'] or 'null'}"]
     return plan_experiment(plain, composed, words, ["omninav", *arguments])

@@ -78,8 +78,8 @@ def _run(arguments: list[str]) -> int:
     try:
         from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 
+        from .arguments import refuse_twice, refuse_unreadable, without_flags
         from .config_groups import refuse_null_groups
-        from .words import refuse_twice, refuse_unreadable, without_flags
 
         refuse_unreadable(arguments)
         _refuse_lost_folder()

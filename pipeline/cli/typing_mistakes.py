@@ -6,7 +6,7 @@ A shell takes such words apart or hands them on as they are; what is said of the
 from collections.abc import Sequence
 from pathlib import Path
 
-from .words import word_of
+from .arguments import value_text
 
 WITH_VALUE = ("--config-dir", "-cd", "--cfg", "-c", "--package", "-p", "--config-name", "-cn", "--config-path", "-cp")
 """Flags whose value is the next word."""
@@ -31,7 +31,7 @@ def with_homes(arguments: Sequence[str]) -> list[str]:
 
 def _with_home(word: str) -> str:
     name, _, value = word.partition("=")
-    return f"{name}={word_of(Path(value).expanduser())}" if value == "~" or value.startswith("~/") else word
+    return f"{name}={value_text(Path(value).expanduser())}" if value == "~" or value.startswith("~/") else word
 
 
 def mistyped_word(arguments: Sequence[str]) -> str:

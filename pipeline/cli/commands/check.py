@@ -8,10 +8,10 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.arguments import condition_arguments
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.cli.objective import check_objective
-from omninav.pipeline.cli.words import condition_words
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import prefix_nodes
@@ -33,7 +33,7 @@ HYDRA_FOLDERS = ("hydra.run.dir", "hydra.sweep.dir")
 def command(arguments: list[str]) -> int:
     """Compose and check a configuration, open its inputs, and print what would run."""
     words, _ = read_words(arguments)
-    of_conditions = condition_words(words)
+    of_conditions = condition_arguments(words)
     with composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:
             return _check_experiment(config, arguments)

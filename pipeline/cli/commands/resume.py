@@ -6,8 +6,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from omninav.pipeline.cli.arguments import read_flags, refuse_unreadable
 from omninav.pipeline.cli.terminal import show_results
-from omninav.pipeline.cli.words import read_flags, refuse_unreadable
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.ports import convert_fields

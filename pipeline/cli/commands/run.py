@@ -14,6 +14,7 @@ from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.arguments import condition_arguments, flags_parser, read_flags, value_text
 from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.composition_cache import CONFIG, RUN_ALONE
 from omninav.pipeline.cli.hydra_session import hydra_started
@@ -21,7 +22,6 @@ from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_executor
 from omninav.pipeline.cli.terminal import shown
-from omninav.pipeline.cli.words import condition_words, flags_parser, read_flags, word_of
 from omninav.pipeline.files import Taken, locked
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
@@ -55,7 +55,7 @@ def command(
         def job(config: Any) -> float | None:
             return run_job(config, arguments, check)
 
-        of_conditions = condition_words(listed)
+        of_conditions = condition_arguments(listed)
         typed = [word for word in listed if word not in of_conditions]
         sys.argv = ["omninav", *(word for word in arguments if word not in of_conditions)]
         try:
@@ -141,7 +141,7 @@ def _own_folder(hydra: Any, words: Sequence[str]) -> Iterator[tuple[Path, list[s
     as_written: Any = OmegaConf.to_container(place, resolve=False)
     if "%S" in str(as_written["dir"]):  # another one may begin in the same second
         folder = new_folder(folder)
-        words_of_folder = [f"hydra.sweep.dir={word_of(folder)}"]
+        words_of_folder = [f"hydra.sweep.dir={value_text(folder)}"]
     try:
         with locked(folder / ".sweep.lock", wait=False):
             _refuse_other_sweep(folder, words)

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.cli.arguments import read_flags
 from omninav.pipeline.cli.config_groups import config_file, group_files, option_content, suggest_option
 from omninav.pipeline.cli.variant_inputs import inputs_of
-from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 

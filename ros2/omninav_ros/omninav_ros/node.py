@@ -11,7 +11,7 @@ from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from omninav.pipeline.cli.words import word_of
+from omninav.pipeline.cli.arguments import value_text
 
 from .parameters import AUTOSTART, OVERRIDES, PARAMETERS
 from .run import Run
@@ -96,7 +96,7 @@ class OmninavNode(Node):
     def _words(self) -> list[str]:
         """The settings as they are typed behind `omninav live`."""
         texts = {setting: self.get_parameter(name).value for name, (setting, _, _) in PARAMETERS.items()}
-        typed = [f"{setting}={word_of(os.path.expanduser(text))}" for setting, text in texts.items() if text]
+        typed = [f"{setting}={value_text(os.path.expanduser(text))}" for setting, text in texts.items() if text]
         return ["transport=rclpy", *typed, *filter(None, self.get_parameter("overrides").value)]
 
     def _watch(self) -> None:

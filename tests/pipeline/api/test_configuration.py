@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import omninav
-from omninav.pipeline.api.words import words_of
+from omninav.pipeline.api.arguments import arguments_of
 
 
 def test_importing_omninav_imports_nothing_heavy():
@@ -24,7 +24,7 @@ def test_every_name_that_is_offered_is_there():
 
 def test_python_values_become_the_words_that_one_would_type():
     settings = {"seed": np.int64(3), "log": Path("a b.mcap"), "grid": None, "validate": True, "cuts": [[1, 2.5]]}
-    assert words_of(("omniview_mcl", "match=l2"), settings) == [
+    assert arguments_of(("omniview_mcl", "match=l2"), settings) == [
         "variant=omniview_mcl",
         "match=l2",
         "seed=3",
@@ -34,7 +34,7 @@ def test_python_values_become_the_words_that_one_would_type():
         "cuts=[[1,2.5]]",
     ]
     with pytest.raises(omninav.BadInput, match="a ndarray cannot be a setting"):
-        words_of((), {"map": np.zeros(3)})
+        arguments_of((), {"map": np.zeros(3)})
 
 
 def test_a_configuration_knows_its_variant_and_draws_its_graph():

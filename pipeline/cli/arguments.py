@@ -1,4 +1,4 @@
-"""The words of a command line, before anything reads them as a configuration: flags, and what no word may hold."""
+"""Arguments of a command, before anything reads them as a configuration: flags, and what no word may hold."""
 
 import re
 from argparse import SUPPRESS, ArgumentParser, Namespace
@@ -87,7 +87,7 @@ def _refuse(known: Sequence[str], message: str) -> NoReturn:
     raise BadInput(f"{message}; `omninav --help` shows what to type")
 
 
-def condition_words(words: Sequence[str]) -> list[str]:
+def condition_arguments(words: Sequence[str]) -> list[str]:
     """Gives the words that are for each condition of an experiment and not for the experiment itself."""
     keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
     if "experiment" not in keys:
@@ -124,7 +124,7 @@ def _depth(word: str) -> int:
     return deepest
 
 
-def word_of(value: Any, depth: int = 0) -> str:
+def value_text(value: Any, depth: int = 0) -> str:
     """A value as it stands behind `name=`, quoted where it is a text with odd characters.
 
     `depth`: how many lists it lies within. Raises `BadInput` for what no word can hold, before it is written out.
@@ -136,7 +136,7 @@ def word_of(value: Any, depth: int = 0) -> str:
             raise BadInput(f"a whole number of more than {MAX_DIGITS} digits cannot be a setting")
         return repr(value)
     if hasattr(value, "item") and getattr(value, "ndim", None) == 0:  # a number of numpy
-        return word_of(value.item(), depth)
+        return value_text(value.item(), depth)
     if isinstance(value, str | Path):
         text = str(value)
         return text if text and all(c.isalnum() or c in "_./-" for c in text) else _quoted(text)
@@ -146,8 +146,8 @@ def word_of(value: Any, depth: int = 0) -> str:
             least = f"expected at most {MAX_WORD:,}, and {MAX_NESTING} within each other"
             raise BadInput(f"a {type(value).__name__} {what} cannot be a setting; {least}")
         if isinstance(value, Mapping):
-            return "{" + ",".join(f"{name}:{word_of(item, depth + 1)}" for name, item in value.items()) + "}"
-        return "[" + ",".join(word_of(item, depth + 1) for item in value) + "]"
+            return "{" + ",".join(f"{name}:{value_text(item, depth + 1)}" for name, item in value.items()) + "}"
+        return "[" + ",".join(value_text(item, depth + 1) for item in value) + "]"
     raise BadInput(f"a {type(value).__name__} cannot be a setting; give a number, a text, a path, or a list of them")
 
 

@@ -1,13 +1,13 @@
-"""Python values as the words of a command line."""
+"""Python values as arguments of a command."""
 
 from collections.abc import Mapping
 from typing import Any
 
-from omninav.pipeline.cli.words import word_of
+from omninav.pipeline.cli.arguments import value_text
 from omninav.pipeline.graph.problems import BadInput, shown
 
 
-def words_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
+def arguments_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
     """Words as they would be typed: `"omniview_mcl", seed=3` is `variant=omniview_mcl seed=3`.
 
     A first word without `=` is a variant's name. Raises `BadInput` for a value that no word can hold.
@@ -15,13 +15,13 @@ def words_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
         typed[0] = f"variant={typed[0]}"
-    return [*typed, *(setting_word(name, value) for name, value in settings.items())]
+    return [*typed, *(setting_argument(name, value) for name, value in settings.items())]
 
 
-def setting_word(name: str, value: Any) -> str:
+def setting_argument(name: str, value: Any) -> str:
     """A setting as it would be typed. Raises `BadInput` for a value that no word can hold."""
     try:
-        return f"{name}={word_of(value)}"
+        return f"{name}={value_text(value)}"
     except BadInput as refused:
         raise BadInput(f"{name}: {refused}") from None
 
