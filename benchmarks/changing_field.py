@@ -134,7 +134,7 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     `limit`: a given limit between views, instead of a measured one. `words`: what else would be typed.
     """
     from omninav.pipeline.cli.composition import complete, composed
-    from omninav.pipeline.run.plan import plan
+    from omninav.pipeline.run.prepared_run import prepare_run
 
     with composed([f"variant={variant}", *words]) as composition:
         config = complete(composition)
@@ -153,4 +153,4 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     config["saves"] = {}  # the map that is saved is made after the last tick, by nodes that are not kept
     for artifact in config["artifacts"].values():
         artifact["must_match"] = []  # the views come from the field, not from the nodes that a map is compared by
-    return plan(config).graph
+    return prepare_run(config).graph

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.pipeline.run.run_folder import RunFolder, start
 from toys import graph_of_toys
 
@@ -35,10 +35,10 @@ class Stop:
 
 def begun(config: Mapping[str, Any]) -> RunFolder:
     """A run that has been started and has done nothing yet."""
-    return start(plan(config), ["omninav", "variant=toy"])
+    return start(prepare_run(config), ["omninav", "variant=toy"])
 
 
 def ended(config: Mapping[str, Any]) -> RunFolder:
     run = begun(config)
-    execute(run, plan(config))
+    execute(run, prepare_run(config))
     return run

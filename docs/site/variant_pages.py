@@ -13,7 +13,7 @@ from omninav.pipeline.cli.config_groups import group_files
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.run.inputs import read_inputs
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 GOAL = Path(__file__).resolve().parents[1] / "experiments" / "topological_nav_homing_vectors_campus.png"
 NEEDED = {"topological_nav": ["goal=kitchen"], "landmark_nav": [f"goal={GOAL}"]}
@@ -30,7 +30,7 @@ def variants_page() -> dict[str, str]:
             name = file.name.removesuffix(".yaml")
             config = compose("config", overrides=[f"variant={name}", *NEEDED.get(name, [])])
             lines += _described(name, file.read_text(encoding="utf-8"), config.inputs)
-            pictures[f"reference/{name}.svg"] = svg(plan(complete(config)).graph)
+            pictures[f"reference/{name}.svg"] = svg(prepare_run(complete(config)).graph)
     return {"reference/variants.md": "\n".join(lines)} | pictures
 
 

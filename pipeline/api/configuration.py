@@ -9,7 +9,7 @@ from typing import Any
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.config_text import config_text
-from omninav.pipeline.run.plan import Plan, check_inputs, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, check_inputs, prepare_run
 
 from .arguments import arguments_of
 from .plain_errors import plain_errors
@@ -33,9 +33,9 @@ class Configuration:
         return str(self.settings.get("variant"))
 
     @cached_property
-    def plan(self) -> Plan:
+    def prepared(self) -> PreparedRun:
         """The checked graph and where its artifacts come from."""
-        return plan(self.settings)
+        return prepare_run(self.settings)
 
     def with_(self, *words: str, **settings: Any) -> "Configuration":
         """The same with more words: `configuration.with_("match=l2", seed=3)`."""
@@ -54,7 +54,7 @@ class Configuration:
     def _repr_svg_(self) -> str:
         from omninav.pipeline.report.graph_svg import svg
 
-        return svg(self.plan.graph)
+        return svg(self.prepared.graph)
 
 
 def compose(*words: str, **settings: Any) -> Configuration:
@@ -69,7 +69,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
         raise BadInput(f"{' '.join(typed)}: experiments run on the command line: omninav {' '.join(typed)}")
     with composed(typed) as config:
         made = Configuration(tuple(typed), complete(config))
-    made.plan  # noqa: B018 - raises what is wrong with the graph
+    made.prepared  # noqa: B018 - raises what is wrong with the graph
     return made
 
 
@@ -77,7 +77,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
 def check(*words: str, **settings: Any) -> Configuration:
     """`compose`, and open every file that the run would read, so that nothing is found to be missing later."""
     made = compose(*words, **settings)
-    check_inputs(made.plan)
+    check_inputs(made.prepared)
     return made
 
 

@@ -19,7 +19,7 @@ from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import key_table
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing
-from omninav.pipeline.run.plan import load_stages
+from omninav.pipeline.run.prepared_run import load_stages
 from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
 from omninav.pipeline.tables import read_table
 
@@ -188,9 +188,9 @@ def run(
     """
     made = configured(words, settings)
     place = None if folder is None else no_run_in(Path(folder))
-    begun = start(made.plan, ["omninav", *made.words], place)
+    begun = start(made.prepared, ["omninav", *made.words], place)
     with Progress() as shown:
-        execute(begun, made.plan, shown if progress else None)
+        execute(begun, made.prepared, shown if progress else None)
     return Run(begun.folder)
 
 

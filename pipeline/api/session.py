@@ -16,7 +16,7 @@ from omninav.pipeline.graph.problems import BadInput, ProblemsFound, suggest
 from omninav.pipeline.graph.pushed import Pushed, push
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.run.execution import execute, running
-from omninav.pipeline.run.plan import Plan
+from omninav.pipeline.run.prepared_run import PreparedRun
 from omninav.pipeline.run.resume import reopened
 from omninav.pipeline.run.run_folder import STEPS, RunFolder, start
 
@@ -83,13 +83,13 @@ class Session(AbstractContextManager["Session"]):
     at a time.
     """
 
-    def __init__(self, run: RunFolder, planned: Plan) -> None:
-        source = planned.graph.source
+    def __init__(self, run: RunFolder, prepared: PreparedRun) -> None:
+        source = prepared.graph.source
         if source is None or not isinstance(source.stage, Pushed):
-            raise BadInput(f"{planned.variant}: nothing can be pushed into its source; type {PUSHED}")
-        self._source, self._run, self._names = source.stage, run, outputs_by_name(planned.graph)
+            raise BadInput(f"{prepared.variant}: nothing can be pushed into its source; type {PUSHED}")
+        self._source, self._run, self._names = source.stage, run, outputs_by_name(prepared.graph)
         self._stack = ExitStack()
-        self._engine: Engine = self._stack.enter_context(running(run, planned))
+        self._engine: Engine = self._stack.enter_context(running(run, prepared))
         self._given = self._engine.calls[source.name].times
         self._over: str | None = None
         self._process, self._used = os.getpid(), threading.Lock()
@@ -217,7 +217,7 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
         why = f"{found.problems[0].where}: {found.problems[0].what}"
         raise BadInput(f"{' '.join(typed):.80}: nothing can be pushed into it ({why}); use omninav.run") from None
     place = None if folder is None else no_run_in(Path(folder))
-    return Session(start(made.plan, ["omninav", *made.words], place), made.plan)
+    return Session(start(made.prepared, ["omninav", *made.words], place), made.prepared)
 
 
 @plain_errors()
@@ -232,12 +232,12 @@ def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] 
     run = RunFolder(given)
     try:
         with only_listed(trust):
-            planned = reopened(run, given)
-            if planned is None:
+            prepared = reopened(run, given)
+            if prepared is None:
                 return Run(given)
-            if planned.graph.source is not None and isinstance(planned.graph.source.stage, Pushed):
-                return Session(run, planned)
-            execute(run, planned)
+            if prepared.graph.source is not None and isinstance(prepared.graph.source.stage, Pushed):
+                return Session(run, prepared)
+            execute(run, prepared)
             return Run(given)
     finally:
         os.chdir(here)  # a run goes on where it was started

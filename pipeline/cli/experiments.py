@@ -14,7 +14,7 @@ from omninav.pipeline.experiment.best import best_condition
 from omninav.pipeline.experiment.conditions import results_by_condition
 from omninav.pipeline.experiment.pages import Judged
 from omninav.pipeline.experiment.result import ExperimentResult, read_result, result_files
-from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
+from omninav.pipeline.experiment.runner import ExperimentRun, prepare_experiment
 from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
 from omninav.pipeline.experiment.verdicts import Verdict, unmeasured
 from omninav.pipeline.graph.problems import BadInput, counted
@@ -37,7 +37,7 @@ MORE_SCENARIOS = "undecided"
 
 def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Run every condition and repetition of an experiment's file, and write its page. 1 where a job failed."""
-    run = planned_experiment(config, arguments)
+    run = prepared_experiment(config, arguments)
     well = run.run()
     for problem in unmeasured(run.experiment, results_by_condition(run.conditions)):
         print(problem, file=sys.stderr)
@@ -106,7 +106,7 @@ def without_graph(words: Sequence[str], config_dirs: Sequence[str] = ()) -> Any:
     return composed_of(words, config_dirs)
 
 
-def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
+def prepared_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
     plain = resolved_but_for_the_experiment(config)
     typed, folders = read_words(arguments)
@@ -115,4 +115,4 @@ def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
         return complete(composed_of(words, folders))
 
     words = [*condition_arguments(typed), f"cache={plain['cache'] or 'null'}"]
-    return plan_experiment(plain, composed, words, ["omninav", *arguments])
+    return prepare_experiment(plain, composed, words, ["omninav", *arguments])

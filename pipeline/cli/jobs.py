@@ -5,7 +5,7 @@ import os
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.files import locked, write_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import Prepare, prepare_run
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import Interrupted, start, was_started
 
@@ -60,19 +60,19 @@ class JobEnd:
     """Its number in the sweep."""
 
 
-def run_job(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> float | None:
+def run_job(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run) -> float | None:
     """Run what a configuration describes, say how it ended, and return its objective, if one is named (see `_run`).
 
     In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
     as a failed trial (NaN would end the whole sweep).
     """
-    end = ended(config, arguments, check)
+    end = ended(config, arguments, prepare)
     report_end(end)
     leave_outcome(end, write_page(Path(end.sweep)) if end.sweep else None)
     return end.objective
 
 
-def ended(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> JobEnd:
+def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run) -> JobEnd:
     """Run what a configuration describes. How that ended stands in the manifest of a sweep's job by then."""
     sweep, folder = _sweep_job(), _folder()
     of_experiment = config.get("experiment") is not None
@@ -85,7 +85,7 @@ def ended(config: Any, arguments: Sequence[str], check: Callable[[Mapping[str, A
 
             code = run_experiment(config, arguments)
         else:
-            objective = _run(config, sweep, folder, check)
+            objective = _run(config, sweep, folder, prepare)
     except (ProblemsFound, BadInput) as wrong:
         code, error = 2, str(wrong)
     except StageFailed as failed:
@@ -128,26 +128,24 @@ def leave_outcome(end: JobEnd, page: Path | None) -> None:
             file.write(f"{end.code} {page or ''}\n")
 
 
-def _run(
-    config: Any, sweep: SweepJob | None, folder: Path | None, check: Callable[[Mapping[str, Any]], Plan]
-) -> float | None:
+def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prepare) -> float | None:
     """Run a configuration. Returns its `objective`, None where none is named."""
     from omninav.pipeline.report.progress import Progress
 
     settings = complete(config)
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
-    planned = check(settings)
-    check_objective(settings.get("objective"), planned.graph)
+    prepared = prepare(settings)
+    check_objective(settings.get("objective"), prepared.graph)
     if sweep is None and folder is not None:
         no_run_in(folder)
     argv = ["omninav", *(sweep.overrides if sweep else sys.argv[1:])]
     with Progress() as progress, compile_notice(progress.say):
-        if sweep is not None and folder is not None and was_started(folder, planned):
+        if sweep is not None and folder is not None and was_started(folder, prepared):
             run, metrics = resume(folder, progress)  # the sweep was stopped and is typed again, or this job has died
         else:
-            run = start(planned, argv, folder, _hydra_files(config))
-            metrics = execute(run, planned, progress)
+            run = start(prepared, argv, folder, _hydra_files(config))
+            metrics = execute(run, prepared, progress)
     if sweep is None:
         show_results(run.folder, metrics, run.manifest)
     else:

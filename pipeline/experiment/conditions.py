@@ -12,7 +12,7 @@ from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.artifact_specification import without_plotted
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 
 from .repetition import artifact_key, condition_key, finished, known_digests
 from .specification import Condition, Experiment
@@ -34,7 +34,7 @@ class ConditionRun:
     shared: bool = True
     """Whether its repetitions share what does not depend on the seed, and other experiments its results."""
     config: dict[str, Any] = field(default_factory=dict)
-    planned: Plan | None = None
+    prepared: PreparedRun | None = None
     key: str = ""
     """The hash of everything but the seed that decides the results."""
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
@@ -91,7 +91,7 @@ def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose
                     composed[run.overrides] = compose(run.overrides)
                 plain = json.loads(json.dumps(composed[run.overrides], default=str))
                 run.config = dict(without_plotted(plain))
-                run.planned = plan(run.config)
+                run.prepared = prepare_run(run.config)
             except ProblemsFound as found:
                 problems += [Problem(f"{run.name}: {p.where}", p.what, p.hint) for p in found.problems]
             progress.update(name, number, len(runs))
@@ -102,7 +102,7 @@ def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose
 
 def _unknown_stages(experiment: Experiment, runs: Sequence[ConditionRun]) -> list[Problem]:
     """Stages whose time is measured and that no condition has."""
-    graphs = [run.planned.graph for run in runs if run.planned is not None]
+    graphs = [run.prepared.graph for run in runs if run.prepared is not None]
     there = sorted({name for graph in graphs for name in graph.nodes})
     return [
         Problem(f"experiment.measures.{name}", f"no condition has a stage '{stage}'", suggest(stage, there, "stages"))
@@ -115,9 +115,9 @@ def _unknown_stages(experiment: Experiment, runs: Sequence[ConditionRun]) -> lis
 def open_inputs(runs: Sequence[ConditionRun]) -> None:
     """Open every file that the runs read. Raises `BadInput` where one cannot be read."""
     for run in runs:
-        assert run.planned is not None
-        known_digests(run.planned.graph)
-        for artifact in run.planned.artifacts:
+        assert run.prepared is not None
+        known_digests(run.prepared.graph)
+        for artifact in run.prepared.artifacts:
             artifact_key(artifact)
 
 
@@ -127,13 +127,13 @@ def timed_groups(experiment: Experiment) -> list[tuple[str, ...]]:
 
 
 def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
-    """Plan every run again, with the recordings that it reads by now, and find the results of earlier attempts."""
+    """Prepare every run again, with the recordings that it reads by now, and find the results of earlier attempts."""
     for run in runs:
         if run.error:
             continue
         try:
-            run.planned = plan(run.config)
-            run.key = condition_key(run.planned, timed_groups(experiment))
+            run.prepared = prepare_run(run.config)
+            run.key = condition_key(run.prepared, timed_groups(experiment))
             place = run.config.get("cache") if run.shared else None  # what is timed is timed again
             run.results = finished(run.folder, run.key, run.seeds, Cache(Path(place)) if place else None)
         except (ProblemsFound, BadInput) as wrong:

@@ -34,7 +34,7 @@ from omninav.pipeline.jobs.job import Send
 from omninav.pipeline.jobs.progress import Heartbeat
 from omninav.pipeline.report.metrics import metric_values
 from omninav.pipeline.run.artifacts import Execution, obtain
-from omninav.pipeline.run.plan import ArtifactPlan, Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedArtifact, PreparedRun, prepare_run
 from omninav.pipeline.run.results import notes_of, results_of
 from omninav.pipeline.run.run_folder import RunFolder
 from omninav.pipeline.run.timing import stage_times
@@ -56,24 +56,24 @@ def measured(graph: Graph) -> Graph:
     return graph.leading_to(origins)
 
 
-def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
+def condition_key(prepared: PreparedRun, groups: Sequence[Sequence[str]] = ()) -> str:
     """The hash of everything but the seed that decides a condition's results. Its inputs must be there.
 
     `groups`: stages whose time together is among them.
     """
-    graph = measured(planned.graph)
+    graph = measured(prepared.graph)
     parts = [
         module_version(__name__),
         graph_digest(graph),
         *known_digests(graph),
         *("+".join(group) for group in groups),
     ]
-    for artifact in planned.artifacts:
+    for artifact in prepared.artifacts:
         parts += [artifact.name, artifact_key(artifact)]
     return digest_text("condition", *parts)
 
 
-def artifact_key(artifact: ArtifactPlan) -> str:
+def artifact_key(artifact: PreparedArtifact) -> str:
     """The hash of everything that decides an artifact's content. Its inputs must be there."""
     if artifact.graph is None:
         assert artifact.file is not None
@@ -143,11 +143,11 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
 
 def _repeat(given: Mapping[str, Any], run: RunFolder, send: Send) -> None:
     folder = Path(given["folder"])
-    planned = plan(given["config"])
-    if planned.digest != given["code"]:
+    prepared = prepare_run(given["config"])
+    if prepared.digest != given["code"]:
         raise BadInput("the code has changed while the experiment ran; type the same command again")
-    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
-    graph = measured(planned.graph)
+    cache = Cache(Path(str(prepared.config["cache"]))) if prepared.config.get("cache") else None
+    graph = measured(prepared.graph)
     known = finished(folder, given["key"], given["seeds"], cache if given["shared"] else None)
     for seed in known:
         send({"seed": seed})
@@ -158,7 +158,7 @@ def _repeat(given: Mapping[str, Any], run: RunFolder, send: Send) -> None:
     execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     artifacts: dict[str, Value] = {}
     facts: dict[str, Any] = {}
-    for artifact in planned.artifacts:
+    for artifact in prepared.artifacts:
         artifacts[artifact.name], made = obtain(execution, artifact)
         facts[artifact.name] = made
         (run.folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it

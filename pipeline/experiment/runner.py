@@ -168,7 +168,7 @@ class ExperimentRun:
                 "folder": str(run.folder),
                 "part": f"seeds{several}",
                 "key": run.key,
-                "code": run.planned.digest if run.planned is not None else "",
+                "code": run.prepared.digest if run.prepared is not None else "",
                 "seeds": seeds,
                 "shared": run.shared,
                 "groups": timed_groups(self.experiment),
@@ -252,7 +252,7 @@ def _condition(run: ConditionRun, common: Sequence[str]) -> ConditionRow:
     return ConditionRow(run.name, f"{len(run.results)}/{len(run.seeds)}", first.get("context", {}), own)
 
 
-def plan_experiment(
+def prepare_experiment(
     config: Mapping[str, Any], compose: Compose, overrides: Sequence[str], argv: Sequence[str]
 ) -> ExperimentRun:
     """The experiment of a composed configuration, checked. Raises `ProblemsFound` where it or a condition is wrong.

@@ -19,7 +19,7 @@ from omninav.pipeline.graph.stage import Context
 from omninav.pipeline.jobs.job import Job, Send
 from omninav.pipeline.jobs.progress import Heartbeat
 from omninav.pipeline.run.artifacts import Execution, obtain
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 from omninav.pipeline.run.run_folder import RunFolder
 
 from .conditions import ConditionRun
@@ -68,8 +68,8 @@ class Recording:
         parameters = self.stage.replay(self.folder)
         for run, artifact in self.readers:
             config = run.config if artifact is None else run.config["artifacts"][artifact]["graph"]
-            assert run.planned is not None
-            node = _source_of(run.planned, artifact)
+            assert run.prepared is not None
+            node = _source_of(run.prepared, artifact)
             assert node is not None
             kept = {name: value for name, value in config["nodes"][node.name].items() if name not in parameters}
             changed = {name: value for name, value in parameters.items() if value is not None}
@@ -80,10 +80,10 @@ def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]
     """Records what the runs' sources would compute, each once; recordings lie in `folder` without a cache."""
     found: dict[str, Recording] = {}
     for run in runs:
-        assert run.planned is not None
+        assert run.prepared is not None
         place = Path(str(run.config.get("cache") or folder)).resolve() / "recordings"
-        for artifact in (None, *(each.name for each in run.planned.artifacts if each.graph is not None)):
-            node = _source_of(run.planned, artifact)
+        for artifact in (None, *(each.name for each in run.prepared.artifacts if each.graph is not None)):
+            node = _source_of(run.prepared, artifact)
             if node is None or not isinstance(node.stage, Recordable):
                 continue
             key = node.stage.recording_key()
@@ -97,10 +97,10 @@ def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]
     return list(found.values())
 
 
-def _source_of(planned: Plan, artifact: str | None) -> Node | None:
+def _source_of(prepared: PreparedRun, artifact: str | None) -> Node | None:
     if artifact is None:
-        return planned.graph.source
-    graph = next(each.graph for each in planned.artifacts if each.name == artifact)
+        return prepared.graph.source
+    graph = next(each.graph for each in prepared.artifacts if each.name == artifact)
     return graph.source if graph is not None else None
 
 
@@ -126,7 +126,7 @@ def _stated(folder: Path) -> dict[str, Any]:
 
 def record(given: Mapping[str, Any], send: Send) -> None:
     """Record a source, as a job: that of the plain configuration `config`, or of its `artifact`, into `folder`."""
-    node = _source_of(plan(given["config"]), given["artifact"])
+    node = _source_of(prepare_run(given["config"]), given["artifact"])
     assert node is not None
     assert isinstance(node.stage, Recordable)
     folder = Path(given["folder"])
@@ -187,8 +187,8 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
     """The artifacts that runs make by a graph, each once."""
     found: dict[str, SharedArtifact] = {}
     for run in runs:
-        assert run.planned is not None
-        for artifact in run.planned.artifacts:
+        assert run.prepared is not None
+        for artifact in run.prepared.artifacts:
             if artifact.graph is None:
                 continue
             name = f"{artifact.name} {artifact_key(artifact)[:12]}"
@@ -201,11 +201,11 @@ def make_artifact(given: Mapping[str, Any], send: Send) -> None:
     """Make an artifact, as a job: the one called `name` of the plain configuration `config`, into `folder`."""
     run = RunFolder(Path(given["folder"]))
     with locked(run.folder.with_suffix(".lock")):  # a job whose experiment was killed lives on for a moment
-        planned = plan(given["config"])
-        cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
+        prepared = prepare_run(given["config"])
+        cache = Cache(Path(str(prepared.config["cache"]))) if prepared.config.get("cache") else None
         execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
         run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
-        for artifact in planned.artifacts:
+        for artifact in prepared.artifacts:
             if artifact.name == given["name"]:
                 obtain(execution, artifact)
         shutil.rmtree(run.memory, ignore_errors=True)

@@ -1,1 +1,1 @@
-"""One run: its plan, its folder, its manifest and its results."""
+"""One run: its graph, its folder, its manifest and its results."""

@@ -20,7 +20,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.stage import Source
 from omninav.pipeline.graph.value import Value
 
-from .plan import ArtifactPlan, digests_of, stages_of
+from .prepared_run import PreparedArtifact, digests_of, stages_of
 from .results import notes_of
 from .run_folder import RunFolder
 
@@ -59,7 +59,7 @@ def identity(graph: Graph, seed: int, *more: str) -> str:
     return digest_text(graph_digest(graph), str(seed), *digests_of(graph).values(), *more)
 
 
-def companions(artifact: ArtifactPlan, artifacts: Sequence[ArtifactPlan]) -> list[ArtifactPlan]:
+def companions(artifact: PreparedArtifact, artifacts: Sequence[PreparedArtifact]) -> list[PreparedArtifact]:
     """The other artifacts that are outputs of the same graph: one run makes them all."""
     if artifact.whole is None:
         return []
@@ -69,7 +69,7 @@ def companions(artifact: ArtifactPlan, artifacts: Sequence[ArtifactPlan]) -> lis
 
 
 def obtain(
-    execution: Execution, artifact: ArtifactPlan, together: Sequence[ArtifactPlan] = ()
+    execution: Execution, artifact: PreparedArtifact, together: Sequence[PreparedArtifact] = ()
 ) -> tuple[Value, dict[str, Any]]:
     """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it.
 
@@ -114,7 +114,7 @@ def found_value(cache: Cache, key: str, suffix: str, seed: int) -> tuple[Path, V
 
 
 def _into(
-    cache: Cache, seed: int, made: Iterable[tuple[ArtifactPlan, Value, dict[str, Any], bool]]
+    cache: Cache, seed: int, made: Iterable[tuple[PreparedArtifact, Value, dict[str, Any], bool]]
 ) -> tuple[Path, Value]:
     """Put artifacts into the cache. The first is the one that is wanted; it is read as the next run will read it."""
     files = []
@@ -141,14 +141,14 @@ def _is_linked(file: Path, link: Path) -> bool:
     return True
 
 
-def _key(artifact: ArtifactPlan) -> str:
+def _key(artifact: PreparedArtifact) -> str:
     assert artifact.graph is not None
     return digest_text("artifact", graph_digest(artifact.graph), artifact.origin, *digests_of(artifact.graph).values())
 
 
 def _make(
-    execution: Execution, wanted: Sequence[ArtifactPlan]
-) -> Iterator[tuple[ArtifactPlan, Value, dict[str, Any], bool]]:
+    execution: Execution, wanted: Sequence[PreparedArtifact]
+) -> Iterator[tuple[PreparedArtifact, Value, dict[str, Any], bool]]:
     """Run the graph of some artifacts; of each that it gave: value, header, and whether random numbers decided it."""
     artifact, origins = wanted[0], [each.origin for each in wanted]
     graph = artifact.graph if len(wanted) == 1 or artifact.whole is None else artifact.whole.leading_to(origins)

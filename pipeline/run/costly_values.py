@@ -12,7 +12,7 @@ from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 from omninav.pipeline.graph.value import Value
 
 from .artifacts import found_value
-from .plan import digests_of
+from .prepared_run import digests_of
 
 SUFFIX = ".value"
 

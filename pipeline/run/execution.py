@@ -1,4 +1,4 @@
-"""Running what was planned, in its folder, to the files that are left at the end."""
+"""Running what was prepared, in its folder, to the files that are left at the end."""
 
 import json
 import logging
@@ -26,7 +26,7 @@ from omninav.pipeline.graph.value import Value
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
 from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
-from .plan import Plan
+from .prepared_run import PreparedRun
 from .results import notes_of, results_of
 from .run_folder import CONFIG, STEPS, Interrupted, RunFolder, recorded_name
 from .timing import stage_times
@@ -35,27 +35,27 @@ log = logging.getLogger("omninav")
 LOG = "run.log"
 
 
-def execute(run: RunFolder, planned: Plan, display: ProgressDisplay | None = None) -> Metrics:
-    """Run a planned configuration in its folder, from its start or from where it was left, and return its metrics.
+def execute(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | None = None) -> Metrics:
+    """Run a prepared configuration in its folder, from its start or from where it was left, and return its metrics.
 
     Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
     """
-    with running(run, planned, display) as engine:
+    with running(run, prepared, display) as engine:
         while engine.tick():
             pass
     return read_metrics(run.folder)
 
 
 @contextmanager
-def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = None) -> Iterator[Engine]:
-    """The engine of a planned configuration, ready for its next tick; whoever has it calls `tick`.
+def running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | None = None) -> Iterator[Engine]:
+    """The engine of a prepared configuration, ready for its next tick; whoever has it calls `tick`.
 
     When the block ends well, what comes after the loop has run and the folder is complete. When it raises, the manifest
     says so, and the run can go on from its last checkpoint.
     """
     with run.owned(), _logged(run):
         try:
-            yield from _running(run, planned, display)
+            yield from _running(run, prepared, display)
         except KeyboardInterrupt:
             _fail(run, "interrupted", "stopped by the user")
             raise Interrupted(run.folder) from None
@@ -69,30 +69,30 @@ def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = Non
             raise
 
 
-def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> Iterator[Engine]:
-    config = planned.config
-    Engine(planned.graph, {}, EngineOptions(planned.seed)).check_source()  # before time is spent on artifacts
+def _running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | None) -> Iterator[Engine]:
+    config = prepared.config
+    Engine(prepared.graph, {}, EngineOptions(prepared.seed)).check_source()  # before time is spent on artifacts
     cache = Cache(Path(str(config["cache"])).absolute()) if config.get("cache") else None
     execution = Execution(
-        run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display, bool(config.get("validate", False))
+        run, prepared.seed, cache, float(config.get("checkpoint_s", 5.0)), display, bool(config.get("validate", False))
     )
     artifacts: dict[str, Value] = {}
     made: dict[str, Any] = {}
-    for artifact in planned.artifacts:
-        together = companions(artifact, planned.artifacts)
+    for artifact in prepared.artifacts:
+        together = companions(artifact, prepared.artifacts)
         artifacts[artifact.name], made[artifact.name] = obtain(execution, artifact, together)
     run.manifest["artifacts"] = made
     run.save()
-    own = identity(planned.graph, planned.seed, *(facts["sha256"] for facts in made.values()))
-    options = execution.options(planned.variant, run.memory, own, run.folder)
-    wanted = sorted(set(planned.saves.values()))
-    with cached_prefix(planned.graph, cache, planned.seed, {*wanted, *planned.record}) as prefix:
-        graph, recorded = planned.graph, prefix.recorded()
+    own = identity(prepared.graph, prepared.seed, *(facts["sha256"] for facts in made.values()))
+    options = execution.options(prepared.variant, run.memory, own, run.folder)
+    wanted = sorted(set(prepared.saves.values()))
+    with cached_prefix(prepared.graph, cache, prepared.seed, {*wanted, *prepared.record}) as prefix:
+        graph, recorded = prepared.graph, prefix.recorded()
         engine = Engine(
-            graph, artifacts, options, wanted=wanted, replay=prefix.replay, recorded=recorded, kept=planned.record
+            graph, artifacts, options, wanted=wanted, replay=prefix.replay, recorded=recorded, kept=prepared.record
         )
         try:
-            with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, planned.seed):
+            with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, prepared.seed):
                 engine.begin()
             _say_what_is_missing(run, engine.ticks)
             yield engine
@@ -101,14 +101,14 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
             engine.close()  # what goes on with the run, perhaps in this process, writes to the same files
             raise
         keep_prefix(engine, prefix, cache)
-    for name, origin in planned.saves.items():
+    for name, origin in prepared.saves.items():
         value = last[origin]
         if isinstance(value, Value):
             file = run.folder / f"{name}.omap"
-            write_artifact(file, value, provenance(planned.graph.leading_to([origin]), engine, planned.variant))
+            write_artifact(file, value, provenance(prepared.graph.leading_to([origin]), engine, prepared.variant))
             saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": artifact_digest(file)}
             run.manifest.setdefault("saved", {})[name] = saved
-    for origin in planned.record:
+    for origin in prepared.record:
         with whole_file(run.folder / recorded_name(origin)) as part:
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)

@@ -12,7 +12,7 @@ from omninav.pipeline.graph.small_files import parse_yaml
 
 from .artifacts import ProgressDisplay
 from .execution import execute
-from .plan import input_digests, plan
+from .prepared_run import input_digests, prepare_run
 from .resume import complete_run
 from .run_folder import CONFIG, start
 
@@ -29,16 +29,16 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
     run, config = complete_run(folder)
     if Path(str(run.manifest["cwd"])).is_dir():
         os.chdir(str(run.manifest["cwd"]))  # its paths are relative to where it was started
-    planned = plan({**parse_yaml(config, str(folder / CONFIG)), "plots": plots})
+    prepared = prepare_run({**parse_yaml(config, str(folder / CONFIG)), "plots": plots})
     known = run.manifest["inputs"]
-    changed = [name for name, digest in input_digests(planned).items() if known.get(name, digest) != digest]
+    changed = [name for name, digest in input_digests(prepared).items() if known.get(name, digest) != digest]
     if changed:
         raise BadInput(f"{folder}: {', '.join(changed)} changed since the run; start a new one")
     place = Path(tempfile.mkdtemp(prefix=".report.", dir=run.folder))
     try:
-        again = start(planned, run.manifest["argv"], place)
+        again = start(prepared, run.manifest["argv"], place)
         again.manifest["started"], again.shown_as = run.manifest["started"], run.folder
-        execute(again, planned, display)
+        execute(again, prepared, display)
         if _metrics(place) != _metrics(run.folder):
             raise BadInput(f"{folder}: it gives other metrics now (the code has changed): start a new run")
         write_whole(run.folder / REPORT, (place / REPORT).read_text(encoding="utf-8"))

@@ -19,7 +19,7 @@ from omninav.pipeline.graph.small_files import parse_yaml
 from .artifacts import ProgressDisplay
 from .execution import execute
 from .metrics_files import MANIFEST, read_metrics
-from .plan import Plan, input_digests, plan
+from .prepared_run import PreparedRun, input_digests, prepare_run
 from .run_folder import CONFIG, STEPS, RunFolder
 
 
@@ -48,11 +48,11 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFol
     """
     run = RunFolder(Path(os.path.realpath(folder)))
     with run.owned():
-        planned = reopened(run, folder)
-        return run, read_metrics(folder) if planned is None else execute(run, planned, display)
+        prepared = reopened(run, folder)
+        return run, read_metrics(folder) if prepared is None else execute(run, prepared, display)
 
 
-def reopened(run: RunFolder, folder: Path) -> Plan | None:
+def reopened(run: RunFolder, folder: Path) -> PreparedRun | None:
     """Prepares a stopped run to be executed in its folder, from the directory in which it was started.
 
     None where it is complete. Raises `BadInput` as `resume` does.
@@ -63,7 +63,7 @@ def reopened(run: RunFolder, folder: Path) -> Plan | None:
         return _reopened(run, folder)
 
 
-def _reopened(run: RunFolder, folder: Path) -> Plan | None:
+def _reopened(run: RunFolder, folder: Path) -> PreparedRun | None:
     for half_written in folder.glob("*.part"):  # by the process that was killed; it is written again
         half_written.unlink()
     began, config = _beginning(run, folder)
@@ -78,23 +78,23 @@ def _reopened(run: RunFolder, folder: Path) -> Plan | None:
         os.chdir(began.cwd)  # its paths are relative to where it was started
     again = shlex.join(began.argv)
     try:
-        planned = plan(parse_yaml(config, str(folder / CONFIG)))
+        prepared = prepare_run(parse_yaml(config, str(folder / CONFIG)))
     except ProblemsFound as found:
         if all(problem.where.startswith(("nodes.", "wires.", "artifacts.")) for problem in found.problems):
             message = f"{folder}: made with an older omninav, whose stages are no longer known; start it again: {again}"
             raise BadInput(message) from None
         raise
-    inputs = input_digests(planned)
+    inputs = input_digests(prepared)
     changed = [name for name, digest in inputs.items() if began.inputs.get(name) != digest]
     if changed:
         raise BadInput(f"{folder}: {', '.join(changed)} changed since the run was started; start a new run")
-    run.describe(planned, config)
+    run.describe(prepared, config)
     run.manifest["status"] = "running"
     for name in ("error", "ended", "files", "saved", "artifacts"):
         run.manifest.pop(name, None)
     run.seal_beginning(config)
     run.save()
-    return planned
+    return prepared
 
 
 def complete_run(folder: Path) -> tuple[RunFolder, str]:

@@ -19,7 +19,7 @@ from omninav.pipeline.graph.problems import BadInput
 from .config_text import config_text
 from .inputs import refuse_missing
 from .metrics_files import MANIFEST
-from .plan import Plan, input_digests
+from .prepared_run import PreparedRun, input_digests
 
 CONFIG = "config.yaml"
 STEPS = "steps"
@@ -82,14 +82,14 @@ class RunFolder:
         """Keep the manifest as it stands, and the text of the configuration, where damage to their files is found."""
         write_whole(self.beginning, seal(encode({"manifest": self.manifest, "config": config})))
 
-    def describe(self, planned: Plan, config: str) -> None:
+    def describe(self, prepared: PreparedRun, config: str) -> None:
         """Write the text of the configuration, and the graph that follows from it."""
         from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
         from omninav.pipeline.report.mermaid import mermaid
 
         write_whole(self.folder / CONFIG, config)
-        write_whole(self.folder / "graph.svg", svg(planned.graph))
-        write_whole(self.folder / "graph.mmd", mermaid(planned.graph))
+        write_whole(self.folder / "graph.svg", svg(prepared.graph))
+        write_whole(self.folder / "graph.mmd", mermaid(prepared.graph))
 
 
 def recorded_name(origin: str) -> str:
@@ -98,40 +98,40 @@ def recorded_name(origin: str) -> str:
 
 
 def start(
-    planned: Plan, argv: Sequence[str], folder: Path | None = None, files: Mapping[str, str] | None = None
+    prepared: PreparedRun, argv: Sequence[str], folder: Path | None = None, files: Mapping[str, str] | None = None
 ) -> RunFolder:
     """Make the run's folder with config, graph and manifest, and with more `files` by their names.
 
     `folder` is given by a sweep or by the user, else made from the date. The latter appears under its name when all
     that a resume needs is in it: a run that can be seen can be resumed.
     """
-    config = planned.config
+    config = prepared.config
     refuse_missing(config)
-    inputs = input_digests(planned)
+    inputs = input_digests(prepared)
     root = Path(str(config.get("runs", "runs"))).absolute()
-    named = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}"
+    named = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{prepared.variant}"
     beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder.absolute()
     beginning.mkdir(parents=True, exist_ok=True)
     run = RunFolder(beginning)
-    config_file = config_text(planned.config)
+    config_file = config_text(prepared.config)
     run.manifest = {
         "omninav": version("omninav"),
         "status": "running",
-        "variant": planned.variant,
+        "variant": prepared.variant,
         "argv": list(argv),
         "cwd": os.getcwd(),
         "started": datetime.now().isoformat(timespec="seconds"),
         "git_commit": git_commit(),
-        "graph": planned.digest,
+        "graph": prepared.digest,
         "config": digest_text(config_file),
         "inputs": inputs,
-        "seed": planned.seed,
+        "seed": prepared.seed,
         "python": platform.python_version(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
     try:
         with run.owned():
-            run.describe(planned, config_file)
+            run.describe(prepared, config_file)
             for name, content in (files or {}).items():
                 write_whole(beginning / name, content)
             run.seal_beginning(config_file)
@@ -146,16 +146,16 @@ def start(
     return run
 
 
-def was_started(folder: Path, planned: Plan) -> bool:
+def was_started(folder: Path, prepared: PreparedRun) -> bool:
     """Whether a run of the same configuration, stages and inputs was started in a folder: then it can go on there."""
     try:
         manifest = read_json(folder / MANIFEST)
     except (OSError, Damaged):
         return False
     now = {
-        "graph": planned.digest,
-        "config": digest_text(config_text(planned.config)),
-        "inputs": input_digests(planned),
+        "graph": prepared.digest,
+        "config": digest_text(config_text(prepared.config)),
+        "inputs": input_digests(prepared),
         "git_commit": git_commit(),
     }
     return all(manifest.get(key) == value for key, value in now.items())

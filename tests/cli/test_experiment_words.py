@@ -1,7 +1,7 @@
 """What the words of an experiment's file mean in each of its conditions."""
 
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.experiments import planned_experiment
+from omninav.pipeline.cli.experiments import prepared_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 
 
@@ -11,11 +11,11 @@ def test_an_interpolation_is_of_the_condition_and_not_of_the_line_that_asks_for_
         config = compose(words)
         assert "other_day" not in config.get("nodes", {})
         config.experiment.about = "${nodes.other_day.world.name}"
-        planned = planned_experiment(config, words)
-    assert planned.experiment.about == "${nodes.other_day.world.name}"  # which only the conditions have
+        prepared = prepared_experiment(config, words)
+    assert prepared.experiment.about == "${nodes.other_day.world.name}"  # which only the conditions have
     worlds = {
         (run.config["world"]["name"], run.config["nodes"]["other_day"]["world"]["name"])
-        for run in planned.conditions
+        for run in prepared.conditions
         if "other_day" in run.config["nodes"]
     }
     assert worlds

@@ -14,7 +14,7 @@ from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.engine.code_version import graph_digest
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 
 CHANGED = {
     "omninav": ("nodes.features.segments=18",),
@@ -42,8 +42,8 @@ def hydra() -> Iterator[None]:
         yield
 
 
-def planned(*words: str) -> Plan:
-    return plan(complete(compose(with_unlisted_parameters(words, []))))
+def prepared(*words: str) -> PreparedRun:
+    return prepare_run(complete(compose(with_unlisted_parameters(words, []))))
 
 
 @pytest.mark.usefixtures("hydra")
@@ -51,9 +51,9 @@ def planned(*words: str) -> Plan:
 def test_a_map_by_itself_is_the_one_that_is_made_on_the_way(variant: str) -> None:
     digests = set()
     for words in ((), CHANGED[variant]):
-        way = planned(f"variant={variant}", *words)
+        way = prepared(f"variant={variant}", *words)
         made = next(artifact for artifact in way.artifacts if artifact.name == "map")
-        alone = planned(f"variant={variant}", "learn=map", *words)
+        alone = prepared(f"variant={variant}", "learn=map", *words)
         assert made.graph is not None
         assert made.variant == alone.variant == f"{variant}_map"
         assert graph_digest(alone.graph.leading_to([alone.saves["map"]])) == graph_digest(made.graph)
@@ -66,7 +66,7 @@ def test_a_map_by_itself_is_the_one_that_is_made_on_the_way(variant: str) -> Non
 @pytest.mark.parametrize("variant", ["omninav", "retrieval_mcl", "omniview_mcl_as_printed"])
 def test_visual_words_are_learned_with_a_map_by_itself_as_on_the_way(variant: str) -> None:
     typed = ("candidates=words", "nodes.local_features.contrast=0.03")
-    way, alone = planned(f"variant={variant}", *typed), planned(f"variant={variant}", "learn=map", *typed)
+    way, alone = prepared(f"variant={variant}", *typed), prepared(f"variant={variant}", "learn=map", *typed)
     for name in ("map", "words"):
         made = next(artifact for artifact in way.artifacts if artifact.name == name)
         assert made.graph is not None
@@ -88,21 +88,21 @@ def test_the_parameters_of_a_stage_that_was_swapped_are_taken_out(capsys: pytest
 @pytest.mark.usefixtures("hydra")
 def test_the_words_typed_change_the_map_as_they_would_its_variant() -> None:
     words = ("variant=omniview_mcl_as_printed", "learn=map", "nodes.mapping.distance_m=0.9")
-    mapping = planned(*words).graph.nodes["mapping"].stage
+    mapping = prepared(*words).graph.nodes["mapping"].stage
     assert (mapping.distance_m, mapping.vicinity_m) == (0.9, 0.5)
-    swapped = planned("variant=omninav", "learn=map", "mapping=image_database").graph.nodes["mapping"]
+    swapped = prepared("variant=omninav", "learn=map", "mapping=image_database").graph.nodes["mapping"]
     assert swapped.target.endswith("ImageDatabase")
 
 
 @pytest.mark.usefixtures("hydra")
 @pytest.mark.parametrize("variant", MAPPING)
 def test_what_maps_while_it_localises_has_true_poses_for_a_first_map_alone(variant: str) -> None:
-    first, usual = planned(f"variant={variant}", "learn=map").graph, planned(f"variant={variant}")
+    first, usual = prepared(f"variant={variant}", "learn=map").graph, prepared(f"variant={variant}")
     assert "pose_fixes" in first.nodes
     assert first.nodes["straightened"].stage.max_distance == 0
     assert "pose_fixes" not in usual.graph.nodes
     assert not usual.artifacts
-    made = planned(
+    made = prepared(
         f"variant={variant}", "artifacts.map.required=true", "features=dct", "+artifacts.map.inherit=[features]"
     )
     (map,) = made.artifacts
@@ -114,7 +114,7 @@ def test_what_maps_while_it_localises_has_true_poses_for_a_first_map_alone(varia
 def test_a_variant_that_made_a_map_says_what_to_type(capsys: pytest.CaptureFixture[str]) -> None:
     gone = {name: hint for name, hint in replaced().items() if "omninav map " in hint and name.endswith(MAPS)}
     assert len(gone) == 11
-    variants = {file.name.removesuffix(".yaml") for file in group_files("variant")}  # each is planned elsewhere
+    variants = {file.name.removesuffix(".yaml") for file in group_files("variant")}  # each is checked elsewhere
     for name, hint in gone.items():
         assert suggest_option("variant", name.partition("=")[2], [], "variants") == hint
         assert hint.partition("omninav map variant=")[2].partition(" log=T")[0] in variants

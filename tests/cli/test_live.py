@@ -33,7 +33,7 @@ def test_a_variant_that_is_no_robots_is_refused_by_name(variant: str):
     with composed([*live.SETTINGS, f"variant={variant}"]) as config:
         settings = complete(config)
     with pytest.raises(BadInput, match=f"variant={variant} does not run live .*; take another: omninav variants"):
-        live.plan_live(settings)
+        live.prepare_live(settings)
 
 
 @pytest.mark.parametrize("publish", ["ros2", "amcl"])
@@ -45,12 +45,12 @@ def test_a_variant_that_is_no_robots_is_refused_by_name(variant: str):
 def test_a_variant_runs_live_without_what_it_is_measured_by(words: str, publish: str):
     typed = f"variant={words.format(TOUR)}".split()
     with composed(["source=live", "log=live", f"publish={publish}", "~evaluation", *typed]) as config:
-        assert "publish" in live.plan_live(complete(config)).graph.nodes
+        assert "publish" in live.prepare_live(complete(config)).graph.nodes
 
 
 def test_a_wrong_setting_is_said_once_for_a_graph_and_those_of_its_maps():
     with composed(["variant=omniview_mcl", "watch=abc"]) as config:
         settings = complete(config)
     with pytest.raises(ProblemsFound) as found:
-        live.plan_live(settings)
+        live.prepare_live(settings)
     assert [problem.where for problem in found.value.problems] == ["nodes.watch.viewer"]

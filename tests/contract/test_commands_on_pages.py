@@ -17,7 +17,7 @@ from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.tools import tool_class, tools
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
@@ -88,4 +88,4 @@ def composed(words: list[str]) -> None:
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]
 
-    plan(complete(compose(with_unlisted_parameters(rest, []))))
+    prepare_run(complete(compose(with_unlisted_parameters(rest, []))))

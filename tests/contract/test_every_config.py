@@ -24,7 +24,7 @@ from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.run.inputs import read_inputs
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 OPTIONS = CONF / "options.yaml"
@@ -154,11 +154,11 @@ def test_every_variant_builds():
 
 
 def builds(variant: str) -> None:
-    found = planned(variant)
+    found = prepared(variant)
     assert found.variant == variant
     assert found.graph.nodes
     if compose([f"variant={variant}"]).artifacts.get("map"):
-        learned = planned(variant, "learn=map")
+        learned = prepared(variant, "learn=map")
         assert learned.variant == f"{variant}_map"
         assert "map" in learned.saves
 
@@ -174,12 +174,12 @@ def test_every_variant_builds_without_what_it_is_measured_by():
 
 
 @functools.cache
-def planned(variant: str, *words: str) -> Plan:
-    return plan(complete(compose([f"variant={variant}", *words])))
+def prepared(variant: str, *words: str) -> PreparedRun:
+    return prepare_run(complete(compose([f"variant={variant}", *words])))
 
 
 def nodes_of(variant: str, *words: str) -> set[str]:
-    return set(planned(variant, *words).graph.nodes)
+    return set(prepared(variant, *words).graph.nodes)
 
 
 def test_a_variant_declares_the_inputs_that_its_graph_reads():

@@ -16,7 +16,7 @@ from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.intervals import MIN_GROUPS
 from omninav.pipeline.experiment.specification import read_experiment
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 CONF = Path(__file__).resolve().parents[2] / "conf" / "experiment"
 NAMES = [
@@ -107,9 +107,9 @@ def test_a_condition_of_each_level_of_each_factor_can_be_built(folder):
 def can_be_built(name, conditions):
     found = experiment(name, "full")
     for condition in conditions:
-        planned = plan(complete(compose(typed(found, condition))))
+        prepared = prepare_run(complete(compose(typed(found, condition))))
         if name in NAMES:
-            assert {"errors", "error_curves", "map_history"} <= set(planned.graph.nodes)
+            assert {"errors", "error_curves", "map_history"} <= set(prepared.graph.nodes)
 
 
 def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided():

@@ -13,7 +13,7 @@ from typing import Any
 from toy_runs import Stop, noisy_sum
 
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import start
 
@@ -21,9 +21,9 @@ from .harness import Format, Wrong
 from .mutations import BINARY, TEXT, Files, on
 
 
-def planned(cache: Path | None = None) -> Plan:
+def prepared(cache: Path | None = None) -> PreparedRun:
     """A small graph with state, random numbers and a sequence."""
-    return plan(noisy_sum(Path("runs"), **({"cache": str(cache)} if cache else {})))
+    return prepare_run(noisy_sum(Path("runs"), **({"cache": str(cache)} if cache else {})))
 
     def say(self, words: str) -> None:
         pass
@@ -45,8 +45,8 @@ def inside(folder: Path) -> Iterator[None]:
 def _whole() -> bytes:
     """The metrics of a run that was never stopped."""
     with tempfile.TemporaryDirectory() as scratch, inside(Path(scratch)):
-        run = start(planned(), ["omninav", "variant=toy"], Path("run"))
-        execute(run, planned())
+        run = start(prepared(), ["omninav", "variant=toy"], Path("run"))
+        execute(run, prepared())
         return Path("run", "metrics.json").read_bytes()
 
 
@@ -54,9 +54,9 @@ def _whole() -> bytes:
 def stopped() -> Sequence[Files]:
     """The files of a run that was stopped."""
     with tempfile.TemporaryDirectory() as scratch, inside(Path(scratch)):
-        run = start(planned(), ["omninav", "variant=toy"], Path("run"))
+        run = start(prepared(), ["omninav", "variant=toy"], Path("run"))
         try:
-            execute(run, planned(), Stop())
+            execute(run, prepared(), Stop())
         except KeyboardInterrupt:
             return [_files(Path("run"))]
     raise AssertionError("it was not stopped")
@@ -66,7 +66,7 @@ def stopped() -> Sequence[Files]:
 def cached() -> Sequence[Files]:
     """The files of a cache that a run has filled."""
     with tempfile.TemporaryDirectory() as scratch, inside(Path(scratch)):
-        execute(start(planned(Path("cache")), ["omninav"], Path("run")), planned(Path("cache")))
+        execute(start(prepared(Path("cache")), ["omninav"], Path("run")), prepared(Path("cache")))
         return [_files(Path("cache"))]
 
 
@@ -89,8 +89,8 @@ def run_with_cache(folder: Path, files: Files) -> Any:
     expected = _whole()
     with inside(folder):
         shutil.rmtree(folder.parent / "run", ignore_errors=True)
-        run = start(planned(folder), ["omninav"], folder.parent / "run")
-        execute(run, planned(folder))
+        run = start(prepared(folder), ["omninav"], folder.parent / "run")
+        execute(run, prepared(folder))
     if (run.folder / "metrics.json").read_bytes() != expected:
         raise Wrong("it ended at other bytes")
 

@@ -6,7 +6,7 @@ import pytest
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 from omninav.stages.features.haar_integral import Binning
 from omninav.stages.features.hsv_histogram import HUE_BINS
 from omninav.stages.fusion.uniform_recovery import RANDOM_PARTICLES
@@ -119,12 +119,12 @@ LEFT_OUT = {
 }
 
 
-def planned(words: str) -> Plan:
+def prepared(words: str) -> PreparedRun:
     with composed(f"variant={words}".split()) as config:
-        return plan(complete(config))
+        return prepare_run(complete(config))
 
 
-def map_of(whole: Plan) -> Graph:
+def map_of(whole: PreparedRun) -> Graph:
     (graph,) = [made.graph for made in whole.artifacts if made.name == "map"]
     assert graph is not None
     return graph
@@ -145,14 +145,14 @@ def wired(graph: Graph, node: str) -> set[str]:
 
 @pytest.mark.parametrize("variant", PRINTED)
 def test_a_variant_as_printed_has_the_papers_stages_and_none_of_ours(variant: str):
-    graph = planned(variant).graph
+    graph = prepared(variant).graph
     assert values_of(graph, PRINTED[variant]) == PRINTED[variant]
     assert not LEFT_OUT.get(variant, set()) & set(graph.nodes)
 
 
 @pytest.mark.parametrize("variant", [PLACES, NAVIGATION])
 def test_a_printed_map_of_places_has_neither_words_nor_merging_nor_straightening(variant: str):
-    whole = planned(variant)
+    whole = prepared(variant)
     assert [made.name for made in whole.artifacts if made.name == "words"] == []
     assert values_of(map_of(whole), PRINTED_MAP) == PRINTED_MAP
     assert not {"straightened", "places", "words"} & set(map_of(whole).nodes)
@@ -161,13 +161,13 @@ def test_a_printed_map_of_places_has_neither_words_nor_merging_nor_straightening
 @pytest.mark.parametrize("variant", ["homing_as_printed", NAVIGATION])
 def test_printed_homing_has_the_camera_as_its_only_sensor(variant: str):
     steering = {"features", "path_following", "target_match", "tracker", "local_map", "homing", "control"}
-    fed = {wire.origin for wire in planned(variant).graph.wires if wire.to_node in steering}
+    fed = {wire.origin for wire in prepared(variant).graph.wires if wire.to_node in steering}
     assert "source.image" in fed
     assert not {"source.motion", "source.odometry"} & fed
 
 
 def test_gross_and_koenig_add_references_by_distance_or_dissimilarity_and_print_two_sizes_of_bins():
-    whole = planned("omniview_mcl_as_printed")
+    whole = prepared("omniview_mcl_as_printed")
     graph, map = whole.graph, map_of(whole)
     assert "calibration" not in wired(graph, "sensor")
     mapping = map.nodes["mapping"].stage
@@ -178,7 +178,7 @@ def test_gross_and_koenig_add_references_by_distance_or_dissimilarity_and_print_
 
 
 def test_wolf_burgard_and_burkhardt_draw_50_samples_anew_and_keep_936_images_in_far_less_than_4_mb():
-    whole = planned("retrieval_mcl_as_printed")
+    whole = prepared("retrieval_mcl_as_printed")
     graph, map = whole.graph, map_of(whole)
     assert "calibration" not in wired(graph, "sensor")
     assert "area" in wired(graph, "prior")
@@ -192,4 +192,4 @@ def test_wolf_burgard_and_burkhardt_draw_50_samples_anew_and_keep_936_images_in_
 
 @pytest.mark.parametrize("variant", ["homing", "topological_nav learn=map", "topological_localisation"])
 def test_ours_is_not_as_printed(variant: str):
-    assert type(planned(variant).graph.nodes["features"].stage).__name__ != "SiftAndVerticalSegments"
+    assert type(prepared(variant).graph.nodes["features"].stage).__name__ != "SiftAndVerticalSegments"

@@ -8,12 +8,12 @@ from conftest import DRIVE, GRID, TOUR
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import ProblemsFound
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 
-def planned(*words: str):
+def prepared(*words: str):
     with composed(words) as config:
-        return plan(complete(config))
+        return prepare_run(complete(config))
 
 
 @pytest.mark.parametrize("v", [0, 1])
@@ -25,7 +25,7 @@ def test_each_stage_of_one_variant_serves_the_other(v: int, f: int, m: int):
     match, sensor = ("retrieval", "selective")[m], ("visibility", "near_references")[v ^ f]
     fusion = ("uniform_recovery", "importance_resampling")[v ^ m]
     words = (f"features={features}", f"match={match}", f"sensor={sensor}", f"fusion={fusion}", "plots=all")
-    graph = planned(f"variant={variant}", *words).graph
+    graph = prepared(f"variant={variant}", *words).graph
     assert ("visibility_areas" in graph.nodes) == (sensor == "visibility")
     answers = [wire for wire in graph.wires if wire.to_port == "answers"]
     assert bool(answers) == (match == "retrieval")
@@ -42,12 +42,12 @@ def test_each_stage_of_one_variant_serves_the_other(v: int, f: int, m: int):
 )
 def test_what_cannot_be_exchanged_is_explained_before_anything_runs(words: tuple[str, ...], said: str):
     with pytest.raises(ProblemsFound) as found:
-        planned("variant=retrieval_mcl", *words)
+        prepared("variant=retrieval_mcl", *words)
     assert said in str(found.value)
 
 
 def test_what_is_proposed_is_drawn_anew_at_each_image():
-    graph = planned("variant=retrieval_mcl", f"tour={TOUR}", f"log={DRIVE}", f"grid={GRID}").graph
+    graph = prepared("variant=retrieval_mcl", f"tour={TOUR}", f"log={DRIVE}", f"grid={GRID}").graph
     assert graph.nodes["proposals"].lifetime == "tick"
 
 

@@ -10,7 +10,7 @@ from conftest import DRIVE, TOUR
 import omninav
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.artifact import read_artifact
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords
 
@@ -52,7 +52,7 @@ def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
 def test_what_is_typed_for_a_map_is_of_its_words_too(variant: str) -> None:
     typed = f"{MAPPING}.{DISTANCES[variant]}=0.7"
     with composed([f"variant={variant}", "candidates=words", typed]) as config:
-        made = {artifact.name: artifact.graph for artifact in plan(complete(config)).artifacts}
+        made = {artifact.name: artifact.graph for artifact in prepare_run(complete(config)).artifacts}
     for name in ("map", "words"):
         graph = made[name]
         assert graph is not None

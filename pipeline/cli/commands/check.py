@@ -21,7 +21,7 @@ from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Source
 from omninav.pipeline.jobs.executors import read_executor
-from omninav.pipeline.run.plan import Plan, check_inputs, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, check_inputs, prepare_run
 
 MAX_TRIED = 1 << 26
 """Bytes of an artifact's file with which a first tick is tried: reading and preparing a larger one takes long."""
@@ -38,30 +38,30 @@ def command(arguments: list[str]) -> int:
         if config.get("experiment") is not None:
             return _check_experiment(config, arguments)
         read_executor(OmegaConf.to_container(config.executor, resolve=True))
-        planned = plan(complete(config))
-    check_objective(planned.config.get("objective"), planned.graph)
-    check_inputs(planned)
-    _refuse_unwritable(planned.config, words)
-    for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
-        engine = Engine(graph, {}, EngineOptions(planned.seed))
+        prepared = prepare_run(complete(config))
+    check_objective(prepared.config.get("objective"), prepared.graph)
+    check_inputs(prepared)
+    _refuse_unwritable(prepared.config, words)
+    for graph in (*(artifact.graph for artifact in prepared.artifacts if artifact.graph is not None), prepared.graph):
+        engine = Engine(graph, {}, EngineOptions(prepared.seed))
         engine.check_source()
         engine.set_up_source()
         if not _is_simulated(graph):
-            _try_first_tick(graph, _small_files(planned) if graph is planned.graph else None, planned.seed)
-    graph = planned.graph
+            _try_first_tick(graph, _small_files(prepared) if graph is prepared.graph else None, prepared.seed)
+    graph = prepared.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
-    print(f"{planned.variant}: nothing wrong with it. {sizes}")
+    print(f"{prepared.variant}: nothing wrong with it. {sizes}")
     print(f"{counted(before, 'stage')} before the loop, {tick} in every tick, {after} after it")
     print(_said_of_truth(truth_readers(graph)))
     return 0
 
 
-def _small_files(planned: Plan) -> dict[str, Path] | None:
+def _small_files(prepared: PreparedRun) -> dict[str, Path] | None:
     """The files of all artifacts, where all are files small enough to be tried in passing."""
-    files = {each.name: each.file for each in planned.artifacts if each.file is not None}
+    files = {each.name: each.file for each in prepared.artifacts if each.file is not None}
     small = all(file.stat().st_size <= MAX_TRIED for file in files.values())
-    return files if small and len(files) == len(planned.artifacts) else None
+    return files if small and len(files) == len(prepared.artifacts) else None
 
 
 def _try_first_tick(graph: Graph, files: Mapping[str, Path] | None, seed: int) -> None:
@@ -109,10 +109,10 @@ def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> 
 
 def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Composes and checks each condition that an experiment would run."""
-    from omninav.pipeline.cli.experiments import planned_experiment
+    from omninav.pipeline.cli.experiments import prepared_experiment
     from omninav.pipeline.experiment.conditions import open_inputs
 
-    run = planned_experiment(config, arguments)
+    run = prepared_experiment(config, arguments)
     experiment = run.experiment
     open_inputs(run.conditions)
     _refuse_unwritable(run.conditions[0].config)
@@ -126,7 +126,7 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     print(f"{counted(runs, 'run')} in all")
     print(f"claims to be judged: {len(experiment.claims)}")
-    readers = sorted({name for each in run.conditions if each.planned for name in truth_readers(each.planned.graph)})
+    readers = sorted({name for each in run.conditions if each.prepared for name in truth_readers(each.prepared.graph)})
     print(_said_of_truth(readers))
     return 0
 

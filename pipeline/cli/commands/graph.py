@@ -6,7 +6,7 @@ from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.report.mermaid import mermaid
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 
 def command(arguments: list[str]) -> int:
@@ -14,9 +14,9 @@ def command(arguments: list[str]) -> int:
     out = next((Path(word.partition("=")[2]) for word in arguments if word.startswith("out=")), Path("."))
     arguments = [word for word in arguments if not word.startswith("out=")]
     with composed(arguments) as config:
-        planned = plan(complete(config))
-    drawn = {planned.variant: planned.graph} | {
-        f"{planned.variant}.{made.name}": made.graph for made in planned.artifacts if made.graph
+        prepared = prepare_run(complete(config))
+    drawn = {prepared.variant: prepared.graph} | {
+        f"{prepared.variant}.{made.name}": made.graph for made in prepared.artifacts if made.graph
     }
     for name, graph in drawn.items():
         write_whole(out / f"{name}.svg", svg(graph))

@@ -5,7 +5,7 @@ from typing import Any
 
 from omninav.pipeline.cli.commands.run import command as run
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 
 SETTINGS = ("source=live", "publish=ros2", "log=live")
 """Settings that make a run live, each where nothing else is typed."""
@@ -16,7 +16,7 @@ RESULTS = ("estimate", "command")
 
 def command(arguments: list[str]) -> int:
     """Run a variant live. Whatever else may be typed for a run may be typed here."""
-    return run(live_words(arguments), plan_live)
+    return run(live_words(arguments), prepare_live)
 
 
 def live_words(arguments: list[str]) -> list[str]:
@@ -27,11 +27,11 @@ def live_words(arguments: list[str]) -> list[str]:
     return [*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments]
 
 
-def plan_live(settings: Mapping[str, Any]) -> Plan:
+def prepare_live(settings: Mapping[str, Any]) -> PreparedRun:
     """Check a configuration. Raises `BadInput` where its variant is none of what runs live."""
     try:
-        planned = plan(settings)
-        told = {wire.to_port for wire in planned.graph.wires if wire.to_node == "publish"}
+        prepared = prepare_run(settings)
+        told = {wire.to_port for wire in prepared.graph.wires if wire.to_node == "publish"}
         why_not = "it has neither an estimate nor a command to publish" if told and told.isdisjoint(RESULTS) else ""
     except ProblemsFound as found:
         if not all(problem.where.startswith("wires.") for problem in found.problems):
@@ -41,4 +41,4 @@ def plan_live(settings: Mapping[str, Any]) -> Plan:
         raise BadInput(
             f"variant={settings.get('variant')} does not run live ({why_not}); take another: omninav variants"
         )
-    return planned
+    return prepared

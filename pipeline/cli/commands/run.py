@@ -5,7 +5,7 @@ import os
 import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.files import Taken, locked
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
-from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.prepared_run import Prepare, prepare_run
 from omninav.pipeline.run.run_folder import new_folder
 
 LAUNCHER = "hydra/launcher=omninav"
@@ -34,10 +34,10 @@ LAUNCHER = "hydra/launcher=omninav"
 
 def command(
     arguments: list[str],
-    check: Callable[[Mapping[str, Any]], Plan] = plan,
+    prepare: Prepare = prepare_run,
     on_sweep: Callable[[Path], None] = lambda folder: None,
 ) -> int:
-    """Run one job, or all of a sweep. Hydra composes the configurations, and `check` makes a plan of each.
+    """Run one job, or all of a sweep. Hydra composes the configurations, and `prepare` checks each run.
 
     `on_sweep` is told the folder of a sweep before its first job.
     """
@@ -53,7 +53,7 @@ def command(
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
-            return run_job(config, arguments, check)
+            return run_job(config, arguments, prepare)
 
         of_conditions = condition_arguments(listed)
         typed = [word for word in listed if word not in of_conditions]

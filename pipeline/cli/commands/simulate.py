@@ -6,7 +6,7 @@ from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 from . import tool
 
@@ -26,11 +26,11 @@ def command(arguments: list[str]) -> int:
     with Progress() as progress, compile_notice(progress.say):
         progress.say("reading the configuration")
         with composed([*LIVE, *arguments]) as config:
-            planned = plan(complete(config))  # of no artifacts
+            prepared = prepare_run(complete(config))  # of no artifacts
 
         def on_tick(done: int, total: int | None) -> None:
             progress.update("simulate", done, total)
 
         with contextlib.suppress(KeyboardInterrupt):  # that is how it ends
-            Engine(planned.graph, {}, EngineOptions(planned.seed, on_tick=on_tick, on_doing=progress.say)).run()
+            Engine(prepared.graph, {}, EngineOptions(prepared.seed, on_tick=on_tick, on_doing=progress.say)).run()
     return 0

@@ -76,7 +76,7 @@ def run(place: Path, monkeypatch: pytest.MonkeyPatch, **file: object) -> tuple[b
     monkeypatch.setattr(toys.Add, "step", functools.wraps(add)(lambda *a, **k: (sums.append(a), add(*a, **k))[1]))
     config = {"experiment": FILE | file, "runs": str(place), "executor": {"workers": 9}}
     words = ["seed=0", f"cache={place.parent}/cache"]
-    experiment = runner.plan_experiment(config, compose, words, ["omninav", "+experiment=test"])
+    experiment = runner.prepare_experiment(config, compose, words, ["omninav", "+experiment=test"])
     return experiment.run(), experiment.result(), ran, len(sums)
 
 

@@ -13,7 +13,7 @@ from omninav.pipeline.files import digest_file, write_whole
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run import artifacts
 from omninav.pipeline.run.artifact_specification import read_specifications, without_plotted
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.pipeline.run.run_folder import RunFolder
 from toys import graph_of_toys
 
@@ -37,12 +37,12 @@ def known(tmp_path: Path) -> Path:
 
 
 def test_without_a_file_the_port_stays_empty_and_with_one_it_is_wired(known: Path) -> None:
-    planned = plan(of_file(None))
-    assert [wire.to_port for wire in planned.graph.wires] == ["number"]
-    assert planned.artifacts == ()
-    planned = plan(of_file(known))
-    assert {wire.to_port for wire in planned.graph.wires} == {"number", "other"}
-    assert [artifact.name for artifact in planned.artifacts] == ["map"]
+    prepared = prepare_run(of_file(None))
+    assert [wire.to_port for wire in prepared.graph.wires] == ["number"]
+    assert prepared.artifacts == ()
+    prepared = prepare_run(of_file(known))
+    assert {wire.to_port for wire in prepared.graph.wires} == {"number", "other"}
+    assert [artifact.name for artifact in prepared.artifacts] == ["map"]
 
 
 def two_of_one_graph(tmp_path: Path) -> dict[str, Any]:
@@ -98,14 +98,14 @@ def sum_of(run: RunFolder) -> str:
 def test_what_comes_with_a_map_is_not_there_where_the_map_is_from_a_file(tmp_path: Path, known: Path) -> None:
     config = two_of_one_graph(tmp_path)
     config["artifacts"]["map"] = {"variant": "toy", "file": str(known), "output": "twice.number"}
-    assert [artifact.name for artifact in plan(config).artifacts] == ["map"]
+    assert [artifact.name for artifact in prepare_run(config).artifacts] == ["map"]
 
 
 def test_repetitions_do_without_what_comes_with_a_map(tmp_path: Path) -> None:
     config = without_plotted(two_of_one_graph(tmp_path))
-    planned = plan(config)
-    assert [artifact.name for artifact in planned.artifacts] == ["map"]
-    assert [wire.to_port for wire in planned.graph.wires] == ["number"]
+    prepared = prepare_run(config)
+    assert [artifact.name for artifact in prepared.artifacts] == ["map"]
+    assert [wire.to_port for wire in prepared.graph.wires] == ["number"]
     assert without_plotted(config) is config
 
 
@@ -130,7 +130,7 @@ def test_a_specification_that_is_wrong_says_where_and_what_is_near(spec: Any, wh
 
 def said_of(config: dict[str, Any]) -> str:
     with pytest.raises(ProblemsFound) as found:
-        plan(config)
+        prepare_run(config)
     return str(found.value)
 
 
@@ -164,7 +164,7 @@ def test_problems_of_the_graph_that_makes_it_are_at_its_own_path_unless_the_node
     config["artifacts"]["map"]["inherit"] = inherit
     config["artifacts"]["map"]["graph"]["nodes"]["twice"]["factor"] = -1.0
     with pytest.raises(ProblemsFound) as found:
-        plan(config)
+        prepare_run(config)
     assert [problem.where for problem in found.value.problems] == [where]
 
 

@@ -16,7 +16,7 @@ from omninav.pipeline.engine import damage
 from omninav.pipeline.files import read_json
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import RunFolder
 
@@ -44,7 +44,7 @@ def stopped(tmp_path: Path) -> RunFolder:
     stopping = noisy_sum(tmp_path / "stopped")
     run = begun(stopping)
     with pytest.raises(KeyboardInterrupt):
-        execute(run, plan(stopping), Stop())
+        execute(run, prepare_run(stopping), Stop())
     return run
 
 

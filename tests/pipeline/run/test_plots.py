@@ -8,7 +8,7 @@ from toy_runs import begun, ended
 
 from omninav.pipeline.files import digest_file, read_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.pipeline.run.redraw import redraw
 from omninav.pipeline.run.resume import resume
 from toys import graph_of_toys
@@ -24,7 +24,7 @@ CONFIG = graph_of_toys(
 
 
 def nodes(**settings: Any) -> set[str]:
-    return set(plan(CONFIG | settings).graph.nodes)
+    return set(prepare_run(CONFIG | settings).graph.nodes)
 
 
 def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_for() -> None:
@@ -34,7 +34,7 @@ def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_fo
     assert nodes(plots="none") == {"source", "add", "total"}
     assert "scaled" in nodes(saves={"last": "scaled.number"})
     with pytest.raises(ProblemsFound, match="'some', expected auto, few, all, none"):
-        plan(CONFIG | {"plots": "some"})
+        prepare_run(CONFIG | {"plots": "some"})
 
 
 def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ import pytest
 from conftest import TOUR
 
 from omninav.pipeline.cli.composition import complete, composed
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.prepared_run import prepare_run
 
 from .conftest import ROOT
 
@@ -15,5 +15,5 @@ def test_the_pose_is_published_before_anything_that_can_wait(variant: str, late:
     camera = ROOT / "tests/data/camera.yaml"
     words = [f"variant={variant}", "source=live", "publish=ros2", "log=live", f"camera={camera}"]
     with composed([*words, *([f"tour={TOUR}"] if variant == "omniview_mcl" else [])]) as config:
-        nodes = list(plan(complete(config)).graph.nodes)
+        nodes = list(prepare_run(complete(config)).graph.nodes)
     assert late < set(nodes[nodes.index("publish") :])

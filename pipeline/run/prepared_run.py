@@ -1,8 +1,8 @@
-"""A configuration, checked: the graph, where its artifacts come from, and what is to be saved."""
+"""A run, prepared and checked: the graph, where its artifacts come from, and what is to be saved."""
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,7 @@ from .plots import PLOTS, with_plots
 
 
 @dataclass(frozen=True)
-class ArtifactPlan:
+class PreparedArtifact:
     """Origin of an artifact: a file, or a graph whose output `origin` is taken.
 
     `graph` is the part of the `whole` that this output depends on.
@@ -37,12 +37,12 @@ class ArtifactPlan:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A configuration that has been checked: the graph, its artifacts, and what is to be saved."""
+class PreparedRun:
+    """A checked configuration: the graph, its artifacts, and what is to be saved."""
 
     config: Mapping[str, Any]
     graph: Graph
-    artifacts: tuple[ArtifactPlan, ...]
+    artifacts: tuple[PreparedArtifact, ...]
     saves: Mapping[str, str]
     record: tuple[str, ...] = ()
     """Outputs (`node.port`) whose value of every tick is kept in the run's folder."""
@@ -63,10 +63,14 @@ class Plan:
         return graph_digest(self.graph)
 
 
-def plan(config: Mapping[str, Any]) -> Plan:
+Prepare = Callable[[Mapping[str, Any]], PreparedRun]
+"""Prepares a run of a plain, resolved configuration."""
+
+
+def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
     """Check a plain, resolved configuration. Raises `ProblemsFound` with everything that is wrong with it."""
     problems: list[Problem] = []
-    artifacts: list[ArtifactPlan] = []
+    artifacts: list[PreparedArtifact] = []
     types: dict[str, Any] = {}
     config = without_absent(config)
     specs = read_specifications(config)
@@ -77,7 +81,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
     for name, spec in specs.items():
         try:
             alike = (one.whole for one in artifacts if one.whole is not None and specs[one.name].graph == spec.graph)
-            made = _plan_artifact(name, spec, next(alike, None))
+            made = _prepare_artifact(name, spec, next(alike, None))
         except ProblemsFound as found:
             problems += found.problems
             types[name] = Any
@@ -114,7 +118,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
     read = {origin for wire in graph.wires for origin in wire.origins}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
-    return Plan(config, graph, tuple(artifacts), saves, record)
+    return PreparedRun(config, graph, tuple(artifacts), saves, record)
 
 
 def _unreadable_inputs(graph: Graph | None) -> Iterator[Problem]:
@@ -160,8 +164,8 @@ def load_stages(config: Mapping[str, Any]) -> None:
                 resolve(spec["_target_"])
 
 
-def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) -> ArtifactPlan:
-    """Origin of an artifact. `graph`: that makes it, where another's plan has it: so its log is opened once."""
+def _prepare_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) -> PreparedArtifact:
+    """Origin of an artifact. `graph`: that makes it, where another has it: so its log is opened once."""
     if spec.file is not None:
         file = Path(spec.file)
         try:
@@ -171,7 +175,7 @@ def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) 
             if file.is_file() and file.suffix != ".omap" and spec.made_from:
                 hint = f"if it is what a {name} is made from, type {spec.made_from[0]}={spec.file}; else {hint}"
             raise ProblemsFound([Problem(name, str(error), hint)]) from None
-        return ArtifactPlan(name, file=file)
+        return PreparedArtifact(name, file=file)
     if spec.graph is None:
         what = f"this variant needs a {name}, and none is given"
         raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])
@@ -180,7 +184,7 @@ def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) 
     origin = spec.output or str((spec.graph.get("saves") or {}).get(name, ""))
     if graph.port(origin) is None:
         raise ProblemsFound([_no_output(f"{where}.output", origin, graph)])
-    return ArtifactPlan(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph)
+    return PreparedArtifact(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph)
 
 
 def _how_to_get(name: str, spec: ArtifactSpecification) -> str:
@@ -240,10 +244,10 @@ def _is_known(target: str) -> bool:
     return True
 
 
-def input_digests(planned: Plan) -> dict[str, str]:
+def input_digests(prepared: PreparedRun) -> dict[str, str]:
     """The content hash of every file that the run reads, by node. Raises `BadInput` where one cannot be read."""
-    digests = digests_of(planned.graph)
-    for artifact in planned.artifacts:
+    digests = digests_of(prepared.graph)
+    for artifact in prepared.artifacts:
         if artifact.graph is not None:
             digests |= {f"{artifact.name}.{name}": digest for name, digest in digests_of(artifact.graph).items()}
         elif artifact.file is not None:
@@ -251,14 +255,14 @@ def input_digests(planned: Plan) -> dict[str, str]:
     return digests
 
 
-def check_inputs(planned: Plan) -> None:
+def check_inputs(prepared: PreparedRun) -> None:
     """Open every file that the run reads, and read its artifacts.
 
     Raises `ProblemsFound` where an input is not given, and `BadInput` where one cannot be used.
     """
-    refuse_missing(planned.config)
-    input_digests(planned)
-    for artifact in planned.artifacts:
+    refuse_missing(prepared.config)
+    input_digests(prepared)
+    for artifact in prepared.artifacts:
         if artifact.file is not None:
             check_artifact(artifact.file)
 
