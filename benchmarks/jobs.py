@@ -11,7 +11,7 @@ import omninav
 from omninav.pipeline.experiment.repetition import condition_key
 from omninav.pipeline.jobs.executors import ExecutorSettings
 from omninav.pipeline.jobs.job import Job
-from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 
 from .table import Row
 
@@ -29,7 +29,7 @@ def rows() -> list[Row]:
 
 def _overhead(place: Path) -> list[Row]:
     jobs = [Job(str(n), "benchmarks.cluster.tasks:nothing", {}, place / f"{n}.log") for n in range(EMPTY)]
-    with Workers(ExecutorSettings(workers=1), place) as workers:
+    with WorkerPool(ExecutorSettings(workers=1), place) as workers:
         workers.run(jobs[:5])
         times = []
         for _ in range(ROUNDS):
@@ -64,7 +64,10 @@ def _throughput(place: Path) -> list[Row]:
 
     times: dict[int, list[float]] = {1: [], 2: []}
     processor: dict[int, list[float]] = {1: [], 2: []}
-    with Workers(ExecutorSettings(workers=1), place) as one, Workers(ExecutorSettings(workers=2), place / "two") as two:
+    with (
+        WorkerPool(ExecutorSettings(workers=1), place) as one,
+        WorkerPool(ExecutorSettings(workers=2), place / "two") as two,
+    ):
         executors = {1: one, 2: two}
         for number, workers in executors.items():  # map, features and compiled code are there by then
             ends = workers.run(jobs(number, 2))

@@ -5,7 +5,7 @@ import posixpath
 import re
 from pathlib import Path
 
-from omninav.pipeline.cli.experiments import judged_experiments
+from omninav.pipeline.cli.composed_experiments import judged_experiments
 from omninav.pipeline.experiment.page import measure_table
 from omninav.pipeline.experiment.pages import Judged, counts, pages, sources
 from omninav.pipeline.experiment.plots import measure_plot

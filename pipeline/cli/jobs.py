@@ -81,7 +81,7 @@ def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run)
         if of_experiment and sweep is not None:
             raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
         if of_experiment:
-            from .experiments import run_experiment  # with pages and plots, which no other job needs
+            from .composed_experiments import run_experiment  # with pages and plots, which no other job needs
 
             code = run_experiment(config, arguments)
         else:

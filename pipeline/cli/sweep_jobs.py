@@ -11,8 +11,8 @@ from omegaconf import OmegaConf, open_dict, read_write
 
 from omninav.pipeline.jobs.executors import read_executor
 from omninav.pipeline.jobs.job import Job, Outcome, Send
-from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.jobs.throttle import Throttle
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 from omninav.pipeline.report.progress import Progress
 
 from .hydra_session import hydra_started
@@ -42,7 +42,7 @@ def run_sweep(
     settings: Any = OmegaConf.to_container(executor, resolve=True)
     ends: dict[str, JobEnd] = {}
     throttle = Throttle()
-    with Progress(unit="jobs") as progress, Workers(read_executor(settings), sweep / LOGS) as workers:
+    with Progress(unit="jobs") as progress, WorkerPool(read_executor(settings), sweep / LOGS) as workers:
         progress.begin(sweep.name, 0, len(jobs))
 
         def on_end(job: Job, outcome: Outcome) -> None:

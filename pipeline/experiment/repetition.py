@@ -31,12 +31,12 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.jobs.job import Send
-from omninav.pipeline.jobs.progress import Heartbeat
+from omninav.pipeline.jobs.job_progress import Heartbeat
 from omninav.pipeline.report.metrics import metric_values
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.prepared_run import PreparedArtifact, PreparedRun, prepare_run
-from omninav.pipeline.run.results import notes_of, results_of
 from omninav.pipeline.run.run_folder import RunFolder
+from omninav.pipeline.run.run_results import notes_of, results_of
 from omninav.pipeline.run.timing import stage_times
 
 SHARED = "shared"

@@ -16,9 +16,9 @@ from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
 from omninav.pipeline.jobs.job import Job, Outcome
-from omninav.pipeline.jobs.progress import JobProgress
-from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.job_progress import JobProgress
 from omninav.pipeline.jobs.throttle import Throttle
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 from omninav.pipeline.report.metrics import title, unit
 from omninav.pipeline.report.progress import Progress
 
@@ -60,12 +60,12 @@ class ExperimentRun:
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
         try:
-            with locked(self.folder / ".lock", wait=False), Workers(self.executor, self.folder) as workers:
+            with locked(self.folder / ".lock", wait=False), WorkerPool(self.executor, self.folder) as workers:
                 return self._run(workers)
         except Taken as taken:
             raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
 
-    def _run(self, workers: Workers) -> bool:
+    def _run(self, workers: WorkerPool) -> bool:
         write_whole(self.folder / "experiment.yaml", self.file)
         self._write_state("running")
         self._record(workers)
@@ -108,7 +108,7 @@ class ExperimentRun:
             common_overrides=tuple(word for word in common if not word.startswith("cache=")),
         )
 
-    def _record(self, workers: Workers) -> None:
+    def _record(self, workers: WorkerPool) -> None:
         self.recordings = recordings_of(self.conditions, self.folder)
         jobs = [each.job(self.folder / "recordings") for each in self.recordings if not each.made]
         failed = self._run_jobs(workers, jobs, "recording")
@@ -119,7 +119,7 @@ class ExperimentRun:
             else:
                 each.use()
 
-    def _make_artifacts(self, workers: Workers) -> None:
+    def _make_artifacts(self, workers: WorkerPool) -> None:
         artifacts = artifacts_of([run for run in self.conditions if run.unfinished], self.folder)
         failed = self._run_jobs(workers, [each.job() for each in artifacts if not each.made], "artifact")
         for each in artifacts:
@@ -128,7 +128,7 @@ class ExperimentRun:
                     run.error = f"its {name} could not be made: {failed[each.name]}"
             each.use()
 
-    def _repeat(self, workers: Workers) -> None:
+    def _repeat(self, workers: WorkerPool) -> None:
         runs = [run for run in self.conditions if run.unfinished]
         parts = max(1, workers.number // max(1, len(runs)))  # a condition's seeds share more in one job than in several
         jobs = {job.name: (job, run) for run in runs for job in self._repetitions(run, parts)}
@@ -177,7 +177,7 @@ class ExperimentRun:
             found.append(Job(f"{run.folder.name}{several}", function, given, log))
         return found
 
-    def _run_jobs(self, workers: Workers, jobs: Sequence[Job], what: str) -> dict[str, str]:
+    def _run_jobs(self, workers: WorkerPool, jobs: Sequence[Job], what: str) -> dict[str, str]:
         """Run jobs whose frames are counted. Returns the errors by the jobs' names."""
         if not jobs:
             return {}

@@ -17,7 +17,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Context
 from omninav.pipeline.jobs.job import Job, Send
-from omninav.pipeline.jobs.progress import Heartbeat
+from omninav.pipeline.jobs.job_progress import Heartbeat
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.prepared_run import PreparedRun, prepare_run
 from omninav.pipeline.run.run_folder import RunFolder

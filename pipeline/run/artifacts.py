@@ -21,8 +21,8 @@ from omninav.pipeline.graph.stage import Source
 from omninav.pipeline.graph.value import Value
 
 from .prepared_run import PreparedArtifact, digests_of, stages_of
-from .results import notes_of
 from .run_folder import RunFolder
+from .run_results import notes_of
 
 
 class ProgressDisplay(Protocol):

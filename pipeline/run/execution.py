@@ -27,8 +27,8 @@ from .artifacts import Execution, ProgressDisplay, companions, identity, obtain,
 from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
 from .prepared_run import PreparedRun
-from .results import notes_of, results_of
 from .run_folder import CONFIG, STEPS, Interrupted, RunFolder, recorded_name
+from .run_results import notes_of, results_of
 from .timing import stage_times
 
 log = logging.getLogger("omninav")

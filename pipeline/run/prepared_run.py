@@ -18,7 +18,7 @@ from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
 
 from .artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from .inputs import refuse_missing
-from .plots import PLOTS, with_plots
+from .plot_selection import PLOTS, with_plots
 
 
 @dataclass(frozen=True)

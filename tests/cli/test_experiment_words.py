@@ -1,7 +1,7 @@
 """What the words of an experiment's file mean in each of its conditions."""
 
+from omninav.pipeline.cli.composed_experiments import prepared_experiment
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.experiments import prepared_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 
 

@@ -12,7 +12,7 @@ import pytest
 from background_runs import kill, run_here, start
 
 from omninav.pipeline.experiment.result import read_result
-from omninav.pipeline.jobs.progress import JobProgress
+from omninav.pipeline.jobs.job_progress import JobProgress
 
 STAGES = '''
 import time

@@ -9,10 +9,10 @@ from offenders import assert_each
 
 from omninav.pipeline.cli.commands.simulate import LIVE, is_live
 from omninav.pipeline.cli.commands.tool import tool_from
+from omninav.pipeline.cli.composed_experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import learnable
-from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters

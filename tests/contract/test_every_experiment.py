@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from offenders import assert_each
 
+from omninav.pipeline.cli.composed_experiments import resolved_but_for_the_experiment, without_graph
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
-from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment, without_graph
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.intervals import MIN_GROUPS

@@ -14,7 +14,7 @@ TESTS = {
     "Stages that you type": f"{TRUST}::test_a_stage_of_ones_own_is_found_here_and_the_path_is_as_before",
     "Programs that you type": f"{TRUST}::test_a_program_that_a_folder_names_is_run_only_where_it_is_typed_again",
     "Launchers and sweepers": f"{TRUST}::test_launchers_and_sweepers_of_installed_packages_take_their_parameters",
-    "Clusters": "pipeline/jobs/test_run.py::test_what_crosses_to_a_cluster_is_text",
+    "Clusters": "pipeline/jobs/test_worker_pool.py::test_what_crosses_to_a_cluster_is_text",
     "Networks": "stages/features/test_onnx_encoder.py::test_what_does_not_fit_is_refused_in_one_line",
     "Configurations": f"{TRUST}::test_what_a_configuration_says_of_hydra_is_refused_before_anything_is_called",
     "Words of the command line": f"{TRUST}::test_hostile_words_are_refused_in_a_few_short_lines",

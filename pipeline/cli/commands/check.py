@@ -109,7 +109,7 @@ def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> 
 
 def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Composes and checks each condition that an experiment would run."""
-    from omninav.pipeline.cli.experiments import prepared_experiment
+    from omninav.pipeline.cli.composed_experiments import prepared_experiment
     from omninav.pipeline.experiment.conditions import open_inputs
 
     run = prepared_experiment(config, arguments)

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from omninav.pipeline.cli.composed_experiments import judged_experiments
 from omninav.pipeline.cli.composition import read_words
-from omninav.pipeline.cli.experiments import judged_experiments
 from omninav.pipeline.experiment.pages import CLAIMS, INDEX, pages
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.problems import BadInput

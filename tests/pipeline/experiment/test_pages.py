@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from omninav.pipeline.cli.experiments import judged_experiments
+from omninav.pipeline.cli.composed_experiments import judged_experiments
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.page import markdown_page
 from omninav.pipeline.experiment.pages import Judged, by_chance, claims_of, claims_page, counts, index_page, sources

@@ -18,7 +18,7 @@ from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.experiment import runner
 from omninav.pipeline.experiment.result import ExperimentResult
 from omninav.pipeline.jobs.job import Job, Outcome
-from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 
 FILE = made_experiments.FILE | {
     "sweep": {"more": {"one": "more=1", "ten": "more=10"}},
@@ -56,7 +56,7 @@ def run(place: Path, monkeypatch: pytest.MonkeyPatch, **file: object) -> tuple[b
     """Run the experiment: whether all went well, the result, the jobs that ran, and how many sums were computed."""
     ran, sums, add = [], [], toys.Add.step
 
-    class HereAndNow(Workers):
+    class HereAndNow(WorkerPool):
         def run(self, jobs: Sequence[Job], on_message: Any = print, on_end: Any = print) -> dict[str, Outcome]:
             ended = {}
             for job in jobs:
@@ -71,7 +71,7 @@ def run(place: Path, monkeypatch: pytest.MonkeyPatch, **file: object) -> tuple[b
                 on_end(job, ended[job.name])
             return ended
 
-    monkeypatch.setattr(runner, "Workers", HereAndNow)
+    monkeypatch.setattr(runner, "WorkerPool", HereAndNow)
     monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
     monkeypatch.setattr(toys.Add, "step", functools.wraps(add)(lambda *a, **k: (sums.append(a), add(*a, **k))[1]))
     config = {"experiment": FILE | file, "runs": str(place), "executor": {"workers": 9}}

@@ -10,7 +10,7 @@ from omninav.pipeline.engine.prefix import following
 from omninav.pipeline.experiment.repetition import run_repetition
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.run.results import results_of
+from omninav.pipeline.run.run_results import results_of
 from toys import Ledger, graph_of_toys
 
 SEEDS = (0, 1, 2)

@@ -1,4 +1,4 @@
-"""Running many jobs: one that fails is reported, one that dies is tried again, and neither stops the others."""
+"""Runs many jobs: one that fails is reported, one that dies is tried again, and neither stops the others."""
 
 import json
 import queue
@@ -30,7 +30,7 @@ Ends = queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]
 """Jobs that have ended, each with the number of the attempt."""
 
 
-class Workers:
+class WorkerPool:
     """Runs jobs by the executor that settings describe; a context manager.
 
     It is started with the first job. `folder` must be seen by all of its machines.
@@ -43,7 +43,7 @@ class Workers:
         self._executor: Executor | None = None
         self._over = threading.Event()
 
-    def __enter__(self) -> "Workers":
+    def __enter__(self) -> "WorkerPool":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *raised: object) -> None:

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from omninav.pipeline import Context, Metrics
-from omninav.pipeline.run.results import results_of
+from omninav.pipeline.run.run_results import results_of
 
 
 def run_of(**stated: dict[str, object]) -> SimpleNamespace:

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
-from omninav.pipeline.jobs import perform, run
+from omninav.pipeline.jobs import perform, worker_pool
 from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
 from omninav.pipeline.jobs.job import Job
-from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 
 TESTS = str(Path(__file__).resolve().parents[2])
 
@@ -30,7 +30,7 @@ def test_a_job_that_fails_or_dies_is_reported_and_the_others_finish(tmp_path: Pa
     jobs = [job(name, tmp_path, messages=3, mark=str(tmp_path / "mark")) for name in ("die", "fail", "count")]
     jobs.append(job("die_once", tmp_path, mark=str(tmp_path / "mark")))
     messages, ended = [], {}
-    with Workers(ExecutorSettings(workers=2), tmp_path) as workers:
+    with WorkerPool(ExecutorSettings(workers=2), tmp_path) as workers:
         outcomes = workers.run(
             jobs,
             lambda job, message: messages.append((job.name, message["number"])),
@@ -50,7 +50,7 @@ def test_a_job_that_fails_or_dies_is_reported_and_the_others_finish(tmp_path: Pa
 
 def test_a_job_that_takes_too_much_memory_is_ended_and_named_with_what_it_took(tmp_path: Path):
     greedy = job("take", tmp_path, megabytes=300, seconds=60, mark=str(tmp_path / "mark"))
-    with Workers(ExecutorSettings(workers=1, memory=200_000_000), tmp_path) as workers:
+    with WorkerPool(ExecutorSettings(workers=1, memory=200_000_000), tmp_path) as workers:
         outcome = workers.run([greedy])["take"]
     assert re.fullmatch(r"it took [23]\d\d MB of memory, more than executor.memory=200 MB allows", outcome.error)
     wait_for(lambda: not lives(int((tmp_path / "mark").read_text())))
@@ -64,10 +64,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's back
 sys.path.append({tests!r})
 from omninav.pipeline.jobs.executors import ExecutorSettings
 from omninav.pipeline.jobs.job import Job
-from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.worker_pool import WorkerPool
 folder = Path(sys.argv[1])
 given = {{"megabytes": 1, "seconds": 60, "mark": str(folder / "mark")}}
-with Workers(ExecutorSettings(workers=1), folder) as workers:
+with WorkerPool(ExecutorSettings(workers=1), folder) as workers:
     workers.run([Job("take", "pool_jobs:take", given, folder / "take.log")])
 """
 
@@ -96,9 +96,9 @@ def test_a_job_ends_whose_client_gives_no_sign_of_life(tmp_path: Path, monkeypat
 
 def test_a_job_goes_on_as_long_as_its_client_gives_signs_of_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(perform, "LEASE_S", 2.0)
-    monkeypatch.setattr(run, "RENEW_S", 0.05)
+    monkeypatch.setattr(worker_pool, "RENEW_S", 0.05)
     slow = job("take", tmp_path, megabytes=1, seconds=3, mark=str(tmp_path / "mark"))
-    with Workers(ExecutorSettings(workers=1), tmp_path) as workers:
+    with WorkerPool(ExecutorSettings(workers=1), tmp_path) as workers:
         assert workers.run([slow])["take"].error is None
 
 
@@ -106,7 +106,7 @@ def test_a_process_takes_one_job_after_another_unless_it_keeps_too_much(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     def processes(*names: str) -> list[int]:
-        with Workers(ExecutorSettings(workers=1), tmp_path) as workers:
+        with WorkerPool(ExecutorSettings(workers=1), tmp_path) as workers:
             outcomes = workers.run([job(name, tmp_path) for name in names])
         return [int(outcomes[name].value) for name in names]
 
@@ -119,7 +119,7 @@ def test_a_process_takes_one_job_after_another_unless_it_keeps_too_much(
 
 def test_a_job_uses_one_thread(tmp_path: Path):
     pytest.importorskip("threadpoolctl")
-    with Workers(ExecutorSettings(workers=1), tmp_path) as workers:
+    with WorkerPool(ExecutorSettings(workers=1), tmp_path) as workers:
         outcome = workers.run([job("threads", tmp_path)])["threads"]
     assert outcome.error is None, outcome.error
     assert set(outcome.value) == {1}
@@ -133,7 +133,7 @@ def test_jobs_run_on_a_cluster_of_dask_as_they_do_here(tmp_path: Path):
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         settings = ExecutorSettings("dask", options={"address": cluster.scheduler_address})
-        with Workers(settings, tmp_path) as workers:
+        with WorkerPool(settings, tmp_path) as workers:
             outcomes = workers.run(jobs, lambda job, message: messages.append(message["number"]))
             assert workers.number == 2
     errors = {name: outcome.error for name, outcome in outcomes.items()}
@@ -149,7 +149,7 @@ def test_what_crosses_to_a_cluster_is_text(tmp_path: Path):
             crossed.append((fn, args, kwargs))
             return super().submit(fn, *args, **kwargs)
 
-    with Workers(ExecutorSettings(workers=1), tmp_path) as workers:
+    with WorkerPool(ExecutorSettings(workers=1), tmp_path) as workers:
         workers.start(Noting(1))
         workers.run([job("count", tmp_path, messages=1)])
     ((function, (text,), named),) = crossed
@@ -179,7 +179,7 @@ def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr("omninav.pipeline.jobs.dask_executor.Client", impatient)
     settings = ExecutorSettings("dask", options={"address": "tcp://127.0.0.1:9"})
-    with pytest.raises(BadInput, match=r"tcp://127.0.0.1:9: no scheduler answers"), Workers(settings, tmp_path) as w:
+    with pytest.raises(BadInput, match=r"tcp://127.0.0.1:9: no scheduler answers"), WorkerPool(settings, tmp_path) as w:
         w.run([job("nothing", tmp_path)])
 
 
