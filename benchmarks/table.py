@@ -27,7 +27,7 @@ class Row:
 
     @property
     def reached(self) -> bool | None:
-        """Whether the figure keeps its limit; None where it has none."""
+        """Tells whether the figure keeps its limit; None where it has none."""
         measured = self.ratio if self.of_peer else self.value
         if self.limit is None or measured is None:
             return None

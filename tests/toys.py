@@ -283,7 +283,7 @@ class Draw(Stage):
 class DrawSlowly(Draw):
     """Draws all numbers where all plots are asked for."""
 
-    on_request = True
+    needs_all_plots = True
 
 
 class Total(GivesNumber):

@@ -252,7 +252,7 @@ def _given_alone(
 
 
 def _lacks(config: Any, name: str) -> bool:
-    """Whether this run is of something that was given, and what its artifact is made from was not."""
+    """Tells whether this run is of something that was given, and what its artifact is made from was not."""
     return any(config.get(key) is not None and config.get(s) is None for key, s in _linked(config, name).items())
 
 

@@ -112,7 +112,7 @@ def _of_options(session: Any, options: tuple[str, ...]) -> bytes:
 
 
 def _is_setting(word: Override) -> bool:
-    """Whether Hydra sets a word in what it has composed. Sweeps and what stands under `hydra.` it refuses before."""
+    """Tells if Hydra sets a word in what it has composed. Sweeps and what stands under `hydra.` it refuses before."""
     key = word.key_or_group
     if word.is_sweep_override() or key.replace("/", ".").partition(".")[0] == "hydra":
         return False

@@ -64,7 +64,7 @@ def learnable() -> list[str]:
 
 
 def is_group(name: str) -> bool:
-    """Whether configuration has a group of that name."""
+    """Tells whether configuration has a group of that name."""
     return bool(name) and (name in listed_groups() or files(CONF).joinpath(name).is_dir())
 
 

@@ -13,7 +13,7 @@ SECTION = re.compile(r"^=== (\w+)\n(.*?\n)(?=\n===|\Z)", re.MULTILINE | re.DOTAL
 
 
 def asks_for_help(words: Sequence[str]) -> bool:
-    """Whether a command line asks what may be typed."""
+    """Tells whether a command line asks what may be typed."""
     return words[:1] == ["help"] or any(word in FLAGS for word in words)
 
 

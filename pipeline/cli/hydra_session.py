@@ -35,9 +35,9 @@ VERSION_BASE = "1.3"
 FOLDERS_OF_JOBS = ("run", "sweep")
 LAUNCHING = ("launcher", "sweeper")
 """Parts of `hydra.` whose classes are called, with parameters: those that installed packages registered."""
-OF_HYDRA = ("mode", "overrides", "runtime")
+FILLED_IN = ("mode", "overrides", "runtime")
 """Parts of `hydra.` that Hydra fills in itself."""
-OF_A_JOB = ("name", "override_dirname", "id", "num", "config_name")
+FILLED_IN_OF_JOB = ("name", "override_dirname", "id", "num", "config_name")
 """Parts of `hydra.job.` that Hydra fills in itself."""
 OWN_WORDS = ("hydra/job_logging=disabled", "hydra/hydra_logging=disabled", "hydra.output_subdir=null")
 """Values that config.yaml gives to those parts that a configuration cannot set."""
@@ -201,7 +201,7 @@ def _refuse_search_path(overrides: Sequence[str]) -> None:
 
 def _foreign(given: Any, own: Any) -> Iterator[Problem]:
     """Problems of overrides under `hydra.` that are neither omninav's `own` nor of its flags."""
-    free = (*FOLDERS_OF_JOBS, *LAUNCHING, *OF_HYDRA)
+    free = (*FOLDERS_OF_JOBS, *LAUNCHING, *FILLED_IN)
     theirs, ours = (_plain(config) for config in (given, own))
     for key in sorted({*theirs, *ours} - {*free}):
         if theirs.get(key) != ours.get(key):
@@ -222,16 +222,18 @@ def _plain(config: Any) -> dict[str, Any]:
     """The parts that are there, without what Hydra fills in for a job."""
     plain: Any = OmegaConf.to_container(config, resolve=False)
     if isinstance(plain.get("job"), dict):
-        plain["job"] = {name: part for name, part in plain["job"].items() if name not in OF_A_JOB}
+        plain["job"] = {name: part for name, part in plain["job"].items() if name not in FILLED_IN_OF_JOB}
     return {str(key): None if part == MISSING else part for key, part in plain.items()}
 
 
 def not_settable(where: str) -> Problem:
     """Problem to report of a name under `hydra.`."""
-    return Problem(where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(SETTABLE)}")
+    return Problem(
+        where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(SETTINGS_OF_HYDRA)}"
+    )
 
 
-SETTABLE = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/launcher", "hydra/sweeper")
+SETTINGS_OF_HYDRA = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/launcher", "hydra/sweeper")
 
 
 def _foreign_classes(part: Any, where: str) -> Iterator[Problem]:

@@ -22,7 +22,7 @@ class _Output(io.RawIOBase):
         return self._raw.fileno()
 
     def isatty(self) -> bool:
-        """Whether it is a terminal."""
+        """Tells whether it is a terminal."""
         return not self._raw.closed and self._raw.isatty()
 
     def write(self, data: Any, /) -> int | None:

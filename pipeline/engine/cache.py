@@ -8,7 +8,7 @@ from typing import Any
 from omninav.pipeline.files import DISK, digest_file, digest_text, locked, whole_file, write_whole
 
 from .codec import BadEncoding, decode, encode, seal, unseal
-from .damage import say_damaged
+from .damage import report_damage
 
 
 class Cache:
@@ -63,11 +63,11 @@ class Cache:
                 raise
             file = Path(str(error.filename2 or error.filename or self.folder))  # of a copy, the file that it makes
             where = f"cache: {file if file.is_relative_to(self.folder) else self.folder}: {error.strerror}"
-            say_damaged(f"{where}; results are not kept there: free some space, or type cache=FOLDER")
+            report_damage(f"{where}; results are not kept there: free some space, or type cache=FOLDER")
 
     def discard(self, key: str, suffix: str, why: str) -> None:
         """Throw a result away, and say why."""
-        say_damaged(f"{why}; it is thrown away and made again")
+        report_damage(f"{why}; it is thrown away and made again")
         for file in (self._entry(key, suffix), self.path(key, suffix)):
             with suppress(FileNotFoundError):
                 file.unlink()

@@ -16,7 +16,7 @@ from omninav.pipeline.graph.stage import Context, Outputs, State
 from .channel import channel_key, held_key
 from .codec import encode
 
-CHECKED_TICKS = 10
+VALIDATED_TICKS = 10
 """First calls of a stage whose outputs are checked against what their types state: enough for a mistake in the stage
 itself, and without a price later."""
 
@@ -30,7 +30,7 @@ class Call:
 
     def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str], validate: bool = False) -> None:
         self.node, self.ctx = node, ctx
-        self.to_check = math.inf if validate else CHECKED_TICKS
+        self.to_check = math.inf if validate else VALIDATED_TICKS
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
         self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}

@@ -7,7 +7,7 @@ _log = logging.getLogger("omninav")
 _shown: set[str] = set()
 
 
-def say_damaged(what: str) -> None:
+def report_damage(what: str) -> None:
     """Say in one line what was damaged and what is done about it."""
     if what in _shown:
         return

@@ -23,7 +23,7 @@ from .call import Call
 from .channel import Channel, channel_key, held_key
 from .checkpoint import Checkpoint, OtherVersion
 from .codec import BadEncoding, encode_state, restore_state
-from .damage import say_damaged
+from .damage import report_damage
 from .disk_sequence import DiskSequence, Present
 from .grown_rows import GrownRows
 
@@ -44,7 +44,7 @@ class EngineOptions:
     """Seconds between checkpoints."""
     on_tick: Callable[[int, int | None], None] = lambda done, total: None
     """Called after every tick, and by stages whose one step takes long."""
-    on_doing: Callable[[str], None] = lambda words: None
+    on_status: Callable[[str], None] = lambda words: None
     """Called with what such a stage does meanwhile, in words."""
     validate: bool = False
     """Whether every output of every tick is checked against what its type states, and not the first ones alone."""
@@ -118,7 +118,7 @@ class Engine:
     def _call(self, node: Node) -> Call:
         rng = np.random.default_rng([self.options.seed, zlib.crc32(node.name.encode())])
         ctx = Context(node.name, rng, self.options.folder)
-        ctx.progress, ctx.doing = self.options.on_tick, self.options.on_doing
+        ctx.progress, ctx.status = self.options.on_tick, self.options.on_status
         read = {*self.wanted, *self.kept, *(origin for wire in self.graph.wires for origin in wire.origins)}
         ctx.read = frozenset(port for port in node.signature.outputs if f"{node.name}.{port}" in read)
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
@@ -317,7 +317,7 @@ class Engine:
         except OtherVersion as error:
             raise BadInput(str(error)) from None
         except BadEncoding as error:
-            say_damaged(f"{error}; this graph begins again at its first tick")
+            report_damage(f"{error}; this graph begins again at its first tick")
             return None
         return found
 

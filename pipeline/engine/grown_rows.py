@@ -86,5 +86,5 @@ class GrownRows:
 
 
 def grows(value: Any) -> bool:
-    """Whether a value has fields of which only new rows need be written."""
+    """Tells whether a value has fields of which only new rows need be written."""
     return isinstance(value, Value) and bool(value.grows)

@@ -146,7 +146,7 @@ def keep_prefix(engine: Engine, prefix: CachedPrefix, cache: Cache | None) -> No
     sequence = engine.sequences[SEQUENCE]
     sequence.flush()
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(lineage(engine.graph, prefix.nodes))}
-    drew = any(note["drew"] for note in notes.values())
-    key = seeded(prefix.key, engine.options.seed) if drew else prefix.key
+    used_rng = any(note["drew"] for note in notes.values())
+    key = seeded(prefix.key, engine.options.seed) if used_rng else prefix.key
     with cache.unless_full(), cache.keep(key, ".prefix", notes) as part:
         shutil.copyfile(sequence.path, part)

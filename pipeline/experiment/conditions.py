@@ -55,7 +55,7 @@ class ConditionRun:
 
     @property
     def unfinished(self) -> bool:
-        """Whether it can and must still be run."""
+        """Tells whether it can and must still be run."""
         return not self.error and bool(self.missing)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from omninav.pipeline.engine.artifact import artifact_digest
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.code_version import graph_digest, module_version
-from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.engine.damage import report_damage
 from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.engine.engine import Engine, EngineOptions, PrefixReplay
 from omninav.pipeline.engine.prefix import (
@@ -114,7 +114,7 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         return read_json(path) if path.exists() else {}
     except Damaged as damaged:
-        say_damaged(f"{damaged}; this repetition runs again")
+        report_damage(f"{damaged}; this repetition runs again")
         return {}
 
 
@@ -210,8 +210,8 @@ def run_repetition(
         keep_prefix(engine, prefix, cache)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
     # What grows in place has grown by now: it starts again too.
-    drew = [name for name, call in engine.calls.items() if call.ctx.drew]
-    seeded = following(graph, [*drew, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
+    used_rng = [name for name, call in engine.calls.items() if call.ctx.used_rng]
+    seeded = following(graph, [*used_rng, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
     nodes = prefix_nodes(graph, artifacts=True, without=seeded)
     if not nodes or not set(frontier_of(graph, nodes)) <= set(wanted):
         return engine, None

@@ -10,7 +10,7 @@ from typing import Any
 
 from omninav.pipeline.engine.artifact import read_header
 from omninav.pipeline.engine.cache import Cache
-from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.engine.damage import report_damage
 from omninav.pipeline.files import Damaged, digest_file, locked, read_json, write_json
 from omninav.pipeline.graph.graph import Node
 from omninav.pipeline.graph.problems import BadInput
@@ -44,7 +44,7 @@ class Recording:
 
     @property
     def made(self) -> bool:
-        """Whether it is there, whole."""
+        """Tells whether it is there, whole."""
         return is_recorded(self.folder, self.key)
 
     @property
@@ -105,7 +105,7 @@ def _source_of(prepared: PreparedRun, artifact: str | None) -> Node | None:
 
 
 def is_recorded(folder: Path, key: str) -> bool:
-    """Whether a folder holds the whole recording with this key."""
+    """Tells whether a folder holds the whole recording with this key."""
     if not folder.is_dir():
         return False
     stated = _stated(folder)
@@ -113,7 +113,7 @@ def is_recorded(folder: Path, key: str) -> bool:
     whole = all((folder / name).is_file() and digest_file(folder / name) == digest for name, digest in files.items())
     if stated.get("key") == key and files and whole:
         return True
-    say_damaged(f"{folder}: the recording in it is damaged; it is recorded again")
+    report_damage(f"{folder}: the recording in it is damaged; it is recorded again")
     return False
 
 
@@ -161,11 +161,11 @@ class SharedArtifact:
 
     @property
     def made(self) -> bool:
-        """Whether it is there, whole."""
+        """Tells whether it is there, whole."""
         try:
             return self.file.exists() and bool(read_header(self.file))
         except BadInput as damaged:
-            say_damaged(f"{damaged}; it is made again")
+            report_damage(f"{damaged}; it is made again")
             return False
 
     def job(self) -> Job:

@@ -237,7 +237,7 @@ class Condition:
         return ", ".join(f"{factor} {label}" for factor, label in self.labels.items())
 
     def fits(self, labels: Mapping[str, Any]) -> bool:
-        """Whether it has all of these labels."""
+        """Tells whether it has all of these labels."""
         return all(self.labels.get(factor) == str(label) for factor, label in labels.items())
 
 

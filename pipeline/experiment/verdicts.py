@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def holds(self) -> bool | None:
-        """Whether every case holds; None where one could not be judged and none fails."""
+        """Tells whether every case holds; None where one could not be judged and none fails."""
         found = [case.holds for case in self.cases]
         if any(held is False for held in found):
             return False

@@ -223,7 +223,7 @@ class _Builder:
         self.wires.append(Wire(node.name, port_name, source_node, source_port, delay, hold, collect, initial))
 
     def _given(self, options: Mapping[str, Any]) -> bool:
-        """Whether what an optional wire comes from is there; one that is no wire is judged like any other."""
+        """Tells whether what an optional wire comes from is there; one that is no wire is judged like any other."""
         node, _, port = str(options.get("from")).partition(".")
         if node == ARTIFACTS:
             return port in self.artifacts

@@ -93,7 +93,7 @@ class Graph:
         return self.nodes[node].signature.outputs.get(name) if node in self.nodes else None
 
     def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "costly", "reported"]) -> bool:
-        """Whether the values of an output are of a type that is marked so (see `Value`)."""
+        """Tells whether the values of an output are of a type that is marked so (see `Value`)."""
         port = self.port(origin)
         return port is not None and bool(getattr(port.type, mark, False))
 

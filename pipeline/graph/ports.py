@@ -44,7 +44,7 @@ def type_name(annotation: Any) -> str:
 
 
 def compatible(given: Any, expected: Any) -> bool:
-    """Whether a value of one type may enter a port of another: same class, subclass, or member of a union."""
+    """Tells whether a value of one type may enter a port of another: same class, subclass, or member of a union."""
     if expected is Any or given is Any:
         return True
     if get_origin(given) in (Union, types.UnionType):

@@ -129,7 +129,7 @@ def refuse_untyped(command: str) -> None:
 
 
 def is_listed(target: str) -> bool:
-    """Whether a target is of omninav itself, or one that an entry point or the environment offers."""
+    """Tells whether a target is of omninav itself, or one that an entry point or the environment offers."""
     own = target.startswith(f"{BUILT_IN}.") and all(part.isidentifier() for part in target.replace(":", ".").split("."))
     return own or any(target in (entry.name, entry.target) for entry in plugins() if not entry.problem)
 

@@ -71,7 +71,7 @@ class Context:
     `count`, `fact` and `warn` write to the manifest. `count` records dropped items by kind. `fact` records a value that
     describes the run. `warn` records what one must know to judge the results; it is also printed at the end of the run
     and stands at the head of its report.
-    `progress` (done, total or None) and `doing` (in words) are for a stage whose one step takes long: they are shown.
+    `progress` (done, total or None) and `status` (in words) are for a stage whose one step takes long: they are shown.
     """
 
     def __init__(self, node: str, rng: "np.random.Generator | None" = None, folder: Path | None = None) -> None:
@@ -83,12 +83,12 @@ class Context:
         self.facts: dict[str, Any] = {}
         self.run_facts: dict[str, Any] = {}
         self.warnings: list[str] = []
-        self.drew = False
+        self.used_rng = False
         self.read: frozenset[str] | None = None
         self.readers: dict[str, list[str]] = {}
         """By output, the nodes that read it tick by tick and lead to a delayed wire: what they give is kept."""
         self.progress: Callable[[int, int | None], None] = lambda done, total: None
-        self.doing: Callable[[str], None] = lambda words: None
+        self.status: Callable[[str], None] = lambda words: None
         self._rng = rng
 
     def is_read(self, port: str) -> bool:
@@ -98,7 +98,7 @@ class Context:
     @property
     def rng(self) -> "np.random.Generator":
         """The node's own generator. Touching it marks the run as one whose results depend on the seed."""
-        self.drew = True
+        self.used_rng = True
         return self.rng_unmarked() if self._rng is None else self._rng
 
     def count(self, kind: str, number: int = 1, detail: str = "") -> None:
@@ -138,7 +138,7 @@ class Context:
             "details": dict(self.details),
             "facts": dict(self.facts),
             "warnings": list(self.warnings),
-            "drew": self.drew,
+            "drew": self.used_rng,
         }
 
     def restore(self, generator: dict[str, Any], notes: dict[str, Any]) -> None:
@@ -149,7 +149,7 @@ class Context:
     def restore_notes(self, notes: dict[str, Any]) -> None:
         """Put back what `notes` gave."""
         self.counts, self.details = Counter(notes["counts"]), dict(notes["details"])
-        self.facts, self.drew = dict(notes["facts"]), notes["drew"]
+        self.facts, self.used_rng = dict(notes["facts"]), notes["drew"]
         self.warnings = list(notes.get("warnings", ()))
 
 
@@ -170,7 +170,7 @@ class Stage:
     the engine keep the prefix of a graph (what follows from its logs alone) for the next run.
     """
 
-    on_request: ClassVar[bool] = False
+    needs_all_plots: ClassVar[bool] = False
     """True for a stage that only draws, and is left out unless all plots are asked for (`plots=all`)."""
 
     if TYPE_CHECKING:

@@ -49,7 +49,7 @@ class _Worker:
 
     @property
     def ready(self) -> bool:
-        """Whether it lives."""
+        """Tells whether it lives."""
         return self._process.poll() is None
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class _Lease:
         self._renewed, self._since = 0, time.monotonic()
 
     def over(self) -> bool:
-        """Whether it does not."""
+        """Tells whether it does not."""
         try:
             renewed = self._file.stat().st_mtime_ns
             if self._file.read_text(encoding="utf-8") != self._token:

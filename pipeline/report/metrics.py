@@ -190,7 +190,7 @@ def headline_paths(runs: Sequence[Metrics]) -> list[str]:
 
 
 def is_detail(path: str, metrics: Metrics) -> bool:
-    """Whether only the run's own page shows what stands at a path."""
+    """Tells whether only the run's own page shows what stands at a path."""
     return any(f"{path}.".startswith(f"{detail}.") for detail in metrics.details)
 
 

@@ -51,7 +51,7 @@ class Execution:
         options = EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, validate=self.validate)
         if self.display is None:
             return options
-        return replace(options, on_tick=partial(self.display.update, name), on_doing=self.display.say)
+        return replace(options, on_tick=partial(self.display.update, name), on_status=self.display.say)
 
 
 def identity(graph: Graph, seed: int, *more: str) -> str:
@@ -118,8 +118,8 @@ def _into(
 ) -> tuple[Path, Value]:
     """Put artifacts into the cache. The first is the one that is wanted; it is read as the next run will read it."""
     files = []
-    for artifact, value, header, drew in made:
-        key = seeded(_key(artifact), seed) if drew else _key(artifact)
+    for artifact, value, header, used_rng in made:
+        key = seeded(_key(artifact), seed) if used_rng else _key(artifact)
         with cache.keep(key, ".omap") as part:
             write_artifact(part, value, header)
         files.append(cache.path(key, ".omap"))
@@ -167,8 +167,8 @@ def _make(
     for each in wanted:
         value = values[each.origin]
         if isinstance(value, Value) and each.graph is not None:
-            drew = any(engine.calls[name].ctx.drew for name in each.graph.nodes)
-            yield each, value, provenance(each.graph, engine, each.variant), drew
+            used_rng = any(engine.calls[name].ctx.used_rng for name in each.graph.nodes)
+            yield each, value, provenance(each.graph, engine, each.variant), used_rng
 
 
 def provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:

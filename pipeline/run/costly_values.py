@@ -40,7 +40,7 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
         for origin, key in made.items():
             value, ctx = engine.values.get(origin), engine.calls[origin.partition(".")[0]].ctx
             if isinstance(value, Value):
-                own = seeded(key, seed) if ctx.drew else key
+                own = seeded(key, seed) if ctx.used_rng else key
                 with cache.unless_full(), cache.keep(own, SUFFIX, ctx.notes()) as part:
                     write_artifact(part, value)
 

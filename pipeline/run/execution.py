@@ -15,7 +15,7 @@ from typing import Any
 from omninav.pipeline.engine.artifact import artifact_digest, write_artifact
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
-from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.engine.damage import report_damage
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
 from omninav.pipeline.files import DISK, digest_file, open_itself, whole_file, write_whole
@@ -120,7 +120,7 @@ def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
     steps = run.manifest.pop(STEPS, 0)
     if steps > ticks:
         what = f"{steps - ticks:,} of {counted(steps, 'frame')}"
-        say_damaged(f"{run.folder}: the last {what} were not kept; omninav.resume takes them again")
+        report_damage(f"{run.folder}: the last {what} were not kept; omninav.resume takes them again")
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:

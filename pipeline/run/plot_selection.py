@@ -31,11 +31,11 @@ def _only_draws(node: Node) -> bool:
 
 
 def _is_drawn(node: Node, plots: str) -> bool:
-    return plots == "all" or (plots != "none" and not node.stage.on_request)
+    return plots == "all" or (plots != "none" and not node.stage.needs_all_plots)
 
 
 def _only_for(graph: Graph, name: str, unwanted: set[str]) -> bool:
-    """Whether somebody reads a node's outputs, and only those that are not wanted."""
+    """Tells whether somebody reads a node's outputs, and only those that are not wanted."""
     node = graph.nodes[name]
     readers = {reader for origin in node.origins for reader in graph.readers_of(origin)}
     return bool(readers) and readers <= unwanted and not node.signature.is_source and not graph.reported([name])

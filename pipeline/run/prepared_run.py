@@ -234,7 +234,7 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
 
 
 def _is_known(target: str) -> bool:
-    """Whether a stage that a file names still exists. For a file's sake nothing outside this package is imported."""
+    """Tells if a stage that a file names still exists. For a file's sake nothing outside this package is imported."""
     if not target.startswith(f"{OWN_PACKAGE}."):
         return True
     try:

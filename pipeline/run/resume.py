@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.engine.codec import BadEncoding, decode, unseal
-from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.engine.damage import report_damage
 from omninav.pipeline.files import Damaged, digest_file, digest_text, read_json
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
@@ -73,7 +73,7 @@ def _reopened(run: RunFolder, folder: Path) -> PreparedRun | None:
             shutil.rmtree(run.memory, ignore_errors=True)
             run.complete = True
             return None
-        say_damaged(f"{folder}: {damaged} is damaged or gone; the run is made again")
+        report_damage(f"{folder}: {damaged} is damaged or gone; the run is made again")
     if Path(began.cwd).is_dir():
         os.chdir(began.cwd)  # its paths are relative to where it was started
     again = shlex.join(began.argv)
@@ -123,7 +123,7 @@ def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
     except Damaged as damaged:
         if not sealed:
             raise BadInput(f"{damaged}; what the run was is no longer known: start it again") from None
-        say_damaged(f"{damaged}; it is written again")
+        report_damage(f"{damaged}; it is written again")
         run.manifest = dict(sealed["manifest"])
     known = {name: run.manifest[name] for name in Manifest.__dataclass_fields__ if name in run.manifest}
     arguments, problems = convert_fields({"files": {}, STEPS: 0} | known, Manifest, MANIFEST)
@@ -137,7 +137,7 @@ def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
         if digest_text(text) != began.config:
             again = shlex.join(began.argv)
             raise BadInput(f"{folder}: config.yaml is damaged, or was changed by hand; start the run again: {again}")
-        say_damaged(f"{folder}: config.yaml is damaged, or was changed by hand; it is written again as it was")
+        report_damage(f"{folder}: config.yaml is damaged, or was changed by hand; it is written again as it was")
     return began, text
 
 

@@ -147,7 +147,7 @@ def start(
 
 
 def was_started(folder: Path, prepared: PreparedRun) -> bool:
-    """Whether a run of the same configuration, stages and inputs was started in a folder: then it can go on there."""
+    """Tells if a run of the same configuration, stages and inputs was started in a folder: then it can go on there."""
     try:
         manifest = read_json(folder / MANIFEST)
     except (OSError, Damaged):

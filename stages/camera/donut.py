@@ -44,7 +44,7 @@ class Donut(Camera, projection="donut"):
 
     @property
     def complete(self) -> bool:
-        """Whether its ring is known."""
+        """Tells whether its ring is known."""
         return self.ring is not None
 
     def found_in(self, pixels: Pixels) -> Self | None:

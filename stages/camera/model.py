@@ -170,7 +170,7 @@ class Camera(Value, ABC):
 
     @property
     def elevations_known(self) -> bool:
-        """Whether elevations are measured; else azimuths are right, and elevations a guess."""
+        """Tells whether elevations are measured; else azimuths are right, and elevations a guess."""
         return True
 
     @property

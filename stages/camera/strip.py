@@ -52,7 +52,7 @@ class Strip(Camera):
 
     @property
     def elevations_known(self) -> bool:
-        """Whether camera.yaml gives both."""
+        """Tells whether camera.yaml gives both."""
         return self.elevation_top is not None and self.elevation_bottom is not None
 
     def project(self, rays: Array) -> tuple[Array, Bools]:

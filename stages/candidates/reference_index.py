@@ -50,7 +50,7 @@ class BuildReferenceIndex(Stage):
         if len(map) >= REBUILD_GROWTH * state.references:
             state.references, self._index = len(map), None
         if self._index is None or map is not self._map:
-            ctx.doing("indexing the map's references")
+            ctx.status("indexing the map's references")
             self._index, self._map = self._built(ctx, map, state.references), map
         return self.Out(index=self._index)
 

@@ -54,7 +54,7 @@ class CameraTransport(Transport):
 
     @property
     def ended(self) -> bool:
-        """Whether a video has ended, and its last image has been taken."""
+        """Tells whether a video has ended, and its last image has been taken."""
         with self._changed:
             return self._over and self._newest is None
 

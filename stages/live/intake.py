@@ -339,7 +339,7 @@ class Intake:
         return arrivals
 
     def _follows(self, stamp: int) -> bool:
-        """Whether an image comes after the last one used; or its clock was set back for good."""
+        """Tells whether an image comes after the last one used; or its clock was set back for good."""
         if self.last_stamp is None or stamp > self.last_stamp:
             return True
         if self._earlier is None or stamp < self._earlier:

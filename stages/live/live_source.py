@@ -281,7 +281,7 @@ class LiveSource(Source):
         news = status.news()
         for sentence in news:
             ctx.warn(sentence)
-        ctx.doing(", ".join([status.line(), *news]))
+        ctx.status(", ".join([status.line(), *news]))
         if self.diagnostics is not None:
             publish_diagnostics(self._transport, self.diagnostics)
 

@@ -227,5 +227,5 @@ class RobotDriver(Stage):
             speed = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""
             obeys = f"obeys {self.command_topic}" if self._subscribed else f"nobody publishes {self.command_topic}"
             status = self._transport.status
-            ctx.doing("; ".join([f"{seconds:.0f} s{speed}", obeys, *status.troubles.values(), *status.news()]))
+            ctx.status("; ".join([f"{seconds:.0f} s{speed}", obeys, *status.troubles.values(), *status.news()]))
             self._noted = seconds, now

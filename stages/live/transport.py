@@ -116,7 +116,7 @@ class Transport(ABC):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing will come any more. A robot may always say something."""
+        """Tells whether nothing will come any more. A robot may always say something."""
         return False
 
     @abstractmethod

@@ -142,7 +142,7 @@ class CameraCheck(NamedTuple):
             return ""
         if np.abs(camera.unproject(self.pixels)[0] - self.bearings).max() > SAME_RAY:
             return ""
-        ctx.doing("finding the horizon of the strip")
+        ctx.status("finding the horizon of the strip")
         right = with_elevations_found(camera, self.pixels, views, matches, poses)
         if right is None:
             return ""

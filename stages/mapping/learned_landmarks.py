@@ -91,7 +91,7 @@ class LearnLandmarks(Stage):
     ) -> Out:
         """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
         straightened. `ticks`, `odometry` and `truth` of all images tell how late these are stamped."""
-        ctx.doing("triangulating landmarks")
+        ctx.status("triangulating landmarks")
         found = [each for each, event in zip(features, events, strict=True) if event is not None]
         views, given = _views(found), map.pose_source == "truth"
         check = CameraCheck.of(camera, found, views.bearings, given)

@@ -43,7 +43,7 @@ class LearnVisualWords(Stage):
             for found, event in zip(features, events, strict=True)
             if event is not None
         ]
-        ctx.doing("learning visual words")
+        ctx.status("learning visual words")
         made = vocabulary_and_words(views, self.words)
         ctx.fact("visual_words", len(made.centres))
         return self.Out(words=made)
@@ -72,7 +72,7 @@ class LearnPlaceWords(Stage):
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:
         """The whole tour at once."""
-        ctx.doing("learning visual words")
+        ctx.status("learning visual words")
         descriptors = [found.descriptors for found in views.features]
         made = vocabulary_and_words(descriptors, self.words)
         return self.Out(words=PlaceWords(made, hypotheses.place, views.poses, views.pose_source))

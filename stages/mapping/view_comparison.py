@@ -85,7 +85,7 @@ class ViewComparison(Stage):
             tours, owners = np.append(np.zeros(kept, np.int64), tours), np.append(known.owner, owners)
         if not seen:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
-        ctx.doing(f"comparing {len(seen)} views")
+        ctx.status(f"comparing {len(seen)} views")
         options = ComparisonOptions(self.ratio, min_matches=self.min_matches, patch_distance=self.patch_distance)
         colours = np.stack([each.values for each in wholes]).astype(np.float64)
         close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance

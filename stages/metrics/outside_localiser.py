@@ -93,7 +93,7 @@ class OutsideLocaliser(Stage):
         with tempfile.TemporaryDirectory(prefix="omninav_peer_") as place:
             folder = Path(place)
             given = {*write_folder(folder, map, images)}
-            ctx.doing(f"{cut(self.command or '')}: a map of {len(map)} images, a drive of {len(images)}")
+            ctx.status(f"{cut(self.command or '')}: a map of {len(map)} images, a drive of {len(images)}")
             used = self._run(folder, (ctx.folder or folder) / LOG)
             try:
                 poses, images_ms = read_poses(folder, images)

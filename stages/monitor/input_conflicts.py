@@ -158,7 +158,7 @@ class InputConflicts(Stage):
 
 
 def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
-    """Whether the clock leapt since the last image: much time went by, or less than none, yet the robot drove on as
+    """Tells if the clock leapt since the last image: much time went by, or less than none, yet the robot drove on as
     between other images, which no pause explains; else ""."""
     if odometry is None or isinstance(odometry, AssumedPose) or len(recent.rows) < MIN_BEFORE_LEAP:
         return ""
@@ -365,7 +365,7 @@ def misplacing(watched: Watched, length_scale_m: float) -> str:
 
 
 def turns_fit(watched: Watched) -> bool:
-    """Whether odometry turns as the images do."""
+    """Tells whether odometry turns as the images do."""
     seen = watched.sure_turns
     known = np.isfinite(seen) & (np.abs(seen) > SURE_TURN)
     turns = np.diff(watched.odometry[:, 2])[known]

@@ -98,7 +98,7 @@ def of_poses(poses: Array) -> str:
 
 
 def of_headings(turned: Array, headings: Array) -> str:
-    """Whether neighbours look turned (P,) against each other as their `headings` differ (P,), or the other way."""
+    """Tells if neighbours look turned (P,) against each other as their `headings` differ (P,), or the other way."""
     known = np.abs(headings) > MIN_TURN
     if known.sum() < MIN_TURNS:
         return ""

@@ -28,7 +28,7 @@ FINE = 4
 
 
 def is_known(vector: HomingVector) -> bool:
-    """Whether a homing vector is known: it is not where the target was never found."""
+    """Tells whether a homing vector is known: it is not where the target was never found."""
     return vector.state != "lost" or vector.metres is not None or vector.direction != 0.0
 
 

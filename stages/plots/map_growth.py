@@ -23,7 +23,7 @@ class MapGrowth(PlotStage):
     Gives nothing where nothing was ever learned.
     """
 
-    on_request = True
+    needs_all_plots = True
 
     def step(
         self,

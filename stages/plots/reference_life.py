@@ -30,7 +30,7 @@ class ReferenceLife(PlotStage):
     that reference never was, or no reference ever changed.
     """
 
-    on_request = True
+    needs_all_plots = True
 
     name: Annotated[int, Bounds(ge=0)] | None = None
     """Number of the reference. None: the one whose heaviest component moved furthest in sum, which is where wrong

@@ -22,7 +22,7 @@ FRAMES = 4
 class SimilarityHeatMap(PlotStage):
     """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
-    on_request = True
+    needs_all_plots = True
 
     def step(self, ctx: Context, drive: Drive, peaks: Sequence[Peaks | None], map: ReferenceGraph) -> PlotStage.Out:
         """The whole run at once; frames of the last log are shown."""

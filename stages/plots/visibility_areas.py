@@ -44,7 +44,7 @@ class ShowVisibilityAreas(PlotStage):
     steps along the map. With `drive` wired its true path is drawn over the last panel.
     """
 
-    on_request = True
+    needs_all_plots = True
 
     def step(
         self,

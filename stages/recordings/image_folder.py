@@ -320,7 +320,7 @@ def _is_turned(path: Path) -> bool:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether there is a file of that name that may be an image; also of a name that no file can have."""
+    """Tells whether there is a file of that name that may be an image; also of a name that no file can have."""
     try:
         return path.is_file() and 0 < path.stat().st_size <= MAX_FILE_BYTES  # as nothing in /proc is
     except OSError:

@@ -100,7 +100,7 @@ def pixels_of(message: Any) -> Pixels:
 
 
 def is_blank(pixels: Pixels) -> bool:
-    """Whether an image is constant: no channel spans more than `LEVELS_OF_A_BLANK` grey levels."""
+    """Tells whether an image is constant: no channel spans more than `LEVELS_OF_A_BLANK` grey levels."""
     some = (pixels[::step, ::step] for step in (64, 8, 1))  # a few pixels tell most images from a blank
     return not any(np.ptp(part, axis=(0, 1)).max() > LEVELS_OF_A_BLANK for part in some)
 

@@ -59,7 +59,7 @@ def assumed_camera(name: str, pixels: Pixels) -> tuple[Camera, str]:
 
 
 def _two_circles(pixels: Pixels) -> bool:
-    """Whether an image twice as wide as high is dark outside two circles side by side, and not in the same rows inside.
+    """Tells if an image twice as wide as high is dark outside two circles side by side, not in the same rows inside.
 
     A panorama without a zenith is dark there too, but all around.
     """

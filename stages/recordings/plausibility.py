@@ -124,7 +124,7 @@ def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:
 
 
 def possible_between(before: Array, after: Array, seconds: float, limits: MotionLimits) -> bool:
-    """Whether a robot within `limits` gets from a pose (3,) to another in that time."""
+    """Tells whether a robot within `limits` gets from a pose (3,) to another in that time."""
     (x, y, heading), (x_then, y_then, heading_then) = after.tolist(), before.tolist()
     if not math.hypot(x - x_then, y - y_then) <= limits.speed * max(seconds, MIN_INTERVAL_S):  # nor is NaN
         return False
@@ -132,7 +132,7 @@ def possible_between(before: Array, after: Array, seconds: float, limits: Motion
 
 
 def _resumes(firsts: Rows, ends: Rows, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Bools:
-    """Whether a track can be at the first pose of a stretch, soon after the end of one before: (S - back,)."""
+    """Tells whether a track can be at the first pose of a stretch, soon after the end of one before: (S - back,)."""
     last, first = ends[:-back] - 1, firsts[back:]
     possible = _possible(stamps[last], poses[last], stamps[first], poses[first], limits)
     return possible if back == 1 else possible & (stamps[first] - stamps[last] <= EXCURSION_S * 1e9)

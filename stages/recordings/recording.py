@@ -132,7 +132,7 @@ class Format(ABC):
         FORMATS.append(cls)
 
     def opens(self, log: str) -> bool:
-        """Whether a name is one of this format, there or not: by default a file with one of the suffixes."""
+        """Tells whether a name is one of this format, there or not: by default a file with one of the suffixes."""
         return Path(log).suffix in self.suffixes and not user_path(log).is_dir()
 
     @abstractmethod

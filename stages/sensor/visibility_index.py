@@ -118,7 +118,7 @@ def _by_cell(
 
 
 def sees_any(poses: Array, cells: Cells) -> Bools:
-    """Whether any group is seen from poses (N, 3): (N,)."""
+    """Tells whether any group is seen from poses (N, 3): (N,)."""
     row, column = cells_of(poses, cells.origin, cells.resolution).T
     inside = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
     number = np.where(inside, row * cells.columns + column, 0)

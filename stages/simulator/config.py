@@ -436,7 +436,7 @@ class WorldConfig:
 
     @property
     def drives_backwards(self) -> bool:
-        """Whether routes are driven the other way round: in even draws, but for the first."""
+        """Tells whether routes are driven the other way round: in even draws, but for the first."""
         return self.draw > 0 and self.draw % 2 == 0
 
     @property

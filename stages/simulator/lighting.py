@@ -215,7 +215,7 @@ def _sees(
     below: float,
     step: float,
 ) -> bool:
-    """Whether nothing blocks the way from a point to a light; the ends of the way do not count."""
+    """Tells whether nothing blocks the way from a point to a light; the ends of the way do not count."""
     length = math.hypot(away_x, away_y)
     count = int(length / step)
     for k in range(2, count - 1):

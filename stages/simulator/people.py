@@ -218,7 +218,7 @@ class Companion:
         return next((place for place in places if self._has_room(place, x, y, others)), None)
 
     def _has_room(self, place: Array, x: float, y: float, others: Array) -> bool:
-        """Whether a place is free and, if near the robot at (x, y), has a free line to it."""
+        """Tells whether a place is free and, if near the robot at (x, y), has a free line to it."""
         if math.hypot(place[0] - x, place[1] - y) < MIN_ROBOT_DISTANCE_M:
             return False
         if len(others) and np.hypot(*(others - place).T).min() < 2.2 * RADIUS_M:
@@ -408,7 +408,7 @@ class Crowd:
 
 
 def _has_given_up(row: Array, goal: Array, robot: Array) -> bool:
-    """Whether a person is too far from the desired place, out of the robot's sight."""
+    """Tells whether a person is too far from the desired place, out of the robot's sight."""
     return math.dist(goal, row[:2]) > GIVE_UP_DISTANCE_M and math.dist(row[:2], robot) > OUT_OF_SIGHT_M
 
 

@@ -37,9 +37,9 @@ def record_log(
     `UnreadableRecording` for an unknown route.
     """
     days = in_order(day)
-    ctx.doing(f"building {world.name} and planning {route}")
+    ctx.status(f"building {world.name} and planning {route}")
     drives = [SimulatedRecording(world, route, day, kidnappings) for day in days]
-    ctx.doing("rendering the first image (a minute if the renderer has to be compiled)")
+    ctx.status("rendering the first image (a minute if the renderer has to be compiled)")
     record(drives, path, progress=ctx.progress)
     camera, floor = path.with_suffix(".camera.yaml"), path.with_suffix(".plan.png")
     camera.write_text(write_camera(drives[0].camera), encoding="utf-8")

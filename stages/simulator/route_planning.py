@@ -376,7 +376,7 @@ class _FreeSpace:
 
 
 def _straight(world: World, points: Array, room: float) -> bool:
-    """Whether straight lines from point to point keep as much room."""
+    """Tells whether straight lines from point to point keep as much room."""
     return bool(world.is_free(_resampled(points, 0.1), room).all())
 
 

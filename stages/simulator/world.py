@@ -276,7 +276,7 @@ class World:
         return self._gathered[reach]
 
     def is_free(self, points: npt.ArrayLike, radius: float) -> Bools:
-        """Whether a disc of `radius` m has room at points (N, 2)."""
+        """Tells whether a disc of `radius` m has room at points (N, 2)."""
         return self.clearance(points) > radius
 
 

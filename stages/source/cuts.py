@@ -43,7 +43,7 @@ def thinned(frames: Ints, stamps: Ints, rate_hz: float | None) -> Ints:
 
 
 def crossed(cuts: Sequence[Cut], frames: Ints) -> Bools:
-    """Whether a cut lies between each of the frames (N,) and the next: (N - 1,)."""
+    """Tells whether a cut lies between each of the frames (N,) and the next: (N - 1,)."""
     done = np.searchsorted([to for _, to in cuts], frames, side="right")
     between_them: Bools = np.diff(done) > 0
     return between_them

@@ -52,7 +52,7 @@ class CalibrateCamera(Tool):
         columns, rows = board_size(self.board)
         recording = open_recording(self.images, camera="perspective")  # of which no number is used
         chosen = np.unique(np.linspace(0, len(recording.stamps) - 1, self.max_images).round().astype(int)).tolist()
-        ctx.doing("looking for the board in the images")
+        ctx.status("looking for the board in the images")
         seen: dict[int, Array] = {}
         first: Pixels | None = None
         for done, frame in enumerate(chosen):
@@ -67,7 +67,7 @@ class CalibrateCamera(Tool):
                 f"calibrate: no board of {columns} x {rows} inner corners is seen in any of {len(chosen)} images; "
                 "count the corners between its squares: board=COLUMNSxROWS"
             )
-        ctx.doing("fitting the camera model")
+        ctx.status("fitting the camera model")
         found = calibrated(
             self.projection, first.shape[1::-1], ring_of(first), list(seen.values()), board_points(columns, rows)
         )

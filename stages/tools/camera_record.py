@@ -41,7 +41,7 @@ class RecordCamera(Tool):
         if path.suffix != ".mcap":
             raise BadInput(f"record: out={self.out:.100} is no .mcap; type out=camera.mcap")
         device = CameraDevice(str(self.device))
-        ctx.doing("recording; Ctrl-C ends it")
+        ctx.status("recording; Ctrl-C ends it")
         try:
             written = self._record(ctx, device, path)
         finally:

@@ -93,7 +93,7 @@ class Drive(Value):
 
     @property
     def has_truth(self) -> bool:
-        """Whether any row has a true pose."""
+        """Tells whether any row has a true pose."""
         return bool(known(self.truth).any())
 
     def odometry(self) -> Array | None:

@@ -98,7 +98,7 @@ def _png(data: bytes) -> tuple[int, int]:
 
 
 def _png_is_whole(data: bytes) -> bool:
-    """Whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk says it has."""
+    """Tells whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk says it has."""
     at = 8
     while at + 12 <= len(data):
         kind = data[at + 4 : at + 8]

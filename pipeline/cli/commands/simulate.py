@@ -15,7 +15,7 @@ LIVE = ("~variant", "+graph=simulate_live")
 
 
 def is_live(arguments: list[str]) -> bool:
-    """Whether what is simulated is sent, and not written as a log."""
+    """Tells whether what is simulated is sent, and not written as a log."""
     return any(word.startswith("live=") for word in arguments)
 
 
@@ -32,5 +32,5 @@ def command(arguments: list[str]) -> int:
             progress.update("simulate", done, total)
 
         with contextlib.suppress(KeyboardInterrupt):  # that is how it ends
-            Engine(prepared.graph, {}, EngineOptions(prepared.seed, on_tick=on_tick, on_doing=progress.say)).run()
+            Engine(prepared.graph, {}, EngineOptions(prepared.seed, on_tick=on_tick, on_status=progress.say)).run()
     return 0

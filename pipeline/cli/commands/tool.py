@@ -32,7 +32,7 @@ def run_tool(name: str, words: Sequence[str]) -> None:
         progress.say("reading the arguments")
         tool = tool_from(tool_class(name), words)
         ctx = Context(name)
-        ctx.doing = progress.say
+        ctx.status = progress.say
         ctx.progress = lambda done, total: progress.update(name, done, total)
         try:
             tool.run(ctx)

@@ -208,7 +208,7 @@ def _squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array)
 
 @compiled(nogil=True)
 def farther_apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limit: float) -> bool:
-    """Whether x, y or heading alone shows that the squared distance is `limit` or more: a cheap test for most pairs."""
+    """Tells if x, y or heading alone puts the squared distance at `limit` or more: a cheap test for most pairs."""
     for i in range(3):
         gap = mean_b[i] - mean_a[i]
         if i == 2:

@@ -7,7 +7,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.cache import Cache
-from omninav.pipeline.engine.call import CHECKED_TICKS, StageFailed
+from omninav.pipeline.engine.call import VALIDATED_TICKS, StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, following, keep_prefix, prefix_nodes
 from omninav.pipeline.graph.builder import build
@@ -284,7 +284,7 @@ def test_a_result_that_is_given_every_tick_is_there_though_no_tick_runs_again(tm
     assert found == [{"latest": 9.0}, {"latest": 9.0}]
 
 
-@pytest.mark.parametrize(("since", "validate"), [(CHECKED_TICKS - 1, False), (CHECKED_TICKS + 3, True)])
+@pytest.mark.parametrize(("since", "validate"), [(VALIDATED_TICKS - 1, False), (VALIDATED_TICKS + 3, True)])
 def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, validate: bool):
     nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": since}}
     graph = graph_of(nodes, {"doubt": {"number": "source.number"}})
@@ -297,7 +297,7 @@ def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, val
 
 
 def test_later_outputs_are_checked_only_where_asked_for():
-    nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": CHECKED_TICKS}}
+    nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": VALIDATED_TICKS}}
     engine = Engine(graph_of(nodes, {"doubt": {"number": "source.number"}}))
     engine.run()
     assert engine.ticks == 20

@@ -192,7 +192,7 @@ def test_random_integration_repeats_with_its_seed_and_full_integration_draws_not
     assert one.tobytes() != third.tobytes()
     ctx = Context("features")
     assert HaarIntegral().step(ctx, pictures).metrics is None
-    assert not ctx.drew
+    assert not ctx.used_rng
 
 
 def test_kernels_share_the_mass_and_scales_each_have_all_of_it() -> None:

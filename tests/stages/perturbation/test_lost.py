@@ -46,4 +46,4 @@ def test_without_a_share_nothing_is_drawn() -> None:
     assert LostFeatures().step(ctx, features).features is features
     assert LoseTracks().step(ctx, tracks).tracks is tracks
     assert LoseTracks(share=0.5).step(ctx, None).tracks is None
-    assert not ctx.drew
+    assert not ctx.used_rng

@@ -64,7 +64,7 @@ def test_every_image_is_a_tick_and_motions_chain_to_the_odometry(log: str) -> No
     assert outs[0].motion is None
     assert_motions_chain_to_odometry(outs)
     assert ctx.facts["odometry"] == "measured"
-    assert not ctx.drew
+    assert not ctx.used_rng
 
 
 def test_motion_spans_images_that_cannot_be_used(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_without_odometry_it_is_made_up_from_the_truth_and_said(tmp_path: Path) 
     ctx = context(1)
     outs = drive(LogSource(log=path), ctx)
     assert ctx.facts["odometry"] == "synthetic"
-    assert ctx.drew
+    assert ctx.used_rng
     assert row(outs[0].odometry).tolist() == [0.0, 0.0, 0.0]
     assert_motions_chain_to_odometry(outs)
     true = [between(row(a.truth), row(b.truth)) for a, b in pairwise(outs)]
