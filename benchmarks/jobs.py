@@ -64,16 +64,14 @@ def _throughput(place: Path) -> list[Row]:
 
     times: dict[int, list[float]] = {1: [], 2: []}
     processor: dict[int, list[float]] = {1: [], 2: []}
-    with (
-        WorkerPool(ExecutorSettings(workers=1), place) as one,
-        WorkerPool(ExecutorSettings(workers=2), place / "two") as two,
-    ):
-        executors = {1: one, 2: two}
-        for number, workers in executors.items():  # map, features and compiled code are there by then
+    settings = [ExecutorSettings(workers=number) for number in (1, 2)]
+    with WorkerPool(settings[0], place) as one, WorkerPool(settings[1], place / "two") as two:
+        pools = {1: one, 2: two}
+        for number, workers in pools.items():  # map, features and compiled code are there by then
             ends = workers.run(jobs(number, 2))
             assert not any(end.error for end in ends.values()), ends
         for _ in range(ROUNDS):
-            for number, workers in executors.items():
+            for number, workers in pools.items():
                 workers.run(jobs(number, number))  # its processes are there
                 some = jobs(number, REPETITIONS)
                 begun = time.perf_counter()

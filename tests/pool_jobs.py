@@ -1,4 +1,4 @@
-"""Jobs for the tests of engines."""
+"""Jobs for the tests of executors."""
 
 import os
 import signal

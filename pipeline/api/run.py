@@ -35,9 +35,8 @@ class NestedValues(dict[str, Any]):
         inside: Any = dict(self)
         for name in str(path).split("."):
             if not isinstance(inside, dict) or name not in inside:
-                raise KeyError(
-                    f"no metric '{path}'; {suggest(name, inside if isinstance(inside, dict) else (), 'metrics')}"
-                )
+                known = inside if isinstance(inside, dict) else ()
+                raise KeyError(f"no metric '{path}'; {suggest(name, known, 'metrics')}")
             inside = inside[name]
         return inside
 

@@ -228,12 +228,10 @@ def _plain(config: Any) -> dict[str, Any]:
 
 def not_settable(where: str) -> Problem:
     """Problem to report of a name under `hydra.`."""
-    return Problem(
-        where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(SETTINGS_OF_HYDRA)}"
-    )
+    return Problem(where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(HYDRA_KEYS)}")
 
 
-SETTINGS_OF_HYDRA = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/launcher", "hydra/sweeper")
+HYDRA_KEYS = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/launcher", "hydra/sweeper")
 
 
 def _foreign_classes(part: Any, where: str) -> Iterator[Problem]:

@@ -25,7 +25,7 @@ from omninav.pipeline.graph.signature import signature
 
 from .composition_cache import compose
 from .config_groups import replaced, suggest_option
-from .hydra_session import SETTINGS_OF_HYDRA, not_settable
+from .hydra_session import HYDRA_KEYS, not_settable
 from .stand_ins import decisive_settings, exchanged
 
 MAX_JOBS = 100_000
@@ -247,7 +247,7 @@ def _unknown_option(word: Override, options: Sequence[str], folders: Sequence[st
 def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str]) -> Iterator[Problem]:
     path = word.key_or_group
     if path.partition(".")[0].partition("/")[0] == "hydra":
-        if not path.replace("/", ".").startswith(tuple(name.replace("/", ".") for name in SETTINGS_OF_HYDRA)):
+        if not path.replace("/", ".").startswith(tuple(name.replace("/", ".") for name in HYDRA_KEYS)):
             yield not_settable(path)
         return
     value = str(word.input_line).partition("=")[2]

@@ -60,8 +60,7 @@ def run_sweep(
 
 def is_of_executor(word: str) -> bool:
     """Tells whether a word says where jobs run, and nothing of what they do."""
-    name = word.lstrip("+").partition("=")[0].partition(".")[0]
-    return name in ("executor", "engine")  # older sweeps have engine=… in their folders
+    return word.lstrip("+").startswith(("executor=", "executor.", "engine=", "engine."))  # engine: of older sweeps
 
 
 def _end_of(job: Job, outcome: Outcome) -> JobEnd:

@@ -9,7 +9,7 @@ from omninav.pipeline.graph.results import Metrics
 from .metrics import MetricValue, digits, headline_paths, is_detail, metric_values, with_unit
 
 MAX_ROWS = 10
-"""Most lines that a run prints, its speed among them."""
+"""Lines that a run prints at most, its speed among them."""
 STANDS_FOR_ALL = ("median", "mean", "rmse")
 """Statistics of which the first that there is stands for a distribution, where no stage says what comes first."""
 

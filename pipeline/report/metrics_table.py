@@ -38,8 +38,7 @@ class MetricsTable:
 
 def metrics_table(metrics: Metrics, details: bool = True) -> MetricsTable:
     """The metrics as rows, without their details where these are not asked for."""
-    every = in_order(metrics)
-    found = [e for e in every if e.is_shown(e.value) and (details or not is_detail(e.path, metrics))]
+    found = [e for e in in_order(metrics) if e.is_shown(e.value) and (details or not is_detail(e.path, metrics))]
     columns = tuple(s for s in STATISTICS if any(metric.statistics and s in metric.statistics for metric in found))
     spread_out = {metric.groups for metric in found if metric.statistics}  # groups that hold distributions
     by_name: dict[str, list[Metric]] = {}

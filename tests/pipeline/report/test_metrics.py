@@ -53,9 +53,8 @@ def test_every_number_has_its_path_and_a_readable_name():
 
 def test_a_title_given_for_a_path_is_shown_without_its_groups():
     described = {"success.at_end": MetricSpec(title="Final pose correct")}
-    assert (
-        metric_values(Metrics({"success": {"at_end": 1.0}}, described))["success.at_end"].name == "Final pose correct"
-    )
+    found = metric_values(Metrics({"success": {"at_end": 1.0}}, described))
+    assert found["success.at_end"].name == "Final pose correct"
 
 
 def test_described_entries_come_first_in_their_order():
