@@ -168,24 +168,13 @@ class ExpectedObservation(NearReferences):
                 "sensor: expected_observation compares as the match does, and does not know how this one does; use "
                 "match=selective, match=histogram_intersection or match=l2, or sensor=near_references"
             )
-        self._view, self._exponent = features, similarities.exponent
-        self._colour_scale = similarities.colour_scale or MAX_COLOUR_DISTANCE
-        return super().step(ctx, similarities, particles, map, motion, length_scale)
+        view, histograms = features.values, isinstance(features, SegmentHistograms)
+        how = similarities.exponent, similarities.colour_scale or MAX_COLOUR_DISTANCE
 
-    def _expected(
-        self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
-    ) -> Array:
-        near = self._cells.of(poses)
-        used, rows = self._rows.of(distinct(near[near >= 0].astype(np.int64)))
-        return similarity_of_expected(
-            poses,
-            map.poses[used],
-            map.features[used],
-            self._view.values,
-            isinstance(self._view, SegmentHistograms),
-            np.where(near < 0, -1, rows[near]).astype(np.int32),
-            self._fade_m(unit),
-            floor,
-            self._exponent,
-            self._colour_scale,
-        )
+        def expected(near: Shorts, _: Ints, fade_m: float | None, floor: float) -> Array:
+            used, rows = self._rows.of(distinct(near[near >= 0].astype(np.int64)))
+            here = np.where(near < 0, -1, rows[near]).astype(np.int32)
+            known = map.poses[used], map.features[used], view, histograms, here
+            return similarity_of_expected(particles.poses, *known, fade_m, floor, *how)
+
+        return self.weighted(similarities, particles, map, motion, length_scale, None, expected)

@@ -1,6 +1,7 @@
 """Weights particles by the similarities of the references near them."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated
 
@@ -225,9 +226,25 @@ class NearReferences(Stage):
         calibration: SimilarityCalibration | None = None,
     ) -> Out:
         """Weight all particles."""
+
+        def expected(near: Shorts, rows: Ints, fade_m: float | None, floor: float) -> Array:
+            return expected_similarity(particles.poses, map.poses, near, rows, similarities.values, fade_m, floor)
+
+        return self.weighted(similarities, particles, map, motion, length_scale, calibration, expected)
+
+    def weighted(
+        self,
+        similarities: Similarities,
+        particles: Particles,
+        map: ReferenceGraph,
+        motion: Motion | None,
+        length_scale: LengthScale | None,
+        calibration: SimilarityCalibration | None,
+        expected: Callable[[Shorts, Ints, float | None, float], Array],
+    ) -> Out:
+        """Weight all particles by what `expected` gives for the references near each, as `expected_similarity` does."""
         unit = metres_of(length_scale)
-        values = similarities.values
-        if not values.size:
+        if not similarities.values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
         if map is not self._map or len(map) != self._length:
             radius = (FAR if self.fade_distance is None else CUTOFF_SIGMAS * self.fade_distance) * unit
@@ -235,9 +252,11 @@ class NearReferences(Stage):
             self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
         candidates, rows = self._rows.of(similarities.candidates)
+        near = self._cells.of(particles.poses)
+        fade_m = None if self.fade_distance is None else self.fade_distance * unit
         if calibration is not None:
             new = novelty_and_kidnapping(similarities, calibration, motion, self.independence_distance)
-            return self._calibrated(similarities, particles, map, rows, unit, calibration, *new)
+            return self._calibrated(similarities, particles, map, near, rows, fade_m, calibration, *new)
         best, each = similarities.best, similarities.sampling_weight
         floor = 0.0
         if self.background_quantile is not None:
@@ -248,34 +267,24 @@ class NearReferences(Stage):
         novelty = evidence_novelty(driven, self.independence_distance * unit)
         top = max(float(np.maximum.reduce(best)), 1e-12)
         field = similarity_field(similarities, floor, top, power)
-        expected = self._expected(particles.poses, map, rows, values, unit, floor)
-        likelihood = Likelihood((expected / top) ** (power * novelty), field.mean, novelty)
-        return self.Out(likelihood=likelihood, field=field)
+        weights = (expected(near, rows, fade_m, floor) / top) ** (power * novelty)
+        return self.Out(likelihood=Likelihood(weights, field.mean, novelty), field=field)
 
     def _calibrated(
         self,
         similarities: Similarities,
         particles: Particles,
         map: ReferenceGraph,
+        near: Shorts,
         rows: Ints,
-        unit: float,
+        fade_m: float | None,
         calibration: SimilarityCalibration,
         novelty: float,
         carried: float,
     ) -> Out:
         ratios = likelihood_ratios(similarities, calibration)
         top = max(float(ratios.max()), 1.0)
-        near = self._cells.of(particles.poses)
-        expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), self._fade_m(unit), 0.0)
+        expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), fade_m, 0.0)
         field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
         likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, carried)
         return self.Out(likelihood=likelihood, field=field)
-
-    def _expected(
-        self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
-    ) -> Array:
-        near = self._cells.of(poses)
-        return expected_similarity(poses, map.poses, near, rows, values, self._fade_m(unit), floor)
-
-    def _fade_m(self, unit: float) -> float | None:
-        return None if self.fade_distance is None else self.fade_distance * unit
