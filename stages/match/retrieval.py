@@ -158,7 +158,7 @@ class Retrieval(Stage):
             of_last = last.similarity(ctx, features.values, of_one) if panoramic and last is not None else None
         weights = candidates.sampling_weight
         similarities = Similarities(values, candidates.references, weights, last_view=of_last)
-        answers = best_answers(similarities, BEST) if len(map) and ctx.is_read("answers") else None
+        answers = best_answers(similarities, BEST) if len(map) else None
         return self.Out(similarities=similarities, answers=answers, calibration=calibration)
 
 

@@ -114,8 +114,6 @@ class Visibility(Stage):
         else:
             novelty, carried = novelty_and_kidnapping(similarities, calibration, motion, far)
         likelihood = Likelihood(mean**novelty, background_level, novelty, carried)
-        if not ctx.is_read("field"):
-            return self.Out(likelihood=likelihood)
         weighed = replace(similarities, values=raised.astype(np.float32))
         return self.Out(likelihood=likelihood, field=similarity_field(weighed, floor, 1.0, 1.0))
 
