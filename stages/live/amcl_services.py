@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 
-from .transport import Arrival, Transport, TransportError, full_name
+from .transport import RawMessage, Transport, TransportError, full_name
 
 EMPTY, POSE = "std_msgs/msg/Empty", "geometry_msgs/msg/PoseWithCovarianceStamped"
 NOTHING = b"\0\1\0\0\0"
@@ -19,7 +19,7 @@ def serve_restart(transport: Transport, service: str) -> None:
     """A call is as good as a message on the topic of that name: the belief starts again, uniform."""
 
     def restart(_: bytes) -> bytes:
-        transport.inbox.put(Arrival(full_name(service), EMPTY, time.time_ns(), NOTHING))
+        transport.queue.put(RawMessage(full_name(service), EMPTY, time.time_ns(), NOTHING))
         return NOTHING
 
     _serve(transport, service, "std_srvs/srv/Empty", restart)
@@ -35,7 +35,7 @@ def serve_amcl(transport: Transport, node: str, initial_pose: str | None) -> Non
     def set_pose(request: bytes) -> bytes:
         assert initial_pose is not None
         # The request is that message.
-        transport.inbox.put(Arrival(full_name(initial_pose), POSE, time.time_ns(), request))
+        transport.queue.put(RawMessage(full_name(initial_pose), POSE, time.time_ns(), request))
         return NOTHING
 
     def get_state(_: bytes) -> bytes:

@@ -8,7 +8,7 @@ from omninav.pipeline import BadInput
 from omninav.stages.values.image import Pixels
 
 from .camera_device import MESSAGE, TOPIC, CameraDevice, image_message
-from .transport import Arrival, Transport, opened
+from .transport import RawMessage, Transport, opened
 
 QUALITY = 92
 """Quality of the JPEGs that are recorded."""
@@ -42,7 +42,7 @@ class CameraTransport(Transport):
         """The images."""
         return {TOPIC: MESSAGE}
 
-    def take(self, timeout_s: float = 0.0) -> Arrival | None:
+    def take(self, timeout_s: float = 0.0) -> RawMessage | None:
         """The newest image, if there is one since the last."""
         with self._changed:
             self._changed.wait_for(lambda: self._newest is not None, timeout_s)
@@ -50,7 +50,7 @@ class CameraTransport(Transport):
         if newest is None:
             return None
         stamp, pixels = newest
-        return Arrival(TOPIC, MESSAGE, stamp, image_message(pixels, stamp, QUALITY))
+        return RawMessage(TOPIC, MESSAGE, stamp, image_message(pixels, stamp, QUALITY))
 
     @property
     def ended(self) -> bool:
@@ -70,7 +70,7 @@ class CameraTransport(Transport):
             pixels = self.device.read()
             if pixels is not None:
                 with self._changed:
-                    self.inbox.overtaken[TOPIC] += self._newest is not None
+                    self.queue.overtaken[TOPIC] += self._newest is not None
                     self._newest = time.time_ns(), pixels
                     self._changed.notify()
             elif self.device.is_video:

@@ -6,7 +6,7 @@ import time
 from typing import Any
 from xml.sax.saxutils import escape
 
-from .transport import DEPTH, NEWEST_DEPTH, Arrival, Transport, TransportError
+from .transport import DEPTH, NEWEST_DEPTH, RawMessage, Transport, TransportError
 
 FAST_DDS = "1.15"
 """The vendor whose type information CycloneDDS cannot match; with it ignored, types match by name."""
@@ -64,7 +64,7 @@ class DdsTransport(Transport):
             Policy.History.KeepLast(NEWEST_DEPTH if newest else DEPTH),
         )
         with self._lock:
-            self.inbox.open(topic, newest)
+            self.queue.open(topic, newest)
             reader = DataReader(self._participant, self._topic(topic, msgtype), qos)
             self._types[topic], self._readers[topic] = msgtype, reader
             self._waitset.attach(ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any))
@@ -148,7 +148,7 @@ class DdsTransport(Transport):
                 received = time.time_ns()
                 for data, info in samples if isinstance(samples, list) else ():
                     if info.valid_data:
-                        self.inbox.put(Arrival(topic, self._types[topic], received, bytes(data)))
+                        self.queue.put(RawMessage(topic, self._types[topic], received, bytes(data)))
 
 
 def _settings() -> str:

@@ -11,7 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.live_record import CAMERA, HEADER, HEADER_TYPE, LiveHeader
 
-from .transport import Arrival
+from .transport import RawMessage
 
 
 class DriveRecord:
@@ -36,17 +36,17 @@ class DriveRecord:
             reader = LogReader(before)
             types = reader.topics
             self.write(
-                Arrival(record.topic, types[record.topic], record.log_time, bytes(record.data))
+                RawMessage(record.topic, types[record.topic], record.log_time, bytes(record.data))
                 for record in reader.scan(set(types) - {HEADER})
             )
             before.unlink()
 
-    def write(self, arrivals: Iterable[Arrival]) -> None:
+    def write(self, messages: Iterable[RawMessage]) -> None:
         """Append messages, in this order whatever their times."""
         with named(self._part):
-            for arrival in arrivals:
-                self._last = max(arrival.received, self._last + 1)
-                self._stream.append(arrival.topic, arrival.msgtype, self._last, arrival.data)
+            for message in messages:
+                self._last = max(message.received, self._last + 1)
+                self._stream.append(message.topic, message.msgtype, self._last, message.data)
             self._file.flush()
 
     def close(self) -> None:

@@ -30,8 +30,8 @@ from .amcl_services import serve_amcl, serve_restart
 from .camera_device import TOPIC, device_camera
 from .camera_transport import connect_camera
 from .drive_record import DriveRecord, unfinished
-from .intake import Intake
 from .publish import publish_diagnostics
+from .time_synchronizer import TimeSynchronizer
 from .transport import Transport, TransportName, connect, disconnect, full_name
 
 LIVE, DEVICE = "live", "camera:"
@@ -148,7 +148,7 @@ class LiveSource(Source):
             ctx.warn(f"assumed: {assumed}")
         self._path = None if ctx.folder is None else ctx.folder / RECORD
         self._before = None if self._path is None else _recorded(self._path)
-        self._intake: Intake | None = None
+        self._synchronizer: TimeSynchronizer | None = None
         self._record: DriveRecord | None = None
         self._counted: Counter[str] = Counter()
         self._stop, self._handlers = threading.Event(), dict[int, Any]()
@@ -165,25 +165,24 @@ class LiveSource(Source):
         again = self._again(position)
         if again is not None:
             return self._out(position, *again)
-        if self._intake is None:
-            self._intake = self._join(position)
+        synchronizer = self._synchronizer = self._synchronizer or self._join(position)
         while not self._ends(position, route):
-            taken = self._intake.next(0.1)
-            self._watch(ctx, self._intake)
-            if taken is not None:
-                if self._intake.mounted is not None and not position.ticks:
-                    said, unsaid = self._intake.mounted.in_words, self._intake.mounted.unsaid(self._camera is None)
+            synced = synchronizer.next(0.1)
+            self._watch(ctx, synchronizer)
+            if synced is not None:
+                if synchronizer.mounted is not None and not position.ticks:
+                    said, unsaid = synchronizer.mounted.in_words, synchronizer.mounted.unsaid(self._camera is None)
                     if said:
                         ctx.fact("camera_mounted", said)
                     if unsaid:
                         ctx.warn(f"assumed: {self.topics.camera_info}: {unsaid}")
-                self._write(self._intake, taken.arrivals)
-                assert isinstance(self._intake.camera, Camera)
-                return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)
-            if len(self._intake.unrecorded) > 256 and self._record is not None:
-                self._write(self._intake, self._intake.recordable())
-        self._intake.watch()
-        self._leave(ctx, self._intake)
+                self._write(synchronizer, synced.messages)
+                assert isinstance(synchronizer.camera, Camera)
+                return self._out(position, synced.stamp, synchronizer.camera, synced.pixels, synced.frame)
+            if len(synchronizer.unrecorded) > 256 and self._record is not None:
+                self._write(synchronizer, synchronizer.recordable())
+        synchronizer.watch()
+        self._leave(ctx, synchronizer)
         if not position.ticks:
             raise BadInput(f"no image became a tick: {self._why_not()}")
         return None
@@ -198,12 +197,12 @@ class LiveSource(Source):
             raise UnreadableRecording(f"{before.name}: its image {position.ticks} is damaged; start a new run")
         return int(before.stamps[position.ticks]), before.camera, pixels, before.frame(position.ticks)
 
-    def _join(self, position: LiveSourceState) -> Intake:
+    def _join(self, position: LiveSourceState) -> TimeSynchronizer:
         """Subscribe, and let signals end the run well."""
         before, self._before = self._before, None
         if position.ticks > (0 if before is None else len(before.stamps)):
             raise UnreadableRecording(f"{self._path}: it holds fewer ticks than the run made; start a new run")
-        intake = Intake(
+        synchronizer = TimeSynchronizer(
             transport=self._transport,
             status=self._transport.status,
             header=self._header,
@@ -213,7 +212,7 @@ class LiveSource(Source):
             patience_s=PATIENCE_S,
             last_stamp=position.stamp if position.ticks else None,
         )
-        intake.subscribe()
+        synchronizer.subscribe()
         self._watched = time.monotonic()  # endpoints need a moment to find each other
         self._transport.status.live = True
         if self.restart is not None:
@@ -223,7 +222,7 @@ class LiveSource(Source):
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._handlers[number] = signal.signal(number, lambda *_: self._told_to_stop())
-        return intake
+        return synchronizer
 
     def _told_to_stop(self) -> None:
         self._stop.set()
@@ -242,8 +241,8 @@ class LiveSource(Source):
             return True
         return self.seconds is not None and position.stamp - position.first >= self.seconds * 1e9
 
-    def _leave(self, ctx: Context, intake: Intake) -> None:
-        self._count_losses(ctx, intake)
+    def _leave(self, ctx: Context, synchronizer: TimeSynchronizer) -> None:
+        self._count_losses(ctx, synchronizer)
         status = self._transport.status
         if status.latencies_ms is not None:
             ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1), of_run=True)
@@ -251,7 +250,7 @@ class LiveSource(Source):
             ctx.fact("rate_hz", round(status.rate_hz, 2), of_run=True)
         if status.age_ms is not None:
             ctx.fact("age_ms_median", round(status.age_ms, 1), of_run=True)
-        self._write(intake, intake.recordable())
+        self._write(synchronizer, synchronizer.recordable())
         if self._record is not None:
             self._record.close()
         self._give_signals_back()
@@ -262,21 +261,21 @@ class LiveSource(Source):
         troubles = sorted(self._transport.status.troubles.values())
         return "; ".join(troubles) or "it was ended before the first image; let it run until the robot has been heard"
 
-    def _write(self, intake: Intake, arrivals: list[Any]) -> None:
-        if self._path is None or not isinstance(intake.camera, Camera) or not intake.camera.complete:
+    def _write(self, synchronizer: TimeSynchronizer, messages: list[Any]) -> None:
+        if self._path is None or not isinstance(synchronizer.camera, Camera) or not synchronizer.camera.complete:
             return
         if self._record is None:
-            self._record = DriveRecord(self._path, self._header, intake.camera)
-        self._record.write(arrivals)
+            self._record = DriveRecord(self._path, self._header, synchronizer.camera)
+        self._record.write(messages)
 
-    def _watch(self, ctx: Context, intake: Intake) -> None:
+    def _watch(self, ctx: Context, synchronizer: TimeSynchronizer) -> None:
         """Every second, say how it goes."""
         now = time.monotonic()
         if now - self._watched < WATCH_S:
             return
         self._watched = now
-        intake.watch()
-        self._count_losses(ctx, intake)
+        synchronizer.watch()
+        self._count_losses(ctx, synchronizer)
         status = self._transport.status
         news = status.news()
         for sentence in news:
@@ -285,11 +284,11 @@ class LiveSource(Source):
         if self.diagnostics is not None:
             publish_diagnostics(self._transport, self.diagnostics)
 
-    def _count_losses(self, ctx: Context, intake: Intake) -> None:
+    def _count_losses(self, ctx: Context, synchronizer: TimeSynchronizer) -> None:
         """Count in the manifest what was left out since the last time."""
-        counts = intake.dropped()
+        counts = synchronizer.dropped()
         for kind, number in (counts - self._counted).items():
-            ctx.count(kind, number, intake.details.get(kind, ""))
+            ctx.count(kind, number, synchronizer.details.get(kind, ""))
         self._counted = counts
 
     def _out(self, position: LiveSourceState, stamp: int, camera: Camera, pixels: Pixels, frame: Frame) -> Out:

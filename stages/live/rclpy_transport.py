@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from .transport import DEPTH, NEWEST_DEPTH, Arrival, Transport, TransportError
+from .transport import DEPTH, NEWEST_DEPTH, RawMessage, Transport, TransportError
 
 
 def open_transport(domain: int) -> Transport:
@@ -58,10 +58,10 @@ class RclpyTransport(Transport):
             reliability=QoSReliabilityPolicy.RELIABLE if latched else QoSReliabilityPolicy.BEST_EFFORT,
             durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
         )
-        self.inbox.open(topic, newest)
+        self.queue.open(topic, newest)
 
         def receive(data: bytes) -> None:
-            self.inbox.put(Arrival(topic, msgtype, time.time_ns(), bytes(data)))
+            self.queue.put(RawMessage(topic, msgtype, time.time_ns(), bytes(data)))
 
         events = SubscriptionEventCallbacks(incompatible_qos=lambda event: self._note_mismatch(topic, event))
         with self._lock:

@@ -161,14 +161,14 @@ class RobotDriver(Stage):
                 self._subscribed = offered
         while True:
             left = self._started + seconds - time.monotonic() if self.real_time else 0.0
-            arrival = self._transport.take(max(0.0, left))
-            if arrival is not None:
+            message = self._transport.take(max(0.0, left))
+            if message is not None:
                 try:
-                    message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+                    decoded = standard_types().deserialize_cdr(message.data, message.msgtype)
                 except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
-                    ctx.count("bad_message", detail=f"{self.command_topic}: no {arrival.msgtype} ({error!s:.120})")
+                    ctx.count("bad_message", detail=f"{self.command_topic}: no {message.msgtype} ({error!s:.120})")
                     continue
-                twist: Any = getattr(message, "twist", message)
+                twist: Any = getattr(decoded, "twist", decoded)
                 speed, turning = twist.linear.x, twist.angular.z
                 if math.isfinite(speed) and math.isfinite(turning):
                     robot.command, robot.commanded = np.array([speed, turning]), now

@@ -27,7 +27,7 @@ class TransportError(BadInput):
     """A transport that cannot be opened or used. The message is one line: what, and what to type."""
 
 
-class Arrival(NamedTuple):
+class RawMessage(NamedTuple):
     """A message as it came: `received` in ns since 1970 by this computer's clock, `data` in CDR with its header."""
 
     topic: str
@@ -37,33 +37,33 @@ class Arrival(NamedTuple):
 
 
 class MessageQueue:
-    """Arrivals between the transport's thread and the one that takes them: bounded, whatever the taker does."""
+    """Messages between the transport's thread and the one that takes them: bounded, whatever the taker does."""
 
     def __init__(self) -> None:
         self.overtaken: Counter[str] = Counter()
         """Number of messages of each topic that later ones overtook before they were taken."""
         self._changed = threading.Condition()
-        self._arrivals: dict[str, deque[Arrival]] = {}
+        self._messages: dict[str, deque[RawMessage]] = {}
 
     def open(self, topic: str, newest: bool) -> None:
         """Make room for a topic: for its newest message alone, or for all up to `MAX_WAITING`."""
-        self._arrivals[topic] = deque(maxlen=1 if newest else MAX_WAITING)
+        self._messages[topic] = deque(maxlen=1 if newest else MAX_WAITING)
 
-    def put(self, arrival: Arrival) -> None:
+    def put(self, message: RawMessage) -> None:
         """Keep a message; where there is no room the oldest of its topic is overtaken."""
         with self._changed:
-            waiting = self._arrivals[arrival.topic]
+            waiting = self._messages[message.topic]
             if len(waiting) == waiting.maxlen:
-                self.overtaken[arrival.topic] += 1
-            waiting.append(arrival)
+                self.overtaken[message.topic] += 1
+            waiting.append(message)
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> Arrival | None:
+    def take(self, timeout_s: float) -> RawMessage | None:
         """The message that was received first of those that wait; None where none comes in time."""
         with self._changed:
-            self._changed.wait_for(lambda: any(self._arrivals.values()), timeout_s)
-            waiting = [arrivals for arrivals in self._arrivals.values() if arrivals]
-            return min(waiting, key=lambda arrivals: arrivals[0].received).popleft() if waiting else None
+            self._changed.wait_for(lambda: any(self._messages.values()), timeout_s)
+            waiting = [messages for messages in self._messages.values() if messages]
+            return min(waiting, key=lambda messages: messages[0].received).popleft() if waiting else None
 
 
 class Transport(ABC):
@@ -73,7 +73,7 @@ class Transport(ABC):
     """
 
     def __init__(self) -> None:
-        self.inbox, self.status = MessageQueue(), LiveStatus()
+        self.queue, self.status = MessageQueue(), LiveStatus()
         self.place = ""
         """Place where it listens, for messages: the transport and its domain."""
         self.farewells: list[Callable[[], None]] = []
@@ -110,9 +110,9 @@ class Transport(ABC):
         """Answer a service, with requests and answers in CDR; False where the transport has no services."""
         return False
 
-    def take(self, timeout_s: float = 0.0) -> Arrival | None:
+    def take(self, timeout_s: float = 0.0) -> RawMessage | None:
         """The message that was received first of those that wait; None where none comes in time."""
-        return self.inbox.take(timeout_s)
+        return self.queue.take(timeout_s)
 
     @property
     def ended(self) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 from omninav.pipeline.mcap.message_types import standard_types
 
-from .transport import Arrival, Transport, TransportError
+from .transport import RawMessage, Transport, TransportError
 
 ROUTER = "tcp/localhost:7447"
 """Address at which rmw_zenoh's sessions look for their router."""
@@ -58,10 +58,10 @@ class ZenohTransport(Transport):
     def subscribe(self, topic: str, msgtype: str, newest: bool = False, latched: bool = False) -> None:
         from zenoh import ext
 
-        self.inbox.open(topic, newest)
+        self.queue.open(topic, newest)
 
         def receive(sample: Any) -> None:
-            self.inbox.put(Arrival(topic, msgtype, time.time_ns(), sample.payload.to_bytes()))
+            self.queue.put(RawMessage(topic, msgtype, time.time_ns(), sample.payload.to_bytes()))
 
         with self._lock:
             key = (

@@ -10,8 +10,8 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("pipeline", "stages", "conf", "examples", "benchmarks")
 WORDS = """
-    ABOUT AROUND AfterLifts AnswersNearBy Arrangement AtOnce BeforeThreshold Behind CorrectPastStates DECK
-    DriveSoFar DriveTally DrivenPlan FADED FirstViewsLimit GuessedMotion GuessedPose HANGS HypothesisLife Inbox
+    ABOUT AROUND AfterLifts AnswersNearBy Arrangement Arrival AtOnce BeforeThreshold Behind CorrectPastStates DECK
+    DriveSoFar DriveTally DrivenPlan FADED FirstViewsLimit GuessedMotion GuessedPose HANGS HypothesisLife Inbox Intake
     KeepSessions LEAST LeftBehind LeftOver Lesson Likeness Looked MatchPlaces MeanAtFirst NEARNESSES NOBODY
     OnceRight OwnPlace PlaceGrid Placed PlannedWay Remark ReturnsHome ShortestWay Spool Stated Tell ViewLimit
     ViewReach VisitedPlaces Waiting WorldPlan WrongPlaces after_lifts agreed album alike anew answers_near_by

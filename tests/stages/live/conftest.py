@@ -26,8 +26,8 @@ from omninav.pipeline import Context
 from omninav.pipeline.api.run import Run
 from omninav.pipeline.mcap.message_types import make_message, standard_types
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.stages.live import intake, live_source, publish, publish_truth, robot_driver, watchdog
-from omninav.stages.live.transport import Arrival, Transport, disconnect
+from omninav.stages.live import live_source, publish, publish_truth, robot_driver, time_synchronizer, watchdog
+from omninav.stages.live.transport import RawMessage, Transport, disconnect
 from omninav.stages.source.log import LogSource
 
 CAMERA = ROOT / "tests/data/camera.yaml"
@@ -50,7 +50,7 @@ def decode(msgtype: str, data: bytes) -> Any:
 
 
 class Wire(Transport):
-    """A transport that keeps what is sent, and gives what a test puts into its inbox."""
+    """A transport that keeps what is sent, and gives what a test puts into its queue."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -59,7 +59,7 @@ class Wire(Transport):
         self.there: dict[str, str] = {}
 
     def subscribe(self, topic, msgtype, newest=False, latched=False):
-        self.inbox.open(topic, newest)
+        self.queue.open(topic, newest)
 
     def publish(self, topic, msgtype, data, latched=False):
         self.sent.append((topic, decode(msgtype, data)))
@@ -88,22 +88,22 @@ class Recorded(Wire):
     def take(self, timeout_s=0.0):
         return next(self._script, None)
 
-    def _messages(self, drive: Path, at_once: int, silent: range) -> Iterator[Arrival | None]:
+    def _messages(self, drive: Path, at_once: int, silent: range) -> Iterator[RawMessage | None]:
         images = itertools.count()
-        for number, arrival in enumerate(recorded(drive, IMAGE, ODOMETRY, TRUTH)):
-            self.now_s = arrival.received / 1e9
-            if arrival.topic != IMAGE or next(images) not in silent:
-                yield arrival
+        for number, message in enumerate(recorded(drive, IMAGE, ODOMETRY, TRUTH)):
+            self.now_s = message.received / 1e9
+            if message.topic != IMAGE or next(images) not in silent:
+                yield message
             if number % at_once == 0:
                 yield None
 
 
-def recorded(drive: Path, *topics: str) -> list[Arrival]:
+def recorded(drive: Path, *topics: str) -> list[RawMessage]:
     """Gives the messages of a recorded robot on these topics (none: on all), in the order of their arrival."""
     reader = LogReader(drive)
     types = reader.topics
     records = sorted(reader.scan(set(topics) or None), key=lambda record: record.log_time)
-    return [Arrival(each.topic, types[each.topic], each.log_time, bytes(each.data)) for each in records]
+    return [RawMessage(each.topic, types[each.topic], each.log_time, bytes(each.data)) for each in records]
 
 
 def joined(monkeypatch: pytest.MonkeyPatch, robot: Wire) -> None:
@@ -125,7 +125,7 @@ def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
 def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """A clock that stands until a test moves it: a busy machine is not late."""
     moment = [1000.0]
-    for module in (intake, watchdog):
+    for module in (time_synchronizer, watchdog):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moment[0]))
     return moment
 
@@ -136,7 +136,7 @@ def localised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Pat
 
     def run(robot: Recorded, variant: str, *settings: str) -> Run:
         joined(monkeypatch, robot)
-        for module in (live_source, intake):
+        for module in (live_source, time_synchronizer):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: robot.now_s))
         words = ("source=live", "publish=ros2", "log=live", f"camera={CAMERA}", "plots=none", *settings)
         return omninav.run(variant, *words, folder=tmp_path / "run", cache=shared_cache, progress=False)

@@ -90,13 +90,13 @@ class Services(Wire):
 
 def test_a_pose_that_is_set_by_service_comes_as_one_by_topic_does():
     transport = Services()
-    transport.inbox.open("/initialpose", newest=False)
+    transport.queue.open("/initialpose", newest=False)
     serve_amcl(transport, "amcl", "/initialpose")
     asked = encode(POSE, {"pose": {"pose": {"position": {"x": 3.0}}}, "header": {"frame_id": "map"}}, 7)
     transport.answers["/set_initial_pose"](asked)  # a request is its one field
-    arrival = transport.take()
-    assert arrival is not None
-    assert (arrival.topic, arrival.msgtype, arrival.data) == ("/initialpose", POSE, asked)
+    message = transport.take()
+    assert message is not None
+    assert (message.topic, message.msgtype, message.data) == ("/initialpose", POSE, asked)
 
 
 def test_a_service_whose_type_is_not_installed_is_left_out_and_said_once():

@@ -199,9 +199,9 @@ def check_all_heard(name: str, told: Told) -> None:
     until = time.monotonic() + WAIT_S
     with teller(name, sys.executable, told):
         while len(heard) < len(topics) and time.monotonic() < until:
-            arrival = transport.take(0.2)
-            if arrival is not None:
-                heard[arrival.topic] = arrival.data
+            message = transport.take(0.2)
+            if message is not None:
+                heard[message.topic] = message.data
     assert sorted(heard) == sorted(topics)
     for topic, data in heard.items():
         check(topic, decoded(topics[topic], data))

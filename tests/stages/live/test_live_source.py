@@ -18,11 +18,11 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import header_stamp
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.stages.live.intake import Intake
 from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.publish import send
 from omninav.stages.live.status import LiveStatus
-from omninav.stages.live.transport import Arrival, MessageQueue
+from omninav.stages.live.time_synchronizer import TimeSynchronizer
+from omninav.stages.live.transport import MessageQueue, RawMessage
 from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera, write_camera
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
@@ -36,11 +36,11 @@ NO_SCAN += "type topics.scan=null (a robot without a range finder)"
 
 
 @functools.cache
-def _said() -> tuple[Arrival, ...]:
+def _said() -> tuple[RawMessage, ...]:
     return tuple(recorded(DRIVE))
 
 
-def said() -> list[Arrival]:
+def said() -> list[RawMessage]:
     """What the recorded robot said, in the order in which it was received."""
     return list(_said())
 
@@ -56,21 +56,21 @@ class Drive:
         self.outs: list[LiveSource.Out] = []
 
     @property
-    def intake(self) -> Intake:
+    def synchronizer(self) -> TimeSynchronizer:
         """Gives what the stage subscribed to, without a tick."""
-        if self.source._intake is None:
-            self.source._intake = self.source._join(self.state)
-        return self.source._intake
+        if self.source._synchronizer is None:
+            self.source._synchronizer = self.source._join(self.state)
+        return self.source._synchronizer
 
-    def feed(self, robot: Wire, arrivals: list[Arrival]) -> None:
+    def feed(self, robot: Wire, messages: list[RawMessage]) -> None:
         """One message after another, and every tick that they lead to."""
-        intake = self.intake
-        for arrival in arrivals:
-            if arrival.topic in intake.header.topics:
-                robot.inbox.put(arrival)
-            taken = intake.next(0.0)
-            if taken is not None:
-                with patch.object(intake, "next", return_value=taken):
+        synchronizer = self.synchronizer
+        for message in messages:
+            if message.topic in synchronizer.header.topics:
+                robot.queue.put(message)
+            synced = synchronizer.next(0.0)
+            if synced is not None:
+                with patch.object(synchronizer, "next", return_value=synced):
                     out = self.source.step(self.ctx, self.state)
                 assert out is not None
                 self.outs.append(out)
@@ -81,10 +81,10 @@ class Drive:
         assert self.source.step(self.ctx, self.state) is None
 
 
-def driven(robot: Wire, folder: Path, arrivals: list[Arrival], **parameters: object) -> Drive:
+def driven(robot: Wire, folder: Path, messages: list[RawMessage], **parameters: object) -> Drive:
     """A drive from its first message to its last, whose record gives the same ticks."""
     drive = Drive(folder, **parameters)
-    drive.feed(robot, arrivals)
+    drive.feed(robot, messages)
     drive.end()
     same(drive.outs, replayed(folder / "live.mcap"))
     return drive
@@ -121,9 +121,9 @@ def test_a_pose_and_a_goal_that_somebody_names_are_in_the_record_at_the_tick_tha
     refused = {"header": {"frame_id": "base_link"}, **goal}
     half = len(messages) // 2
     messages[half:half] = [
-        Arrival("/initialpose", POSE, messages[half].received, encode(POSE, where, 0)),
-        Arrival("/goal_pose", POSE_STAMPED, messages[half].received, encode(POSE_STAMPED, goal, 0)),
-        Arrival("/goal_pose", POSE_STAMPED, messages[half].received, encode(POSE_STAMPED, refused, 0)),
+        RawMessage("/initialpose", POSE, messages[half].received, encode(POSE, where, 0)),
+        RawMessage("/goal_pose", POSE_STAMPED, messages[half].received, encode(POSE_STAMPED, goal, 0)),
+        RawMessage("/goal_pose", POSE_STAMPED, messages[half].received, encode(POSE_STAMPED, refused, 0)),
     ]
     drive = driven(wire, tmp_path, messages)
     asked = [out for out in drive.outs if out.restart is not None or out.goal is not None]
@@ -139,7 +139,7 @@ def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(wire: Wire, tmp
     done = len(drive.outs)
     assert done > 2
     state = LiveSourceState()  # of a checkpoint before the first tick: all ticks are made again
-    wire.inbox = MessageQueue()
+    wire.queue = MessageQueue()
     resumed = Drive(tmp_path, state)
     again = [resumed.source.step(resumed.ctx, state) for _ in range(done)]
     same(drive.outs, [out for out in again if out is not None])  # type: ignore[misc]
@@ -151,17 +151,17 @@ def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(wire: Wire, tmp
     assert sorted(os.listdir(tmp_path)) == ["live.mcap"]
 
 
-def cut(arrival: Arrival, length: int) -> Arrival:
-    return arrival._replace(data=arrival.data[:length])
+def cut(message: RawMessage, length: int) -> RawMessage:
+    return message._replace(data=message.data[:length])
 
 
-def zeros(arrival: Arrival, start: int) -> Arrival:
-    return arrival._replace(data=arrival.data[:start].ljust(len(arrival.data), b"\0"))
+def zeros(message: RawMessage, start: int) -> RawMessage:
+    return message._replace(data=message.data[:start].ljust(len(message.data), b"\0"))
 
 
-def without_angles(arrival: Arrival, ranges: int) -> Arrival:
+def without_angles(message: RawMessage, ranges: int) -> RawMessage:
     fields = {"angle_increment": 0.0, "range_max": 4.0, "ranges": np.ones(ranges, np.float32)}
-    return arrival._replace(data=encode(SCAN, fields, arrival.received))
+    return message._replace(data=encode(SCAN, fields, message.received))
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def without_angles(arrival: Arrival, ranges: int) -> Arrival:
     ],
 )
 def test_a_damaged_message_is_counted_and_the_drive_goes_on(
-    wire: Wire, tmp_path: Path, msgtype: str, spoilt: Callable[[Arrival, int], Arrival], number: int, kind: str
+    wire: Wire, tmp_path: Path, msgtype: str, spoilt: Callable[[RawMessage, int], RawMessage], number: int, kind: str
 ):
     messages = said()
     fifth = [row for row, each in enumerate(messages) if each.msgtype == msgtype][4]
@@ -187,16 +187,16 @@ def test_a_damaged_message_is_counted_and_the_drive_goes_on(
 def test_images_of_another_size_are_refused_at_the_start_and_counted_later(wire: Wire, tmp_path: Path):
     small = {"height": 2, "width": 2, "encoding": "mono8", "step": 2, "data": np.array([0, 90, 120, 250], np.uint8)}
     last = max(LogReader(DRIVE).messages({ODOMETRY}), key=lambda message: message.stamp).stamp
-    image = Arrival("/camera/image", "sensor_msgs/msg/Image", last, encode("sensor_msgs/msg/Image", small, last))
+    image = RawMessage("/camera/image", "sensor_msgs/msg/Image", last, encode("sensor_msgs/msg/Image", small, last))
     with pytest.raises(BadInput, match=r"/camera/image: its images are 2 x 2, its camera .*; give camera="):
         Drive(tmp_path).feed(wire, [*recorded(DRIVE, ODOMETRY), image])
-    wire.inbox = MessageQueue()
+    wire.queue = MessageQueue()
     assert driven(wire, tmp_path, [*said(), image]).ctx.counts["wrong_size"] == 1
 
 
 def test_while_a_robot_says_nothing_what_is_missing_is_noted(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path)
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert wire.status.troubles == {
         ODOMETRY: "nothing on /odom (nav_msgs/msg/Odometry) for 0 s, nobody publishes it; "
         "type speed=0.5 (m/s, a robot without odometry)",
@@ -205,21 +205,21 @@ def test_while_a_robot_says_nothing_what_is_missing_is_noted(wire: Wire, tmp_pat
         "robot": "no publisher is seen (a test): is the robot on, and in the same domain and reach?",
     }
     drive.feed(wire, said())
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert not wire.status.troubles
 
 
 def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
     wire: Wire, tmp_path: Path, now: list[float]
 ):
-    intake = Drive(tmp_path).intake
+    synchronizer = Drive(tmp_path).synchronizer
     wire.there = {
         "/wheels": "nav_msgs/msg/Odometry",
         "/omni": "sensor_msgs/msg/Image",
         "/camera/image": "std_msgs/msg/String",
     }
     now[0] += 12.0
-    intake.watch()
+    synchronizer.watch()
     assert wire.status.troubles == {
         ODOMETRY: "nothing on /odom (nav_msgs/msg/Odometry) for 12 s, nobody publishes it; "
         "type topics.odometry=/wheels, or speed=0.5 (m/s, a robot without odometry)",
@@ -232,19 +232,19 @@ def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
 def test_a_camera_info_that_came_late_is_no_trouble_any_more_and_hides_no_other(
     wire: Wire, tmp_path: Path, now: list[float]
 ):
-    intake = Drive(tmp_path, camera=None, topics=Topics(scan=None)).intake
-    intake.watch()
+    synchronizer = Drive(tmp_path, camera=None, topics=Topics(scan=None)).synchronizer
+    synchronizer.watch()
     assert "nothing on /camera/camera_info" in wire.status.troubles["/camera/camera_info"]
     (odometry, *_), (image, *_) = recorded(DRIVE, ODOMETRY), recorded(DRIVE, IMAGE)
-    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
-    assert intake.next(0.0) is None
+    wire.queue.put(recorded(DRIVE, "/camera/camera_info")[0])
+    assert synchronizer.next(0.0) is None
     wire.status.note("state", "searching")
     for _ in range(2):
         now[0] += 3.0
-        wire.inbox.put(odometry)
-        wire.inbox.put(image._replace(data=image.data[:4]))
-        assert intake.next(0.0) is None
-    intake.watch()
+        wire.queue.put(odometry)
+        wire.queue.put(image._replace(data=image.data[:4]))
+        assert synchronizer.next(0.0) is None
+    synchronizer.watch()
     assert wire.status.troubles.keys() == {"state", "ticks"}
     assert "no image is used: bad_message" in wire.status.troubles["ticks"]
 
@@ -256,12 +256,12 @@ def test_a_range_finder_that_is_missing_and_a_request_of_another_type_are_noted_
     drive.feed(wire, said())
     wire.there = {"/goal_pose": "geometry_msgs/msg/Point", "/pose": POSE_STAMPED, "/odom": "nav_msgs/msg/Odometry"}
     wire.there |= {IMAGE: COMPRESSED}
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert drive.outs
     assert wire.status.troubles == {"/goal_pose": f"/goal_pose carries geometry_msgs/msg/Point, not {POSE_STAMPED}"}
-    drive.intake._received.pop("/scan")
+    drive.synchronizer._received.pop("/scan")
     wire.there["/base_scan"] = SCAN
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert wire.status.troubles["/scan"] == NO_SCAN.replace("type", "type topics.scan=/base_scan, or")
 
 
@@ -279,15 +279,15 @@ def test_a_topic_for_two_things_is_refused_before_anything_runs(wire: Wire, give
 
 
 def test_images_that_odometry_never_reaches_are_a_trouble(wire: Wire, tmp_path: Path, now: list[float]):
-    intake = Drive(tmp_path).intake
+    synchronizer = Drive(tmp_path).synchronizer
     images = [each._replace(data=ahead(each.data)) for each in recorded(DRIVE, IMAGE)]
     odometry = recorded(DRIVE, ODOMETRY)
     for late in (False, True):  # both go on coming
         now[0] += 3.0 * late
-        for arrival in (*odometry[late::2], *images[late::2]):
-            wire.inbox.put(arrival)
-        assert intake.next(0.0) is None
-    intake.watch()
+        for message in (*odometry[late::2], *images[late::2]):
+            wire.queue.put(message)
+        assert synchronizer.next(0.0) is None
+    synchronizer.watch()
     assert "no image is used: outside_odometry" in wire.status.troubles["ticks"]
     assert "odometry says up to" in wire.status.troubles["ticks"]
 
@@ -299,19 +299,19 @@ def ahead(data: bytes) -> bytes:
 
 
 def test_an_image_waits_for_truth_half_as_long_as_for_odometry(wire: Wire, tmp_path: Path, now: list[float]):
-    intake = Drive(tmp_path).intake
+    synchronizer = Drive(tmp_path).synchronizer
     image = recorded(DRIVE, IMAGE)[3]
     stamp = header_stamp(image.data)
-    for arrival in [*recorded(DRIVE, ODOMETRY, TRUTH)[:400], image]:
-        if arrival.topic != TRUTH or header_stamp(arrival.data) < stamp:
-            wire.inbox.put(arrival)
-    assert intake.next(0.0) is None  # its truth may still come
+    for message in [*recorded(DRIVE, ODOMETRY, TRUTH)[:400], image]:
+        if message.topic != TRUTH or header_stamp(message.data) < stamp:
+            wire.queue.put(message)
+    assert synchronizer.next(0.0) is None  # its truth may still come
     now[0] += 0.45
-    assert intake.next(0.0) is None
+    assert synchronizer.next(0.0) is None
     now[0] += 0.1
-    taken = intake.next(0.0)
-    assert taken is not None
-    assert (taken.stamp, bool(np.isnan(taken.frame.truth).all())) == (stamp, True)
+    synced = synchronizer.next(0.0)
+    assert synced is not None
+    assert (synced.stamp, bool(np.isnan(synced.frame.truth).all())) == (stamp, True)
 
 
 def test_a_run_without_a_tick_is_refused_with_what_was_missing(wire: Wire, tmp_path: Path):
@@ -331,7 +331,7 @@ def test_latency_is_measured_from_the_arrival_and_a_clock_that_is_off_shows_as_a
 
 
 def test_requests_that_are_turned_off_are_not_heard(wire: Wire, tmp_path: Path):
-    assert Drive(tmp_path, initial_pose=None, goal=None, restart=None).intake.header.topics.keys() == {
+    assert Drive(tmp_path, initial_pose=None, goal=None, restart=None).synchronizer.header.topics.keys() == {
         *IMAGE_TOPICS,
         ODOMETRY,
         TRUTH,
@@ -341,8 +341,8 @@ def test_requests_that_are_turned_off_are_not_heard(wire: Wire, tmp_path: Path):
 
 def test_the_yaw_that_a_camera_info_does_not_say_is_said_to_be_assumed(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path, camera=None)
-    assert drive.intake.camera is None
-    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    assert drive.synchronizer.camera is None
+    wire.queue.put(recorded(DRIVE, "/camera/camera_info")[0])
     drive.feed(wire, said())
     assert drive.ctx.warnings == [f"assumed: /camera/camera_info: {UNSAID_BY_INFO}"]
 
@@ -351,16 +351,16 @@ def test_static_transforms_say_where_the_camera_sits_and_the_record_keeps_it(wir
     kind = "tf2_msgs/msg/TFMessage"
     at = {"translation": {"x": 0.2, "y": -0.1, "z": 0.9}, "rotation": {"z": math.sqrt(0.5), "w": math.sqrt(0.5)}}
     fixed = {"header": {"frame_id": "base_link"}, "child_frame_id": "omni_camera", "transform": at}
-    told = Arrival("/tf_static", kind, 0, encode(kind, {"transforms": [fixed]}))
+    told = RawMessage("/tf_static", kind, 0, encode(kind, {"transforms": [fixed]}))
     drive = Drive(tmp_path, camera=None)
-    assert drive.intake.camera is None
+    assert drive.synchronizer.camera is None
     wire.there["/tf_static"] = kind  # it is waited for
-    wire.inbox.put(recorded(DRIVE, "/camera/camera_info")[0])
+    wire.queue.put(recorded(DRIVE, "/camera/camera_info")[0])
     elsewhere = {**fixed, "header": {"frame_id": "base_footprint"}, "child_frame_id": "base_link"}
-    wire.inbox.put(told._replace(data=encode(kind, {"transforms": [elsewhere]})))  # says nothing of the camera
+    wire.queue.put(told._replace(data=encode(kind, {"transforms": [elsewhere]})))  # says nothing of the camera
     drive.feed(wire, said()[:60])
     assert not drive.outs
-    wire.inbox.put(told)
+    wire.queue.put(told)
     drive.feed(wire, said()[60:])
     assert drive.outs[0].camera.mount == pytest.approx([0.2, -0.1, math.pi / 2])
     assert not drive.ctx.warnings
@@ -385,10 +385,10 @@ def test_topics_without_a_slash_are_those_that_ros_makes_of_them(wire: Wire, tmp
     source = LiveSource(topics=names, goal="goal_pose", restart="again")
     ctx = Context("source", folder=tmp_path)
     source.setup(ctx)
-    intake = source._join(LiveSourceState())
+    synchronizer = source._join(LiveSourceState())
     topics = {IMAGE, ODOMETRY, TRUTH, "/scan", "/initialpose", "/goal_pose", "/again"}
-    assert intake.header.topics.keys() == topics
-    assert wire.inbox._arrivals.keys() == topics | {"/camera/camera_info", "/tf_static"}
+    assert synchronizer.header.topics.keys() == topics
+    assert wire.queue._messages.keys() == topics | {"/camera/camera_info", "/tf_static"}
     send(wire, "pose", POSE, encode(POSE, {}))
     assert [topic for topic, _ in wire.sent] == ["/pose"]
 
@@ -399,14 +399,14 @@ def test_a_second_node_on_a_published_topic_is_noted(wire: Wire, tmp_path: Path)
     for topic, kind in (("/cmd_vel", "geometry_msgs/msg/Twist"), ("/tf", "tf2_msgs/msg/TFMessage")):
         send(wire, topic, kind, encode(kind, {}))
         wire.there[topic] = kind
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert wire.status.troubles == {"sent /cmd_vel": "another node publishes /cmd_vel too; end one of them"}
 
 
 def test_scans_of_another_clock_than_the_cameras_are_noted(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path)
     drive.feed(wire, [each._replace(data=ahead(each.data)) if each.topic == "/scan" else each for each in said()])
-    drive.intake.watch()
+    drive.synchronizer.watch()
     assert drive.outs
     assert wire.status.troubles.keys() == {"/scan"}
     assert "/scan: nothing of it is stamped in the second before an image" in wire.status.troubles["/scan"]

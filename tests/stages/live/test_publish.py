@@ -39,18 +39,18 @@ class Driven(Recorded):
         self.begins_anew, self.reported = begins_anew, dict[int, np.ndarray]()
 
     def take(self, timeout_s=0.0):
-        arrival = super().take(timeout_s)
-        if arrival is None or arrival.topic != ODOMETRY:
-            return arrival
-        message = decode(arrival.msgtype, arrival.data)
-        at, turned = message.pose.pose.position, message.pose.pose.orientation
+        message = super().take(timeout_s)
+        if message is None or message.topic != ODOMETRY:
+            return message
+        decoded = decode(message.msgtype, message.data)
+        at, turned = decoded.pose.pose.position, decoded.pose.pose.orientation
         pose = planar(at, turned)
         if self.begins_anew and len(self.reported) >= RESET_AT:
             pose = between(RESET, pose)
             at.x, at.y = pose[:2].tolist()
             turned.z, turned.w = math.sin(pose[2] / 2), math.cos(pose[2] / 2)
-        self.reported[stamp_of(message)] = pose
-        return arrival._replace(data=bytes(standard_types().serialize_cdr(message, arrival.msgtype)))
+        self.reported[stamp_of(decoded)] = pose
+        return message._replace(data=bytes(standard_types().serialize_cdr(decoded, message.msgtype)))
 
 
 @pytest.mark.parametrize("tolerance_s", [0.0, 0.3])

@@ -7,7 +7,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.live import publish_truth, robot_driver
 from omninav.stages.live.robot_driver import CameraStop, ClockJump, RobotDriver, RobotDriverState
-from omninav.stages.live.transport import Arrival, TransportError
+from omninav.stages.live.transport import RawMessage, TransportError
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.episode_statistics import EpisodeStatistics
@@ -51,7 +51,7 @@ def test_a_command_of_either_type_holds_for_half_a_second(wire, msgtype):
     drive.tick()  # it is found, and subscribed to
     twist = {"linear": {"x": 0.3}, "angular": {"z": -0.2}}
     data = encode(msgtype, twist if msgtype == TWIST else {"twist": twist})
-    wire.inbox.put(Arrival("/cmd_vel", msgtype, 0, data))
+    wire.queue.put(RawMessage("/cmd_vel", msgtype, 0, data))
     commands = [drive.tick().command for _ in range(4)]
     assert [command and (command.speed, command.turning) for command in commands] == [(0.3, -0.2)] * 3 + [None]
 
@@ -60,8 +60,8 @@ def test_a_command_that_is_no_number_is_counted_and_not_driven(wire):
     drive = Drive()
     wire.there["/cmd_vel"] = TWIST
     drive.tick()
-    wire.inbox.put(Arrival("/cmd_vel", TWIST, 0, encode(TWIST, {"linear": {"x": float("nan")}})))
-    wire.inbox.put(Arrival("/cmd_vel", TWIST, 0, b"\0\1\0\0cut"))
+    wire.queue.put(RawMessage("/cmd_vel", TWIST, 0, encode(TWIST, {"linear": {"x": float("nan")}})))
+    wire.queue.put(RawMessage("/cmd_vel", TWIST, 0, b"\0\1\0\0cut"))
     assert drive.tick().command is None
     assert drive.ctx.counts == {"impossible_command": 1, "bad_message": 1}
 

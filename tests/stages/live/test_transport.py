@@ -4,25 +4,25 @@ import sys
 import pytest
 
 from omninav.stages.live.dds_transport import _settings
-from omninav.stages.live.transport import Arrival, MessageQueue, TransportError, connect
+from omninav.stages.live.transport import MessageQueue, RawMessage, TransportError, connect
 
 from .conftest import WAIT_S, OtherEnd, decode, encode, until
 
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseWithCovarianceStamped"
 
 
-def arrival(topic: str, received: int) -> Arrival:
-    return Arrival(topic, ODOMETRY, received, b"")
+def message(topic: str, received: int) -> RawMessage:
+    return RawMessage(topic, ODOMETRY, received, b"")
 
 
 def test_of_a_topic_whose_newest_is_wanted_older_ones_are_overtaken_and_counted():
-    inbox = MessageQueue()
-    inbox.open("/image", newest=True)
-    inbox.open("/odom", newest=False)
+    queue = MessageQueue()
+    queue.open("/image", newest=True)
+    queue.open("/odom", newest=False)
     for received in range(4):
-        inbox.put(arrival("/image", received))
-        inbox.put(arrival("/odom", received))
-    taken = [inbox.take(0.0) for _ in range(6)]
+        queue.put(message("/image", received))
+        queue.put(message("/odom", received))
+    taken = [queue.take(0.0) for _ in range(6)]
     assert [(one.topic, one.received) for one in taken if one] == [
         ("/odom", 0),
         ("/odom", 1),
@@ -30,13 +30,13 @@ def test_of_a_topic_whose_newest_is_wanted_older_ones_are_overtaken_and_counted(
         ("/image", 3),
         ("/odom", 3),
     ]
-    assert inbox.overtaken == {"/image": 3}
+    assert queue.overtaken == {"/image": 3}
 
 
 def test_an_empty_inbox_gives_none_in_time():
-    inbox = MessageQueue()
-    inbox.open("/odom", newest=False)
-    assert inbox.take(0.01) is None
+    queue = MessageQueue()
+    queue.open("/odom", newest=False)
+    assert queue.take(0.01) is None
 
 
 @pytest.mark.parametrize("value", ["robots", "233", "-1"])

@@ -20,7 +20,7 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .status import LiveStatus
-from .transport import Arrival, Transport, TransportError
+from .transport import RawMessage, Transport, TransportError
 
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 EMPTY = "std_msgs/msg/Empty"
@@ -53,21 +53,21 @@ UNUSED_S = 2.0
 class _Pending(NamedTuple):
     stamp: int
     since: float
-    arrival: Arrival
+    message: RawMessage
 
 
-class Taken(NamedTuple):
-    """A tick's image with all that belongs to it; `arrivals`: what it consumed, in the order of the record."""
+class SyncedFrame(NamedTuple):
+    """A tick's image with all that belongs to it; `messages`: what it consumed, in the order of the record."""
 
     stamp: int
     pixels: Pixels
     frame: Frame
-    arrivals: list[Arrival]
+    messages: list[RawMessage]
 
 
 @dataclass
-class Intake:
-    """Takes from a transport what a drive is made of, and says what is missing."""
+class TimeSynchronizer:
+    """Joins a transport's images with odometry, scans and truth of their times, and says what is missing."""
 
     transport: Transport
     status: LiveStatus
@@ -85,7 +85,7 @@ class Intake:
         self.details: dict[str, str] = {}
         """The first of each kind; `_latest`: the last."""
         self._latest: dict[str, str] = {}
-        self.unrecorded: list[Arrival] = []
+        self.unrecorded: list[RawMessage] = []
         self._images: list[_Pending] = []
         self._earlier: int | None = None
         self._without_scan = False
@@ -109,19 +109,19 @@ class Intake:
             with suppress(TransportError):  # an installation without that type has no such transforms either
                 self.transport.subscribe(TF_STATIC, TRANSFORMS_TYPE, latched=True)
 
-    def next(self, wait_s: float) -> Taken | None:
+    def next(self, wait_s: float) -> SyncedFrame | None:
         """The newest image that can be used, of all that has come; None where none can within that time."""
         until = time.monotonic() + wait_s
         while True:
-            while (arrival := self.transport.take()) is not None:
-                self._take(arrival)
-            taken = self._newest()
+            while (message := self.transport.take()) is not None:
+                self._take(message)
+            synced = self._newest()
             left = until - time.monotonic()
-            if taken is not None or left <= 0:
-                return taken
-            arrival = self.transport.take(left)
-            if arrival is not None:
-                self._take(arrival)
+            if synced is not None or left <= 0:
+                return synced
+            message = self.transport.take(left)
+            if message is not None:
+                self._take(message)
 
     def watch(self) -> None:
         """Note what is missing, and what is well again."""
@@ -196,7 +196,7 @@ class Intake:
         tracks = (self.drive.odometry, self.drive.truth)
         found = sum((track.dropped for track in tracks if track is not None), self.counts.copy())
         images = [topic for topic, role in self.header.topics.items() if role == "image"]
-        found["overtaken_image"] += sum(self.transport.inbox.overtaken[topic] for topic in images)
+        found["overtaken_image"] += sum(self.transport.queue.overtaken[topic] for topic in images)
         return +found
 
     def _drop(self, kind: str, detail: str) -> None:
@@ -204,39 +204,39 @@ class Intake:
         self.details.setdefault(kind, detail)
         self._latest[kind] = detail
 
-    def _take(self, arrival: Arrival) -> None:
-        self._received[arrival.topic] = time.monotonic()
-        role = self.header.topics.get(arrival.topic)
+    def _take(self, message: RawMessage) -> None:
+        self._received[message.topic] = time.monotonic()
+        role = self.header.topics.get(message.topic)
         if role == "image":
-            stamp = header_stamp(arrival.data)
+            stamp = header_stamp(message.data)
             if stamp is None:
-                self._drop("bad_message", f"{arrival.topic}: a message of {len(arrival.data)} bytes is no image")
+                self._drop("bad_message", f"{message.topic}: a message of {len(message.data)} bytes is no image")
             else:
                 delay = self.camera.delay_ns if isinstance(self.camera, Camera) else 0
-                self._images.append(_Pending(stamp - delay, time.monotonic(), arrival))
+                self._images.append(_Pending(stamp - delay, time.monotonic(), message))
             return
         try:
-            message: Any = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
-            if arrival.topic == TF_STATIC:
-                return self._fixed.add(message)
+            decoded: Any = standard_types().deserialize_cdr(message.data, message.msgtype)
+            if message.topic == TF_STATIC:
+                return self._fixed.add(decoded)
             if role is None:
                 if self.camera is None:
-                    self.camera = camera_from_info(message, str(arrival.topic))
-                    self._info_frame = message.header.frame_id
+                    self.camera = camera_from_info(decoded, str(message.topic))
+                    self._info_frame = decoded.header.frame_id
                 return
             if role == "odometry":
-                self._base = message.child_frame_id
-            header = getattr(message, "header", None)
-            stamp = arrival.received if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
-            items = self.drive.add(role, stamp, message, arrival)
+                self._base = decoded.child_frame_id
+            header = getattr(decoded, "header", None)
+            stamp = message.received if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
+            items = self.drive.add(role, stamp, decoded, message)
         except BadInput:
             raise
         except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
-            self._drop("bad_message", f"{arrival.topic}: a message is not a valid {arrival.msgtype} ({error!s:.120})")
+            self._drop("bad_message", f"{message.topic}: a message is not a valid {message.msgtype} ({error!s:.120})")
             return
         self.unrecorded += items
 
-    def _newest(self) -> Taken | None:
+    def _newest(self) -> SyncedFrame | None:
         """The newest sound image that odometry has reached; older ones are overtaken by it."""
         if self.camera is None:
             self._images.clear()
@@ -246,13 +246,13 @@ class Intake:
         for one in sorted(reached, key=lambda one: one.stamp, reverse=True):
             if self._awaits_truth(one, now):
                 return None
-            taken = self._use(one, self.camera)
+            synced = self._use(one, self.camera)
             self._images.remove(one)
-            if taken is not None:
+            if synced is not None:
                 late = [other for other in self._images if other in reached]
                 self.counts["overtaken_image"] += len(late)
                 self._images = [other for other in self._images if other not in late]
-                return taken
+                return synced
         for one in self._images:
             if now - one.since > self.patience_s:
                 where = "nothing" if track is None or track.last is None else f"up to {track.last / 1e9:.3f} s"
@@ -278,8 +278,8 @@ class Intake:
         waits = self._wants_transforms() and time.monotonic() - self._since <= self.patience_s
         return waits and self.transport.offered().get(TF_STATIC) == TRANSFORMS_TYPE
 
-    def _use(self, image: _Pending, camera: Camera | str) -> Taken | None:
-        where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
+    def _use(self, image: _Pending, camera: Camera | str) -> SyncedFrame | None:
+        where = f"{image.message.topic}: the image of {image.stamp / 1e9:.3f} s"
         if image.stamp == self.last_stamp:
             self._drop("duplicate_frame", f"{where} has come before")
             return None
@@ -287,13 +287,13 @@ class Intake:
             self._drop("backward_stamp", f"{where} comes after one of {(self.last_stamp or 0) / 1e9:.3f} s")
             return None
         try:
-            message: Any = standard_types().deserialize_cdr(image.arrival.data, image.arrival.msgtype)
-            pixels = pixels_of(message)
+            decoded: Any = standard_types().deserialize_cdr(image.message.data, image.message.msgtype)
+            pixels = pixels_of(decoded)
         except Undecodable as error:
             self._drop("undecodable_image", f"{where}: {error}")
             return None
         except Exception as error:  # as above
-            self._drop("bad_message", f"{where} is not a valid {image.arrival.msgtype} ({error!s:.120})")
+            self._drop("bad_message", f"{where} is not a valid {image.message.msgtype} ({error!s:.120})")
             return None
         if isinstance(camera, str):
             camera = self.camera = named_camera(camera, lambda: pixels.shape[1::-1])[0]
@@ -301,7 +301,7 @@ class Intake:
         if pixels.shape[:2] != size:
             is_not = f"{pixels.shape[1]} x {pixels.shape[0]}, its camera {size[1]} x {size[0]}"
             if not self._used_any:
-                raise BadInput(f"{image.arrival.topic}: its images are {is_not}; give camera=PATH/camera.yaml")
+                raise BadInput(f"{image.message.topic}: its images are {is_not}; give camera=PATH/camera.yaml")
             self._drop("wrong_size", f"{where} is {is_not}")
             return None
         if is_blank(pixels):
@@ -314,7 +314,7 @@ class Intake:
         self.camera = whole
         mounted = Mounted(whole)
         if not self._used_any:
-            own = self._info_frame or message.header.frame_id
+            own = self._info_frame or decoded.header.frame_id
             mounted = self._fixed.mounted(whole, self._base, own, self._by_info)
             if not mounted.in_words and self._awaits_transforms():
                 return None
@@ -327,16 +327,16 @@ class Intake:
         self.camera = mounted.camera
         frame, scans = made
         self._without_scan = frame.scan is None
-        arrivals = [*self.recordable(), *scans, image.arrival]
+        messages = [*self.recordable(), *scans, image.message]
         self.last_stamp, self._used_any, self._earlier = image.stamp, True, None
         self._last_used, self._counts_at_last = time.monotonic(), self.counts.copy()
-        self.status.taken(image.stamp, image.arrival.received)
-        return Taken(image.stamp, pixels, frame, arrivals)
+        self.status.taken(image.stamp, image.message.received)
+        return SyncedFrame(image.stamp, pixels, frame, messages)
 
-    def recordable(self) -> list[Arrival]:
+    def recordable(self) -> list[RawMessage]:
         """Inputs consumed since this was last asked."""
-        arrivals, self.unrecorded = self.unrecorded, []
-        return arrivals
+        messages, self.unrecorded = self.unrecorded, []
+        return messages
 
     def _follows(self, stamp: int) -> bool:
         """Tells whether an image comes after the last one used; or its clock was set back for good."""
