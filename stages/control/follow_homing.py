@@ -171,7 +171,7 @@ def _metres_left(vector: HomingVector, scan: Scan | None) -> float:
     if scan is None:
         return math.inf
     # A typical feature is taken to be as far away as what stands around the robot.
-    return vector.nearness * float(np.median(np.minimum(scan.ranges, scan.farthest)))
+    return vector.depth_ratio * float(np.median(np.minimum(scan.ranges, scan.farthest)))
 
 
 def _since(stamp: int | None, now: bool, tick: Tick) -> tuple[int | None, float]:

@@ -40,7 +40,7 @@ class HomingVectorFromMap(Stage):
             turn=turn,
             distance=distance,
             ratio=distance * map.unit,
-            nearness=distance / depth if depth > 0.0 else 1.0,
+            depth_ratio=distance / depth if depth > 0.0 else 1.0,
             metres=distance * map.metres if map.metres > 0.0 else None,
             inliers=map.inliers,
             state=map.state,

@@ -37,8 +37,8 @@ REBUILD_RATIO = 1.5
 ARRIVAL_DISTANCE = 0.05
 """Distance to the target, over the features' typical distance, below which the two views must look the same."""
 MAX_OUTLIER_DEG = 3.0
-"""Largest angle between most matched bearings at the target, after the turn, degrees; twice the nearness is added, as
-half of the features are closer than a typical one."""
+"""Largest angle between most matched bearings at the target, after the turn, degrees; twice the depth ratio is added,
+as half of the features are closer than a typical one."""
 SAME_SHARE, SAME_SHARE_AT_TARGET, AT_TARGET = 0.5, 0.7, 0.03
 """Share of the matches that must have the target's bearings; and the share from this distance on, over the features'
 typical distance, at which the robot may stop: in 20 development drives 98 % of the images there have 0.77 and more, and
@@ -323,15 +323,15 @@ class LocalMapping(Stage):
 
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn and what is left of the way.
-        nearness = local_map.distance() / max(local_map.depth(), 1e-9)
-        if nearness > ARRIVAL_DISTANCE or (not self.verify and local_map.inliers > len(matches.rows) / 3):
+        depth_ratio = local_map.distance() / max(local_map.depth(), 1e-9)
+        if depth_ratio > ARRIVAL_DISTANCE or (not self.verify and local_map.inliers > len(matches.rows) / 3):
             return False
         turn = local_map.rotation.T @ local_map.goal_rotation
         turned = matches.second @ turn.T
-        chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0 + nearness)
+        chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0 + depth_ratio)
         same = np.linalg.norm(turned - matches.first, axis=1) < chord
         enough = MIN_VERIFIED_INLIERS if self.verify else 0
-        share = SAME_SHARE_AT_TARGET if self.verify and nearness <= AT_TARGET else SAME_SHARE
+        share = SAME_SHARE_AT_TARGET if self.verify and depth_ratio <= AT_TARGET else SAME_SHARE
         if np.count_nonzero(same) < max(share * len(matches.rows), enough):
             return True
         return self.verify and shown_sectors(matches.there @ turn.T, turned[same], matches.here) < SHOWN_SECTORS

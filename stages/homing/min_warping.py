@@ -20,9 +20,9 @@ LOG_STEP = 0.112
 """Step of the logarithm of the tangent of elevation from row to row, and of the magnification from plane to plane."""
 MAX_SHIFT = 8
 """Planes for magnification, and as many for its inverse: up to 2.4 times."""
-INVERSE_DEPTH_RATIOS = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.52, 0.64, 0.78, 0.95, 1.2])
+DEPTH_RATIOS = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.52, 0.64, 0.78, 0.95, 1.2])
 """The way to the target over a column's distance: what is tried. Each stands for what is closest to it."""
-PRIOR = np.gradient(INVERSE_DEPTH_RATIOS) / np.gradient(INVERSE_DEPTH_RATIOS).sum()
+PRIOR = np.gradient(DEPTH_RATIOS) / np.gradient(DEPTH_RATIOS).sum()
 """All alike up to the largest."""
 HALF_WINDOW = 1
 """Columns on both sides of one that are compared together with it."""
@@ -48,12 +48,12 @@ class Columns(NamedTuple):
 
 
 class Warp(NamedTuple):
-    """The best warp. `direction`, `turn`: to the target (rad, counter-clockwise); `nearness`: the way there over the
+    """The best warp. `direction`, `turn`: to the target (rad, counter-clockwise); `depth_ratio`: the way there over the
     distance of a typical column; `columns`: how many columns speak for it; `scores` (directions, turns): of all."""
 
     direction: float
     turn: float
-    nearness: float
+    depth_ratio: float
     columns: int
     scores: Floats
 
@@ -119,14 +119,14 @@ def likelihood_ratios(distances: Floats) -> Floats:
 
 
 def places_of_columns(count: int) -> tuple[Ints, Ints]:
-    """Bearing of a column seen from the target, by the angle from the target's direction: two (C, nearnesses).
+    """Bearing of a column seen from the target, by the angle from the target's direction: two (C, depth ratios).
 
     Columns of azimuth (of the target's view, turned to the first one's heading), and planes of `column_distances`, -1
     where there is none. A thing at azimuth x from the target's direction and distance r is at azimuth y and distance
     r' from the target, d away: r' sin y = r sin x, r' cos y = r cos x - d.
     """
     azimuths = 2.0 * math.pi * np.arange(count)[:, None] / count
-    x, y = np.cos(azimuths) - INVERSE_DEPTH_RATIOS, np.sin(azimuths)
+    x, y = np.cos(azimuths) - DEPTH_RATIOS, np.sin(azimuths)
     columns = np.rint(np.arctan2(y, x) * count / (2.0 * math.pi)).astype(np.int64) % count
     shifts = np.rint(np.log(np.maximum(np.hypot(x, y), 1e-6)) / LOG_STEP).astype(np.int64)
     return columns, np.where(np.abs(shifts) <= MAX_SHIFT, shifts + MAX_SHIFT, -1)
@@ -186,13 +186,13 @@ def warped(first: Columns, second: Columns, max_turn: float = math.pi) -> Warp:
     scores = there + back[seen_back, -turns % count]
     allowed = np.abs((turns + count // 2) % count - count // 2) <= max(max_turn, 0.0) * count / (2.0 * math.pi)
     row, turn = np.unravel_index(int(np.argmax(np.where(allowed, scores, -np.inf))), scores.shape)
-    nearness, columns = _support(ratios, int(directions[row]), int(turn))
+    depth_ratio, columns = _support(ratios, int(directions[row]), int(turn))
     angle = 2.0 * math.pi / count
-    return Warp(float(directions[row]) * angle, float(turn) * angle, nearness, columns, scores)
+    return Warp(float(directions[row]) * angle, float(turn) * angle, depth_ratio, columns, scores)
 
 
 def _support(ratios: Floats, direction: int, turn: int) -> tuple[float, int]:
-    """The median nearness of the columns that match better than by chance, and how many they are."""
+    """The median depth ratio of the columns that match better than by chance, and how many they are."""
     count = len(ratios)
     places, planes = places_of_columns(count)
     rows = np.arange(count)
@@ -200,5 +200,5 @@ def _support(ratios: Floats, direction: int, turn: int) -> tuple[float, int]:
     seen = (places[x] + direction - turn) % count
     ratio = np.where(planes[x] >= 0, ratios[rows[:, None], planes[x], seen], 0.0) * PRIOR
     total = ratio.sum(axis=1)
-    means = (ratio @ INVERSE_DEPTH_RATIOS)[total > 1.0] / total[total > 1.0]
+    means = (ratio @ DEPTH_RATIOS)[total > 1.0] / total[total > 1.0]
     return (float(np.median(means)) if len(means) else 1.0), len(means)

@@ -23,10 +23,10 @@ MIN_COLUMNS = 20
 
 
 class MinWarpingState(State):
-    """`target`: the number of the target; `nearness`: at the first vector towards it, 0 before that."""
+    """`target`: the number of the target; `depth_ratio`: at the first vector towards it, 0 before that."""
 
     target: int = -1
-    nearness: float = 0.0
+    depth_ratio: float = 0.0
 
 
 class MinWarping(Stage):
@@ -38,7 +38,7 @@ class MinWarping(Stage):
     is given on, a doubtful one too: it is the more accurate one. The vector of whole images is `new`: no second image
     has to bear it out. The camera moves on a plane and stands upright.
 
-    `ratio` is over the nearness at the target's first vector, `distance` the same; metres are not known. Raises
+    `ratio` is over the depth ratio at the target's first vector, `distance` the same; metres are not known. Raises
     BadInput for an image without its camera, and a camera that does not see the full circle.
     """
 
@@ -67,7 +67,7 @@ class MinWarping(Stage):
     ) -> Out:
         """One homing vector; `vector`: the local map's, `target`: the image to go to."""
         if vector.number != state.target:
-            state.target, state.nearness = vector.number, 0.0
+            state.target, state.depth_ratio = vector.number, 0.0
         weak = vector.state == "lost" or (vector.state in ("new", "doubtful") and vector.inliers < MIN_FEATURES)
         if not weak or target is None:
             return self.Out(vector=vector)
@@ -81,8 +81,8 @@ class MinWarping(Stage):
                 why = f"{vector.why}; {found.columns} columns of the image match, {MIN_COLUMNS} are needed"
                 vector = replace(vector, why=why)
             return self.Out(vector=vector)
-        state.nearness = state.nearness or max(found.nearness, 1e-3)
-        ratio = found.nearness / state.nearness
+        state.depth_ratio = state.depth_ratio or max(found.depth_ratio, 1e-3)
+        ratio = found.depth_ratio / state.depth_ratio
         return self.Out(
             vector=HomingVector(
                 number=vector.number,
@@ -90,7 +90,7 @@ class MinWarping(Stage):
                 turn=float(wrap(found.turn)),
                 distance=ratio,
                 ratio=ratio,
-                nearness=found.nearness,
+                depth_ratio=found.depth_ratio,
                 metres=None,
                 inliers=found.columns,
                 state="new",

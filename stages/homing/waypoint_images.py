@@ -10,12 +10,12 @@ REACHED_RATIO = 0.2
 """Share of the way to a view that is left where it counts as reached, but for the last."""
 ARRIVAL_DISTANCE_M = 0.04
 """Distance to the last view at which the robot has arrived, where odometry tells metres."""
-ARRIVAL_NEARNESS = 0.007
-"""Nearness of the last view at which the robot has arrived."""
-PASSED_NEARNESS = 0.03
-"""Nearness of a view that hardly differs from the present one, reached at once; of the last, where it lies behind."""
-DOCKING_NEARNESS = 0.05
-"""Nearness of the last view beyond which a robot that turns there is not there after all."""
+ARRIVAL_DEPTH_RATIO = 0.007
+"""Depth ratio of the last view at which the robot has arrived."""
+PASSED_DEPTH_RATIO = 0.03
+"""Depth ratio of a view that hardly differs from the present one, reached at once; of the last where it lies behind."""
+DOCKING_DEPTH_RATIO = 0.05
+"""Depth ratio of the last view beyond which a robot that turns there is not there after all."""
 MAX_HEADING_ERROR_DEG = 3.0
 """Largest heading error at the last view, degrees."""
 
@@ -39,8 +39,8 @@ class WaypointImages(Stage):
     Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it lies behind and less than half of the
     way to it is left. At the last view the robot only turns, until it has the view's heading. A lost target's vector
     does not count; a doubtful one says that the robot is not there yet. `vector` is the one of the tick before, by a
-    delayed wire. A path with another number starts again at its first view. Nearness is the distance over that of a
-    typical feature.
+    delayed wire. A path with another number starts again at its first view. The depth ratio is the distance over that
+    of a typical feature.
     """
 
     class Out(Outputs):
@@ -65,7 +65,7 @@ class WaypointImages(Stage):
             state.path, state.reached, state.docking, state.arrived = path.number, 0, False, False
             state.target += 1
         elif vector is not None and vector.number == state.target:
-            state.docking &= vector.state != "doubtful" and vector.nearness <= DOCKING_NEARNESS
+            state.docking &= vector.state != "doubtful" and vector.depth_ratio <= DOCKING_DEPTH_RATIO
             if vector.is_found:
                 self._go_on(state, vector, len(path.views))
         last = state.reached >= len(path.views) - 1
@@ -79,13 +79,13 @@ class WaypointImages(Stage):
         return self.Out(target=HomingTarget(state.target, view, last, name), features=view, progress=progress)
 
     def _go_on(self, state: WaypointImagesState, vector: HomingVector, views: int) -> None:
-        behind, close = math.cos(vector.direction) < 0.0, vector.nearness <= PASSED_NEARNESS
+        behind, close = math.cos(vector.direction) < 0.0, vector.depth_ratio <= PASSED_DEPTH_RATIO
         if state.reached < views - 1:
             if close or vector.ratio <= REACHED_RATIO or (behind and vector.ratio < 0.5):
                 state.reached += 1
                 state.target += 1
             return
-        there = vector.nearness <= ARRIVAL_NEARNESS or (close and behind)
+        there = vector.depth_ratio <= ARRIVAL_DEPTH_RATIO or (close and behind)
         there = there or (vector.metres is not None and vector.metres <= ARRIVAL_DISTANCE_M)
         state.docking = state.docking or there
         if state.docking and abs(vector.turn) <= math.radians(MAX_HEADING_ERROR_DEG):

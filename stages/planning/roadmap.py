@@ -196,7 +196,7 @@ class RoadmapPlanner(Stage):
             turn=turn,
             distance=left,
             ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3) if begun else 1.0,
-            nearness=1.0,
+            depth_ratio=1.0,
             metres=math.hypot(x, y) if begun and sure else None,
             inliers=0 if fix is None else int(fix.inliers[0]),
             state="tracking" if sure else "lost",

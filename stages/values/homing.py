@@ -44,11 +44,11 @@ class HomingVector(Value):
     `direction`: where to go (rad, counter-clockwise from forward); `turn`: how far to turn, in all, to have the
     target's heading (rad, counter-clockwise). `distance`: in units of the first baseline, the way from where the local
     map was made (erratum 39 in docs/papers.md: bearings alone give no metres); `ratio`: over the way from where homing
-    towards this target began, the same unless the map was made again. `nearness`: the distance over that of a typical
-    feature; small where the two views hardly differ, from the first tick on. `metres`: the distance, where odometry has
-    told the unit. `inliers`: features that agree with it. `state`: `new` (from two views), `tracking` (from the local
-    map), `doubtful` (from two views, and no other image has borne out yet that they show one place), or `lost`; of the
-    last two `why`. What is said of a lost target is what was known last, moved on by odometry where there is any.
+    towards this target began, the same unless the map was made again. `depth_ratio`: the distance over a typical
+    feature's, small where the two views hardly differ. `metres`: the distance, where odometry has told the unit.
+    `inliers`: features that agree with it. `state`: `new` (from two views), `tracking` (from the local map), `doubtful`
+    (from two views, and no other image has borne out yet that they show one place), or `lost`; of the last two `why`.
+    What is said of a lost target is what was known last, moved on by odometry where there is any.
     """
 
     number: int
@@ -56,7 +56,7 @@ class HomingVector(Value):
     turn: Finite
     distance: Finite
     ratio: Finite
-    nearness: Finite
+    depth_ratio: Finite
     metres: Annotated[float | None, Bounds(ge=0)]
     inliers: Annotated[int, Bounds(ge=0)]
     state: Literal["new", "tracking", "doubtful", "lost"]

@@ -18,7 +18,7 @@ WORDS = """
     anywhere apart aside asks at_once before_threshold beside boundary careful_references catalog chance clean_rate
     closing columns_alone consensus creep crew disturbance doubt driving empty_map far_in_drive film first_belief
     fresh gives growing guessed_motion heard how_compared hypothesis_life idle kept_sessions known_poses largest
-    left_behind left_over lesson lessons longest mean_at_first misfit misfits near_rate ordinary own_place pace
+    left_behind left_over lesson lessons longest mean_at_first misfit misfits near_rate nearness ordinary own_place pace
     past_states path_images patience picture pictures put_down put_right random_samples reckon restless retrace
     returns_home right_rate said selective_few settled_speed sift_and_columns splice splices spool stands_for
     strangers stray_deg taught tell told_rate view_limit view_reach wandered wants way work_through

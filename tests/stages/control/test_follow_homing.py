@@ -17,7 +17,7 @@ STAND = (0.0, 0.0)
 
 
 def vector(direction: float = 0.0, ratio: float = 0.8, **how) -> HomingVector:
-    known = {"number": 0, "turn": 0.0, "nearness": 0.3, "metres": None, "inliers": 20, "state": "tracking"}
+    known = {"number": 0, "turn": 0.0, "depth_ratio": 0.3, "metres": None, "inliers": 20, "state": "tracking"}
     return HomingVector(direction=direction, distance=ratio, ratio=ratio, **{**known, **how})
 
 
@@ -208,8 +208,8 @@ def test_a_target_close_before_a_wall_can_be_reached() -> None:
 
 def test_where_metres_are_unknown_a_near_target_is_taken_to_be_as_near_as_what_stands_around() -> None:
     walls = scan((-180.0, 180.0, 2.0), (-40.0, 40.0, 0.6))  # the median range is 2 m
-    for nearness, moves in ((0.1, True), (0.35, False)):  # 0.2 m and 0.7 m away
-        speed, _ = command(drive(vector(nearness=nearness), progress(last=True), walls))
+    for depth_ratio, moves in ((0.1, True), (0.35, False)):  # 0.2 m and 0.7 m away
+        speed, _ = command(drive(vector(depth_ratio=depth_ratio), progress(last=True), walls))
         assert (speed > 0.0) is moves
 
 

@@ -177,9 +177,9 @@ def test_under_a_camera_in_front_of_its_axis_the_vector_is_the_robots() -> None:
     assert abs(wrapped(math.atan2(beside[1], beside[0]) - math.atan2(y, x))) > 0.2
 
 
-def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:
-    assert Homing().at((5.02, 5.01, 1.4)).nearness < 0.04
-    assert Homing().at((4.0, 4.2, 1.4)).nearness > 0.1
+def test_the_depth_ratio_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:
+    assert Homing().at((5.02, 5.01, 1.4)).depth_ratio < 0.04
+    assert Homing().at((4.0, 4.2, 1.4)).depth_ratio > 0.1
 
 
 def test_a_map_that_says_the_target_is_reached_where_views_differ_is_discarded() -> None:
@@ -316,12 +316,12 @@ def test_an_arrival_four_decimetres_away_is_not_believed(pose: tuple[float, floa
     assert (homing.ctx.counts["false_map"] == 0) == believed
 
 
-@pytest.mark.parametrize(("share", "nearness", "believed"), [(65, 0.01, False), (75, 0.01, True), (65, 0.04, True)])
-def test_at_the_target_seven_of_ten_matches_must_have_its_bearings(share: int, nearness: float, believed: bool) -> None:
+@pytest.mark.parametrize(("share", "depth_ratio", "believed"), [(65, 0.01, False), (75, 0.01, True), (65, 0.04, True)])
+def test_at_the_target_seven_of_ten_matches_have_its_bearings(share: int, depth_ratio: float, believed: bool) -> None:
     homing, rng = Homing(verify=True), np.random.default_rng(0)
     while homing.at((4.97, 4.98, -0.5)).state != "tracking":
         pass
-    ahead = np.array([nearness * homing.map.depth(), 0.0, 0.0])
+    ahead = np.array([depth_ratio * homing.map.depth(), 0.0, 0.0])
     near = replace(homing.map, goal_translation=homing.map.translation + ahead)
     seen_there = rng.normal(size=(100, 3))
     seen_there /= np.linalg.norm(seen_there, axis=1)[:, None]
@@ -456,9 +456,9 @@ def test_a_vector_is_in_the_robots_frame_and_its_lengths_are_in_their_units() ->
     stage, ctx = HomingVectorFromMap(), Context("homing")
     found, close, none = (stage.step(ctx, each).vector for each in (map, at_robot, LocalMap(-1, 3, "lost")))
     assert (found.direction, found.turn) == pytest.approx((math.atan2(4.0, 3.0), math.radians(30.0)))
-    assert (found.distance, found.ratio, found.nearness, found.metres) == pytest.approx((5.0, 0.2, 0.5, 1.5))
-    assert (close.nearness, close.metres) == (1.0, None)
-    assert (none.direction, none.turn, none.distance, none.ratio, none.nearness) == (0.0, 0.0, 1.0, 1.0, 1.0)
+    assert (found.distance, found.ratio, found.depth_ratio, found.metres) == pytest.approx((5.0, 0.2, 0.5, 1.5))
+    assert (close.depth_ratio, close.metres) == (1.0, None)
+    assert (none.direction, none.turn, none.distance, none.ratio, none.depth_ratio) == (0.0, 0.0, 1.0, 1.0, 1.0)
 
 
 def test_missing_wires_are_reported() -> None:

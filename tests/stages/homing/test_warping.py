@@ -11,7 +11,7 @@ from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.homing.column_table import ColumnTable
 from omninav.stages.homing.first_image import FirstImage
-from omninav.stages.homing.min_warping import INVERSE_DEPTH_RATIOS, Columns, places_of_columns, warped
+from omninav.stages.homing.min_warping import DEPTH_RATIOS, Columns, places_of_columns, warped
 from omninav.stages.homing.warping import MinWarping, MinWarpingState
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Image
@@ -47,8 +47,8 @@ def test_it_is_nearer_where_less_of_the_way_is_left():
     vectors = [stage.step(ctx, state, seen((x, 4.6, 0.4)), LOST, target, CAMERA).vector for x in (4.2, 4.8)]
     assert vectors[0] is not None
     assert vectors[1] is not None
-    assert vectors[1].nearness < vectors[0].nearness
-    assert vectors[1].ratio == pytest.approx(vectors[1].nearness / vectors[0].nearness)
+    assert vectors[1].depth_ratio < vectors[0].depth_ratio
+    assert vectors[1].ratio == pytest.approx(vectors[1].depth_ratio / vectors[0].depth_ratio)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_compass_limits_the_turn():
 
 def test_columns_are_seen_where_geometry_says():
     columns, planes = places_of_columns(360)
-    row = int(np.flatnonzero(INVERSE_DEPTH_RATIOS == 0.52)[0])
+    row = int(np.flatnonzero(DEPTH_RATIOS == 0.52)[0])
     assert planes[0, 0] == planes[180, 0]  # no way to the target: nothing changes
     assert columns[90, 0] == 90
     # straight ahead, half the way there: still ahead, 1 / 0.48 times as near; behind: 1.52 times as far
@@ -100,7 +100,7 @@ def test_views_that_differ_by_a_turn_alone_give_the_turn():
     nothing = np.zeros((180, 0, 3), np.float32)
     found = warped(Columns(above, nothing), Columns(np.roll(above, -40, axis=0), nothing))
     assert math.degrees(found.turn) == pytest.approx(80.0)
-    assert found.nearness < 0.05
+    assert found.depth_ratio < 0.05
 
 
 def test_a_camera_without_a_full_circle_is_refused():

@@ -14,7 +14,7 @@ PATH = ImagePath(4, tuple(none_found() for _ in range(3)), ("a", "b", "c"))
 
 
 def vector(number: int, ratio: float = 1.0, **how) -> HomingVector:
-    known = {"direction": 0.0, "turn": 0.5, "nearness": ratio, "metres": None, "inliers": 20, "state": "tracking"}
+    known = {"direction": 0.0, "turn": 0.5, "depth_ratio": ratio, "metres": None, "inliers": 20, "state": "tracking"}
     return HomingVector(number=number, distance=ratio, ratio=ratio, **{**known, **how})
 
 
@@ -37,13 +37,13 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
     assert path.step(vector(0, 0.01)).target.name == "b"  # of the view before: says nothing of this one
     assert path.step(vector(1, 0.1, state="lost")).target.name == "b"  # lost: nor this
     assert path.step(vector(1, 0.49, direction=1.6)).target.name == "c"  # behind, more than half of the way on
-    out = path.step(vector(2, 0.1, nearness=0.0071, metres=0.041))
+    out = path.step(vector(2, 0.1, depth_ratio=0.0071, metres=0.041))
     assert out.target.last
     assert not out.progress.docking
     out = path.step(vector(2, 0.0069, turn=math.radians(-3.1)))
     assert out.progress.docking
     assert not out.progress.arrived
-    out = path.step(vector(2, 0.1, nearness=0.049, turn=math.radians(-2.9)))
+    out = path.step(vector(2, 0.1, depth_ratio=0.049, turn=math.radians(-2.9)))
     assert out.progress.arrived
     assert out.progress.at == out.progress.of == 3
     assert out.target is None
@@ -63,7 +63,7 @@ def test_a_robot_that_turns_where_its_target_turns_out_to_be_farther_away_drives
     path, one_view = Path(), ImagePath(5, PATH.views[:1], ("a",))
     path.step(path=one_view)
     assert path.step(vector(0, 0.005, turn=1.0), one_view).progress.docking
-    farther = path.step(vector(0, 0.2, nearness=0.051, turn=0.0), one_view).progress
+    farther = path.step(vector(0, 0.2, depth_ratio=0.051, turn=0.0), one_view).progress
     assert (farther.docking, farther.arrived) == (False, False)
 
 
@@ -76,25 +76,25 @@ def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() 
 @pytest.mark.parametrize(
     "there",
     [
-        {"ratio": 0.1, "nearness": 0.006},
-        {"ratio": 0.1, "nearness": 0.2, "metres": 0.039},
-        {"ratio": 0.1, "nearness": 0.029, "direction": 1.6},
+        {"ratio": 0.1, "depth_ratio": 0.006},
+        {"ratio": 0.1, "depth_ratio": 0.2, "metres": 0.039},
+        {"ratio": 0.1, "depth_ratio": 0.029, "direction": 1.6},
     ],
 )
 def test_the_last_view_is_reached_where_it_is_near_or_just_behind(there) -> None:
     path, one = Path(), ImagePath(1, (none_found(),), ())
     path.step(path=one)
-    away = {**there, "nearness": 0.2, "metres": None}
+    away = {**there, "depth_ratio": 0.2, "metres": None}
     assert not path.step(vector(0, **{**away, "turn": -0.5}), one).progress.arrived
-    assert not path.step(vector(0, **{**there, "nearness": 0.2, "metres": None}), one).progress.docking
+    assert not path.step(vector(0, **{**there, "depth_ratio": 0.2, "metres": None}), one).progress.docking
     assert path.step(vector(0, **there), one).progress.docking
 
 
 def test_a_view_that_hardly_differs_from_the_start_is_passed_at_once() -> None:
     path = Path()
     path.step()
-    assert path.step(vector(0, 1.0, nearness=0.031)).target.name == "a"
-    assert path.step(vector(0, 1.0, nearness=0.029)).target.name == "b"
+    assert path.step(vector(0, 1.0, depth_ratio=0.031)).target.name == "a"
+    assert path.step(vector(0, 1.0, depth_ratio=0.029)).target.name == "b"
 
 
 def test_a_new_path_begins_anew_with_a_target_of_another_number() -> None:
