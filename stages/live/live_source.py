@@ -19,7 +19,7 @@ from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, Liv
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.topics import IMAGE_TOPICS
-from omninav.stages.source.dead_reckoning import Reckoned, VisualCompass, assumed_speed, dead_reckon
+from omninav.stages.source.dead_reckoning import DeadReckoning, VisualCompass, assumed_speed, dead_reckon
 from omninav.stages.source.outputs import DriveOutputs, motion_of, pose_of
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
@@ -44,7 +44,7 @@ PATIENCE_S = 1.0
 """Time for which an image waits for the odometry after it, and for which a topic may be silent, seconds."""
 
 
-class LiveSourceState(Reckoned):
+class LiveSourceState(DeadReckoning):
     """Ticks made, logs begun (a clock that is set back begins one), and of the last tick the stamp (ns), the position
     in the odometry's frame, and the seconds of odometry not believed. `first` and `ended`: stamps of the first tick,
     and of that at which the planned route ended (0: it has not)."""

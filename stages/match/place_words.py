@@ -5,7 +5,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.local_features import LocalFeatures
-from omninav.stages.values.similarity import Answers
+from omninav.stages.values.similarity import RetrievedReferences
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_words import PlaceWords, WordSimilarities
 
@@ -24,7 +24,7 @@ class MatchPlaceWords(Stage):
         """Similarities by place, and the most similar views of the tour; absent where the map has no words."""
 
         similarities: WordSimilarities | None = None
-        answers: Answers | None = None
+        answers: RetrievedReferences | None = None
 
     def step(self, ctx: Context, features: LocalFeatures, map: TopologicalMap, words: PlaceWords | None = None) -> Out:
         """Compare one view with all places."""
@@ -38,4 +38,5 @@ class MatchPlaceWords(Stage):
         best = np.zeros(len(map), np.float32)
         np.maximum.at(best, words.owner, each)
         order = np.argsort(-each, kind="stable")[:ANSWERS]
-        return self.Out(similarities=WordSimilarities(best), answers=Answers(order, each[order], np.zeros(len(order))))
+        answers = RetrievedReferences(order, each[order], np.zeros(len(order)))
+        return self.Out(similarities=WordSimilarities(best), answers=answers)

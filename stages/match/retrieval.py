@@ -16,7 +16,7 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Answers, Similarities
+from omninav.stages.values.similarity import RetrievedReferences, Similarities
 
 from .calibration import MapCalibration
 from .last_view import LastView
@@ -117,7 +117,7 @@ class Retrieval(Stage):
         """Similarities of view and references, the most similar references, and what similarities say of the place."""
 
         similarities: Similarities
-        answers: Answers | None = None
+        answers: RetrievedReferences | None = None
         calibration: SimilarityCalibration | None = None
 
     def __post_init__(self) -> None:
@@ -162,11 +162,11 @@ class Retrieval(Stage):
         return self.Out(similarities=similarities, answers=answers, calibration=calibration)
 
 
-def best_answers(similarities: Similarities, number: int) -> Answers:
+def best_answers(similarities: Similarities, number: int) -> RetrievedReferences:
     """The `number` most similar references, the most similar first, equal ones in the map's order."""
     values, headings = similarities.values, similarities.values.shape[1]
     turns = values.argmax(axis=1)
     peaks = values[np.arange(len(values)), turns]
     rows = np.argsort(-peaks, kind="stable")[:number]
     references = rows if similarities.candidates is None else similarities.candidates[rows]
-    return Answers(references, peaks[rows], wrap(2.0 * np.pi * turns[rows] / headings))
+    return RetrievedReferences(references, peaks[rows], wrap(2.0 * np.pi * turns[rows] / headings))

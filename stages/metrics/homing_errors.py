@@ -10,7 +10,7 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
 
-from .kidnap_recovery import lifted
+from .kidnap_recovery import kidnapped_rows
 
 CARRIED_M = 0.5
 """Distance between true motion and odometry of one tick from which the robot was carried."""
@@ -57,7 +57,7 @@ class HomingErrors(MetricStage):
         if not len(poses) or not known(poses).all():
             return self.Out()
         targets = between(poses, poses[0])
-        carried = lifted(drive, CARRIED_M, 360.0)  # of turns there is none so large: where it was put down alone counts
+        carried = kidnapped_rows(drive, CARRIED_M, 360.0)  # turns do not count: none is so large
         away = int(carried[-1] if len(carried) else np.argmax(np.hypot(targets[:, 0], targets[:, 1])))
         after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:

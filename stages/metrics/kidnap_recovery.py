@@ -1,4 +1,4 @@
-"""Time until the estimate is right again after the robot was lifted."""
+"""Time until the estimate is right again after the robot was kidnapped."""
 
 import itertools
 import math
@@ -17,21 +17,21 @@ SPECS = {
 }
 
 JUMP_M = 0.5
-"""Distance between true motion and odometry of one frame from which the robot was lifted, metres."""
+"""Distance between true motion and odometry of one frame from which the robot was kidnapped, metres."""
 JUMP_DEG = 15.0
 """Largest difference of their turns, degrees."""
 
 
 class KidnapRecovery(MetricStage):
-    """Measures the time from each lifting of the robot until the estimate is right again, in the last log.
+    """Measures the time from each kidnapping of the robot until the estimate is right again, in the last log.
 
-    The robot was lifted between two frames where its true motion is not that of odometry: it was turned, or put down
+    The robot was kidnapped between two frames where its true motion is not that of odometry: it was turned, or put down
     elsewhere. The estimate is right where position and heading errors stay below 1 m and 20 degrees for ten frames (as
     under `converged_after_frames`).
 
     Under `lifts`: `number`; `never`, after how many the estimate was not right before the next one or the end; lists
     with an entry for each: `step`, and `seconds` until the estimate was right, or until the next one or the end where
-    it never was. Nothing where it was not lifted, or without ground truth.
+    it never was. Nothing where it was not kidnapped, or without ground truth.
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
@@ -39,7 +39,7 @@ class KidnapRecovery(MetricStage):
         log = log.at(known(log.truth) & known(log.estimate))
         if not len(log):
             return self.Out()
-        starts = lifted(log, JUMP_M, JUMP_DEG).tolist()
+        starts = kidnapped_rows(log, JUMP_M, JUMP_DEG).tolist()
         if not starts:
             return self.Out()
         metres, degrees = position_errors(log.estimate, log.truth), heading_errors_deg(log.estimate, log.truth)
@@ -55,8 +55,8 @@ class KidnapRecovery(MetricStage):
         return self.Out(metrics=Metrics({"lifts": values}, SPECS))
 
 
-def lifted(log: Drive, jump_m: float, jump_deg: float) -> Ints:
-    """Rows of a log, all with truth, before which the robot was lifted."""
+def kidnapped_rows(log: Drive, jump_m: float, jump_deg: float) -> Ints:
+    """Rows of a log, all with truth, before which the robot was kidnapped."""
     true: Array = between(log.truth[:-1], log.truth[1:])
     gap = true - log.motion[1:]
     jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))

@@ -11,7 +11,7 @@ from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Answers, Similarities
+from omninav.stages.values.similarity import RetrievedReferences, Similarities
 from omninav.stages.values.visual_words import PlaceWords
 
 RANKS = (1, 5, 10)
@@ -62,7 +62,7 @@ class PlaceRecognition(Stage):
         self,
         ctx: Context,
         drive: Drive,
-        ranked: Sequence[RankedReferences | Answers | None],
+        ranked: Sequence[RankedReferences | RetrievedReferences | None],
         map: ReferenceGraph | PlaceWords | None = None,
     ) -> Out:
         """The whole run at once. `map`: what was ranked; of a topological map all views of its tour."""

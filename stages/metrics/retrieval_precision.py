@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Answers
+from omninav.stages.values.similarity import RetrievedReferences
 
 SPECS = {
     "answers.nearby_rate": MetricSpec(title="Retrieved images taken nearby", better="higher"),
@@ -33,7 +33,7 @@ class RetrievalPrecision(MetricStage):
     """
 
     def step(
-        self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph
+        self, ctx: Context, drive: Drive, answers: Sequence[RetrievedReferences | None], map: ReferenceGraph
     ) -> MetricStage.Out:
         last = drive.last_log
         last = last.at(known(last.truth))

@@ -23,7 +23,7 @@ from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.similarity import Answers
+from omninav.stages.values.similarity import RetrievedReferences
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -74,7 +74,7 @@ class FrameByFrame(PlotStage):
         progress: Sequence[PathProgress | None] | None = None,
         statuses: Sequence[DrivingStatus | None] | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
-        answers: Sequence[Answers | None] | None = None,
+        answers: Sequence[RetrievedReferences | None] | None = None,
     ) -> PlotStage.Out:
         ticks = first_seen(events or ())
         last = drive.last_log
@@ -237,7 +237,7 @@ def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
 
 
 def _answers(
-    found: Answers, truth: Array, map: AnyMap | None, thumbnails: Thumbnails | None
+    found: RetrievedReferences, truth: Array, map: AnyMap | None, thumbnails: Thumbnails | None
 ) -> list[tuple[str, bytes]]:
     """Captions and JPEG bytes of the most similar references, best first, with their errors where truth is known."""
     shown: list[tuple[str, bytes]] = []

@@ -62,7 +62,7 @@ def record_log(
     if collisions:
         print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
     for drive in drives:
-        late = drive.kidnappings[len(drive.lifted) :]
+        late = drive.kidnappings[len(drive.kidnapped) :]
         if late:
             ends = f"after {(drive.times[-1] - drive.times[0]) / 1e9:.1f} s, the robot is not carried at"
             ctx.warn(f"{path}: day {drive.day} ends {ends} {', '.join(f'{each.at:g}' for each in late)} s")

@@ -58,7 +58,7 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_im
         elif topic == "scan":
             _write_scan(log, recording, number, arrival)
         elif topic == "event":
-            said = json.dumps(asdict(recording.lifted[number][1]))
+            said = json.dumps(asdict(recording.kidnapped[number][1]))
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
             _write_image(log, recording, number, arrival, quality)
@@ -70,7 +70,7 @@ def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
     found = [(int(stamp) + ODOMETRY_LATENCY_NS, "odometry", number) for number, stamp in enumerate(recording.times)]
     found += [(int(stamp) + ODOMETRY_LATENCY_NS, "truth", number) for number, stamp in enumerate(recording.true_times)]
     found += [(int(stamp) + SCAN_LATENCY_NS, "scan", number) for number, stamp in enumerate(recording.scan_times)]
-    found += [(stamp, "event", number) for number, (stamp, _) in enumerate(recording.lifted)]
+    found += [(stamp, "event", number) for number, (stamp, _) in enumerate(recording.kidnapped)]
     return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
 
 

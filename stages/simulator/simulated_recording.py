@@ -96,8 +96,8 @@ class SimulatedRecording:
         bias = draw_bias(world.odometry, stream(world.draw_seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
-        self.lifted = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
-        """Times (ns) at which the robot was put down again."""
+        self.kidnapped = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
+        """Kidnappings that took place, each with the time (ns) at which the robot was put down again."""
         put = np.unique([row for row, _ in driven.kidnappings]).astype(np.int64)
         # Up to that moment it was where its wheels had rolled, so that interpolation does not bridge the jump.
         self._true_seconds = np.insert(driven.times, put, driven.times[put])

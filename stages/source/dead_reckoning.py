@@ -53,7 +53,7 @@ class VisualCompass:
         return np.asarray(cv2.GaussianBlur(around, (0, 0), BLUR_PX)[:, ends:-ends], np.float32)
 
 
-class Reckoned(State):
+class DeadReckoning(State):
     """Position of a source by its odometry, measured or guessed (m, rad), and what the compass keeps of the last image
     (`view`)."""
 
@@ -69,7 +69,7 @@ class Reckoned(State):
 
 
 def dead_reckon(
-    compass: VisualCompass, speed: float, position: Reckoned, image: Image, camera: Camera, seconds: float | None
+    compass: VisualCompass, speed: float, position: DeadReckoning, image: Image, camera: Camera, seconds: float | None
 ) -> AssumedMotion | None:
     """The assumed motion to an image, by which `position` goes on; None at the first image of a log.
 

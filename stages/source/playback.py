@@ -22,12 +22,12 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
-from .dead_reckoning import Reckoned
+from .dead_reckoning import DeadReckoning
 from .log_parts import LogPart, frozen_steps, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
-class PlaybackState(Reckoned):
+class PlaybackState(DeadReckoning):
     """Position in the recordings: recording, next frame and last used frame (-1: none) as positions in the selection,
     and ticks made; of odometry that is synthetic or guessed, the position so far."""
 

@@ -76,7 +76,7 @@ class SimilarityField(Value):
     mean: Annotated[float, Bounds(ge=0)]
 
 
-class Answers(Value):
+class RetrievedReferences(Value):
     """The references of a map that are most similar to the current view, the most similar first.
 
     `references` (k,): their indices in the map. `similarities` (k,) in [0, 1] and `turns` (k,): each at its best

@@ -10,18 +10,19 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("pipeline", "stages", "conf", "examples", "benchmarks")
 WORDS = """
-    ABOUT AROUND AfterLifts AnswersNearBy Arrangement Arrival AtOnce BeforeThreshold Behind CorrectPastStates DECK
-    DriveSoFar DriveTally DrivenPlan FADED FirstViewsLimit GuessedMotion GuessedPose HANGS HypothesisLife Inbox Intake
-    KeepSessions LEAST LeftBehind LeftOver Lesson Likeness Looked MatchPlaces MeanAtFirst NEARNESSES NOBODY
-    OnceRight OwnPlace PlaceGrid Placed PlannedWay Remark ReturnsHome ShortestWay Spool Stated Tell ViewLimit
-    ViewReach VisitedPlaces Waiting WorldPlan WrongPlaces after_lifts agreed album alike anew answers_near_by
-    anywhere apart aside asks at_once before_threshold beside boundary careful_references catalog chance clean_rate
-    closing columns_alone consensus creep crew disturbance doubt driving empty_map far_in_drive film first_belief
-    fresh gives growing guessed_motion heard how_compared hypothesis_life idle kept_sessions known_poses largest
-    left_behind left_over lesson lessons longest mean_at_first misfit misfits near_rate nearness ordinary own_place pace
-    past_states path_images patience picture pictures put_down put_right random_samples reckon restless retrace
-    returns_home right_rate said selective_few settled_speed sift_and_columns splice splices spool stands_for
-    strangers stray_deg taught tell told_rate view_limit view_reach wandered wants way work_through
+    ABOUT AROUND AfterLifts Answers AnswersNearBy Arrangement Arrival AtOnce BeforeThreshold Behind
+    CorrectPastStates DECK DriveSoFar DriveTally DrivenPlan FADED FirstViewsLimit GuessedMotion GuessedPose HANGS
+    HypothesisLife Inbox Intake KeepSessions LEAST LeftBehind LeftOver Lesson Likeness Looked MatchPlaces
+    MeanAtFirst NEARNESSES NOBODY OnceRight OwnPlace PlaceGrid Placed PlannedWay Reckoned Remark ReturnsHome
+    ShortestWay Spool Stated Tell ViewLimit ViewReach VisitedPlaces Waiting WorldPlan WrongPlaces after_lifts
+    agreed album alike anew answers_near_by anywhere apart aside asks at_once before_threshold beside boundary
+    careful_references catalog chance clean_rate closing columns_alone consensus creep crew disturbance doubt
+    driving empty_map far_in_drive film first_belief fresh gives growing guessed_motion heard how_compared
+    hypothesis_life idle kept_sessions known_poses largest left_behind left_over lesson lessons longest
+    mean_at_first misfit misfits near_rate nearness ordinary own_place pace past_states path_images patience
+    picture pictures put_down put_right random_samples reckon restless retrace returns_home right_rate said
+    selective_few settled_speed sift_and_columns splice splices spool stands_for strangers stray_deg taught tell
+    told_rate view_limit view_reach wandered wants way work_through
 """
 """Those that keep an ordinary meaning (column, detour, limit, moments, near, reach, share) cannot be found by name."""
 REPLACED = frozenset(WORDS.split())

@@ -1,4 +1,4 @@
-"""Answers against where they were taken and which way they look, worked by hand."""
+"""Retrieved references against where they were taken and which way they look, worked by hand."""
 
 import math
 
@@ -8,7 +8,7 @@ from measured_drives import Row, figures, made_drive
 
 from omninav.stages.metrics.retrieval_precision import RetrievalPrecision
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Answers
+from omninav.stages.values.similarity import RetrievedReferences
 
 ROBOT = (3.0, -2.0, 1.0)
 
@@ -24,7 +24,7 @@ def told(map: ReferenceGraph, *answers: list[tuple[int, float, float]] | None, t
     given = []
     for each in answers:
         references, similarities, turns = np.array(each or [], np.float64).reshape(-1, 3).T
-        found = Answers(references.astype(np.int64), similarities.astype(np.float32), np.radians(turns))
+        found = RetrievedReferences(references.astype(np.int64), similarities.astype(np.float32), np.radians(turns))
         given.append(None if each is None else found)
     measured = figures(RetrievalPrecision(), made_drive([truth] * len(given)), given, map)
     return measured and measured["answers"]

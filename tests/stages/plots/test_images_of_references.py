@@ -10,7 +10,7 @@ from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.thumbnails import joined
 from omninav.stages.values.image import Panorama, Windows
-from omninav.stages.values.similarity import Answers
+from omninav.stages.values.similarity import RetrievedReferences
 from omninav.stages.values.thumbnails import decoded
 
 CTX = Context("view")
@@ -40,7 +40,7 @@ def test_the_answers_of_a_database_stand_beside_the_image_with_the_error_of_the_
     run = small_run()
     row = 4
     near = np.argsort(np.hypot(*(run.map.poses - run.drive.truth[row])[:, :2].T))
-    answers = Answers(near[:9], np.linspace(0.9, 0.5, 9).astype(np.float32), np.full(9, 0.5))
+    answers = RetrievedReferences(near[:9], np.linspace(0.9, 0.5, 9).astype(np.float32), np.full(9, 0.5))
     shots = [PanoramaSnapshot().step(CTX, tick, Panorama(plain(120, columns=160)[0])).snapshot for tick in run.ticks]
     every = [None if n == 0 else answers for n in range(len(run.ticks))]
     images = [cv2.imencode(".jpg", picture)[1].tobytes() for picture in plain(*range(0, 5 * len(run.map), 5))]

@@ -146,13 +146,13 @@ def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> 
     slip, kidnap = (SimulatedRecording(world_of("office_loop"), route, 0) for route in ("slip", "kidnap"))
     lap = len(SimulatedRecording(world_of("office_loop"), "lap", 0).stamps)
     assert len(slip.stamps) == pytest.approx(4 * lap, abs=15)
-    starts = [(moment - int(slip.times[0])) / 1e9 / (slip.times[-1] - slip.times[0]) * 4e9 for moment, _ in slip.lifted]
+    starts = [(time - int(slip.times[0])) / 1e9 / (slip.times[-1] - slip.times[0]) * 4e9 for time, _ in slip.kidnapped]
     assert [int(start) for start in starts] == [1, 2, 3]
     assert len(kidnap.stamps) == pytest.approx(9.6 * lap, abs=0.5 * lap)
     for drive in (slip, kidnap):
         ends = compose(drive.driven[0], drive.rolled[-1])
         assert math.dist(ends[:2], drive.driven[-1, :2]) > 2.0
-    row = int(np.searchsorted(kidnap.times, kidnap.lifted[0][0]))
+    row = int(np.searchsorted(kidnap.times, kidnap.kidnapped[0][0]))
     turned = wrap(kidnap.driven[row, 2] - kidnap.driven[row - 1, 2])
     assert abs(turned) == pytest.approx(math.pi, abs=0.15)
 
