@@ -12,7 +12,7 @@ from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
-from .segments import segment_edges
+from .segment_edges import segment_edges
 
 ColourSpace = Literal["rgb", "lab", "ycrcb", "hsv"]
 BinCount = Annotated[int, Bounds(ge=0, le=256)]

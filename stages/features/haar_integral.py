@@ -15,7 +15,7 @@ from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 
 from .grey_world import UnderGreyWorld
-from .segments import segment_edges
+from .segment_edges import segment_edges
 
 Radius = Annotated[float, Bounds(ge=0)]
 Scale = Annotated[float, Bounds(gt=0)]

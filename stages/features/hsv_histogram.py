@@ -12,7 +12,7 @@ from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
-from .segments import segment_edges
+from .segment_edges import segment_edges
 
 HUE_BINS = 16
 """Bins of the hue, as in the paper (Gross & Koenig 2004, section 2)."""

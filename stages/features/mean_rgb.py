@@ -10,7 +10,7 @@ from omninav.stages.values.features import SegmentColours
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
-from .segments import segment_edges
+from .segment_edges import segment_edges
 
 
 def mean_colours(pixels: Pixels, segments: int) -> Floats:

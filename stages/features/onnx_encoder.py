@@ -15,7 +15,7 @@ from omninav.stages.values.features import SegmentDescriptors
 from omninav.stages.values.image import Panorama, Pixels
 
 from .onnx_network import error_line, loaded, network_digest
-from .segments import segment_edges
+from .segment_edges import segment_edges
 
 PerChannel = tuple[float, float, float]
 MAX_SIDE = 4096

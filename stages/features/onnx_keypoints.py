@@ -9,7 +9,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput, cut
 from omninav.stages.camera.model import Camera, seen_at
-from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths

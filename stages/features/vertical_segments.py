@@ -44,7 +44,7 @@ def profile_basis() -> Floats:
     return basis.astype(np.float32)
 
 
-class Segments(NamedTuple):
+class ImageSegments(NamedTuple):
     """Segments on upright lines: `lines` (N,); `ends` (N, 2), rows of upper and lower end; `descriptors` (N, 10)."""
 
     lines: Ints
@@ -92,7 +92,7 @@ def _describe(
 
 def segments_of(
     pixels: Pixels, circle: bool, blur: float, min_gradient: float, min_length: float, margin: float
-) -> Segments:
+) -> ImageSegments:
     """All segments of an image whose columns are upright lines, the upper end of each at the smaller row.
 
     An edge is a local maximum along a column of the intensity's gradient, of the image smoothed by `blur` pixels,
@@ -113,7 +113,7 @@ def segments_of(
     ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
     descriptors = np.empty((len(kept), 3 + COEFFICIENTS), np.float32)
     _describe(smooth, grey, lines[kept], ends, margin, profile_basis(), descriptors)
-    return Segments(lines[kept], ends, descriptors)
+    return ImageSegments(lines[kept], ends, descriptors)
 
 
 @compiled(nogil=True)
@@ -180,7 +180,7 @@ def _prototypes(
 
 
 def prototypes(
-    found: Segments, columns: int, azimuth_sigma: float, distance: float, circle: bool
+    found: ImageSegments, columns: int, azimuth_sigma: float, distance: float, circle: bool
 ) -> tuple[Ints, Floats]:
     """One segment for each group of similar neighbours: rows, heaviest first, and how many each stands for.
 

@@ -14,7 +14,7 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 
-from .landmarks import joined_landmarks
+from .joined_landmarks import joined_landmarks
 
 OTHER_VIEW = math.radians(30.0)
 """Difference in direction (rad) from which views in one direction only show something else."""

@@ -17,8 +17,8 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visual_words import WordSimilarities
 
-from .calibration import MapCalibration
 from .last_view import LastView
+from .map_calibration import MapCalibration
 
 
 @dataclass(kw_only=True, eq=False)

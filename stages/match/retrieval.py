@@ -18,8 +18,8 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import RetrievedReferences, Similarities
 
-from .calibration import MapCalibration
 from .last_view import LastView
+from .map_calibration import MapCalibration
 from .reference_match import check_same_kind
 
 LANES = 8

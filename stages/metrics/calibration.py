@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.geometry.probability.calibration import (
+from omninav.stages.geometry.probability.reliability import (
     area_under_roc,
     expected_calibration_error,
     reliability,

@@ -29,7 +29,7 @@ EPIPOLAR_DEG = 1.0
 """Largest angle to the epipolar plane, where depths are not known, degrees."""
 
 
-class Judged(NamedTuple):
+class JudgedMatches(NamedTuple):
     """A pair of images: which of its matches are `right`, the best first; the share of wrong partners that pass as
     right `by_chance`; how many `features` of the first image could be found again."""
 
@@ -124,7 +124,7 @@ class FirstMatches(MetricStage):
         found["all"] = summary([pair for pairs in judged for pair in pairs])
         return self.Out(metrics=Metrics({"matches": found}, SPECS, ("matches.all.right_share",)))
 
-    def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> Judged:
+    def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> JudgedMatches:
         x, y, turn = (float(number) for number in between(one.pose, other.pose))
         moved, features = (x, y, turn), 0
         kinds: list[tuple[Pairs, Callable[[Pairs], Bools]]] = []
@@ -137,12 +137,12 @@ class FirstMatches(MetricStage):
             kinds.append((pairs, partial(self._right_columns, one, other, moved)))
             features += len(one.columns)
         if not kinds:
-            return Judged(np.zeros(0, np.bool_), math.nan, 0)
+            return JudgedMatches(np.zeros(0, np.bool_), math.nan, 0)
         ratios = [pairs.distance if self.best == "nearest" else pairs.ratio for pairs, _ in kinds]
         order = np.argsort(np.concatenate(ratios), kind="stable")
         rights = np.concatenate([is_right(pairs) for pairs, is_right in kinds])
         chance = np.concatenate([is_right(shifted(pairs)) for pairs, is_right in kinds])
-        return Judged(rights[order], float(chance.mean()) if len(chance) else math.nan, features)
+        return JudgedMatches(rights[order], float(chance.mean()) if len(chance) else math.nan, features)
 
     def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
         if self.search == "both_ways":
@@ -216,7 +216,7 @@ def run_of_right(right: Bools) -> int:
     return int(wrong[0]) if len(wrong) else len(right)
 
 
-def summary(pairs: Sequence[Judged]) -> dict[str, float | int | None]:
+def summary(pairs: Sequence[JudgedMatches]) -> dict[str, float | int | None]:
     """Judgement of some pairs; None where there are none."""
     if not pairs:
         names = ("matched", "first_right", "right", "right_share", "found_again", "by_chance")

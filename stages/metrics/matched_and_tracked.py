@@ -29,7 +29,7 @@ APART_M = 0.3
 """Distance below which two images are not compared, metres: a map that was not tracked so far has no tracks."""
 
 
-class Judged(NamedTuple):
+class JudgedBearings(NamedTuple):
     """Pairs of bearings of two images taken `metres` apart, one for each feature of a map.
 
     `angles` (N,), degrees, by which the two together miss a common plane with the baseline, and which of them are
@@ -103,8 +103,8 @@ class MatchedAndTracked(MetricStage):
         maps: Sequence[LocalMap | None],
         tracks: Sequence[TrackedFeatures | None],
         number: int,
-    ) -> Judged:
-        none = Judged(math.nan, np.full(number, np.nan), np.zeros(number, np.bool_))
+    ) -> JudgedBearings:
+        none = JudgedBearings(math.nan, np.full(number, np.nan), np.zeros(number, np.bool_))
         if not ticks:
             return none
         start, end, last = tracks[ticks[0]], tracks[ticks[-1]], maps[ticks[-1]]
@@ -119,13 +119,13 @@ class MatchedAndTracked(MetricStage):
         none.angles[held], none.right[held] = found.angles, found.right
         return none._replace(metres=found.metres)
 
-    def _judged(self, first: Array, second: Array, moved: Array) -> Judged:
+    def _judged(self, first: Array, second: Array, moved: Array) -> JudgedBearings:
         """Bearings (N, 3) of two images, the second taken at `moved` (3,) as seen from the first."""
         x, y, turn = (float(each) for each in moved)
         way = np.array([x, y, 0.0]) / metres(moved)
         angles = np.degrees(shared_residuals(turn_about_vertical(turn), way, first, second))
         right = right_by_epipolar(first, second, (x, y, turn), math.radians(RIGHT_DEG))
-        return Judged(metres(moved), angles, right)
+        return JudgedBearings(metres(moved), angles, right)
 
 
 def spans(maps: Sequence[LocalMap | None], tracks: Sequence[TrackedFeatures | None]) -> Iterator[tuple[int, list[int]]]:
@@ -148,7 +148,7 @@ def metres(motion: Array) -> float:
     return math.hypot(motion[0], motion[1])
 
 
-def _summary(judged: Sequence[Judged], both: Bools) -> dict[str, float | None]:
+def _summary(judged: Sequence[JudgedBearings], both: Bools) -> dict[str, float | None]:
     angles = np.concatenate([each.angles for each in judged])
     apart = [each.metres for each in judged if math.isfinite(each.metres)]
     return {

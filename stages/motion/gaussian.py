@@ -5,7 +5,7 @@ from omninav.stages.geometry.plane.odometry_motion import move_gaussians
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion, UncertainMotion
 
-from .odometry_noise import OdometryNoiseModel
+from .odometry_noise_model import OdometryNoiseModel
 
 
 class GaussianMotion(OdometryNoiseModel, Stage):

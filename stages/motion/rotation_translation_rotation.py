@@ -7,7 +7,7 @@ from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import Motion, UncertainMotion
 
 from .measured_noise import MeasuredNoise
-from .odometry_noise import OdometryNoiseModel
+from .odometry_noise_model import OdometryNoiseModel
 
 
 class RotationTranslationRotation(OdometryNoiseModel, Stage):

@@ -14,7 +14,7 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
 
-from .odometry_noise import OdometryNoiseModel
+from .odometry_noise_model import OdometryNoiseModel
 
 FLOOR_DEG = 0.02
 """Smallest standard deviation of a turn seen in the images, degrees."""

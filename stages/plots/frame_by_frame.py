@@ -13,9 +13,9 @@ from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.geometry.probability.calibration import ELLIPSE_95, squared_mahalanobis
 from omninav.stages.geometry.probability.gaussians import moments
 from omninav.stages.geometry.probability.particles import weighted_moments
+from omninav.stages.geometry.probability.reliability import ELLIPSE_95, squared_mahalanobis
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan

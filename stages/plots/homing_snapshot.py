@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.camera.model import Camera, seen_at
-from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures

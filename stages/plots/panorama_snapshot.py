@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.camera.model import seen_at
-from omninav.stages.camera.panorama import panorama_camera
+from omninav.stages.camera.panorama_camera import panorama_camera
 from omninav.stages.camera.thumbnail import Thumbnail, thumbnail
 from omninav.stages.geometry.arrays import Bools, Floats
 from omninav.stages.values.image import Panorama, Windows

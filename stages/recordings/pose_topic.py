@@ -19,7 +19,7 @@ MAX_STAMP = 2**63 - 1
 NOWHERE = (float("nan"),) * 3
 
 
-class Track(NamedTuple):
+class PoseTrack(NamedTuple):
     """Poses (N, 3) at ascending stamps (N,) in ns; `gaps` (G, 2): stamps between which no measurement is believed."""
 
     stamps: Stamps
@@ -43,7 +43,7 @@ class PoseTopic:
         self._log_times.append(min(log_time, MAX_STAMP))
         self._poses.extend(pose)
 
-    def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> Track | None:
+    def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> PoseTrack | None:
         """The believed part of a message; None where nothing is. Skipped data is counted with `feed`.
 
         `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
@@ -60,7 +60,7 @@ class PoseTopic:
         if not jumps:
             self._drop(feed, name, "odometry_jump", stamps, poses, begun, limits)
             poses = without_jumps(stamps, poses, begun)
-        return Track(stamps, poses, gaps)
+        return PoseTrack(stamps, poses, gaps)
 
     def _drop(
         self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Rows, limits: MotionLimits

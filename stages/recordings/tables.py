@@ -115,7 +115,7 @@ class OutOfProportion(UnreadableRecording):
     """A number that is too large for what it stands for: it may be of another unit."""
 
 
-class Block(NamedTuple):
+class RowBlock(NamedTuple):
     """Some rows in a row: their `cells` one after the other (a `pyarrow.StringArray`), and at which of them each row
     begins, with their number: `starts` (rows + 1,)."""
 
@@ -129,7 +129,7 @@ class CsvTable:
 
     path: Path
     names: tuple[str, ...]
-    blocks: Sequence[Block]
+    blocks: Sequence[RowBlock]
     lines: npt.NDArray[np.int32]
     """The line of the file on which each row ends, from 1: (rows,)."""
 
@@ -234,9 +234,9 @@ def table_of(path: Path, names: tuple[str, ...], rows: Iterable[tuple[int, list[
             lines.append(line)
             starts.append(len(block))
             if len(block) + size > _BLOCK:
-                blocks.append(Block(pa.array(block, pa.string()), np.array(starts, np.int32)))
+                blocks.append(RowBlock(pa.array(block, pa.string()), np.array(starts, np.int32)))
                 block, size, starts = [], 0, array("i", [0])
-    blocks.append(Block(pa.array(block, pa.string()), np.array(starts, np.int32)))
+    blocks.append(RowBlock(pa.array(block, pa.string()), np.array(starts, np.int32)))
     return CsvTable(path, names, blocks, np.array(lines, np.int32))
 
 

@@ -19,7 +19,7 @@ from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
-from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, Track
+from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
@@ -223,7 +223,7 @@ def _known_image_topics(feed: Feed, wanted: str = "") -> str:
 
 def _track(
     name: str, feed: Feed, role: str, topic: str | None, poses: dict[str, PoseTopic], limits: MotionLimits
-) -> Track | None:
+) -> PoseTrack | None:
     """Stamps and poses of a pose topic in ascending order; None where the recording does not have it."""
     if topic is None:
         return None

@@ -26,7 +26,7 @@ PALLET_SPACING_M = 3.4
 """Metres between the middles of pallets, in x and in y."""
 
 
-class Part(NamedTuple):
+class Area(NamedTuple):
     """A rectangle of the floor: from x0, y0 to x1, y1 (m)."""
 
     x0: float
@@ -43,9 +43,9 @@ class Part(NamedTuple):
         """Tells whether a point lies in it, at least `inset` m from its edge."""
         return self.x0 + inset < point[0] < self.x1 - inset and self.y0 + inset < point[1] < self.y1 - inset
 
-    def grown(self, by: float) -> "Part":
+    def grown(self, by: float) -> "Area":
         """A rectangle that is larger by so many metres on each side."""
-        return Part(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
+        return Area(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
 
 
 class MainAisle(NamedTuple):
@@ -80,7 +80,7 @@ def drawn_store(world: WorldConfig) -> WorldConfig:
     over = Mirrored(world.size, flips=(bool(rng.integers(2)), bool(rng.integers(2))))
     listed = [_part(block) for block in world.aisle_blocks]
     corners = np.array([over.point(corner) for part in listed for corner in (part[:2], part[2:])])
-    bounds = Part(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+    bounds = Area(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
     around = min(bounds.x0, bounds.y0, world.size[0] - bounds.x1, world.size[1] - bounds.y1)
     count = len(listed) + int(rng.integers(3) if len(listed) >= LARGE_STORE else rng.integers(2))
     inset = rng.uniform(0.0, 0.08) * around
@@ -118,17 +118,17 @@ def drawn_store(world: WorldConfig) -> WorldConfig:
 # Departments
 
 
-def _part(of: AisleBlock | Room) -> Part:
-    return Part(*of.corner, of.corner[0] + of.size[0], of.corner[1] + of.size[1])
+def _part(of: AisleBlock | Room) -> Area:
+    return Area(*of.corner, of.corner[0] + of.size[0], of.corner[1] + of.size[1])
 
 
-def _footprint(block: Block) -> Part:
+def _footprint(block: Block) -> Area:
     turned = abs(math.cos(block.yaw)) < math.sqrt(0.5)
     half = np.array(block.size[::-1] if turned else block.size) / 2
-    return Part(*np.subtract(block.centre, half).tolist(), *np.add(block.centre, half).tolist())
+    return Area(*np.subtract(block.centre, half).tolist(), *np.add(block.centre, half).tolist())
 
 
-def _divided(floor: Part, count: int, gap: float, rng: np.random.Generator) -> tuple[dict[int, Part], list[MainAisle]]:
+def _divided(floor: Area, count: int, gap: float, rng: np.random.Generator) -> tuple[dict[int, Area], list[MainAisle]]:
     """A floor cut into `count` parts with aisles of `gap` m between: the largest part is cut each time."""
     parts, aisles = {0: floor}, []
     for number in range(1, count):
@@ -145,7 +145,7 @@ def _divided(floor: Part, count: int, gap: float, rng: np.random.Generator) -> t
     return parts, aisles
 
 
-def _kept_from(part: Part, standing: list[Part]) -> Part:
+def _kept_from(part: Area, standing: list[Area]) -> Area:
     """A part less what lies too close to things that stand: on the side where that takes the least away."""
     for thing in standing:
         near = thing.grown(DESK_ROOM_M)
@@ -160,7 +160,7 @@ def _kept_from(part: Part, standing: list[Part]) -> Part:
     return part
 
 
-def _department(world: WorldConfig, number: int, part: Part, rng: np.random.Generator) -> AisleBlock:
+def _department(world: WorldConfig, number: int, part: Area, rng: np.random.Generator) -> AisleBlock:
     """Shelves on a part, with aisles about as wide as in a listed department, and cross aisles where they are long."""
     like = world.aisle_blocks[number % len(world.aisle_blocks)]
     along = 0 if rng.uniform() < 0.5 else 1
@@ -187,7 +187,7 @@ def _moved_along(panel: WallPanel, size: Point, rng: np.random.Generator) -> Wal
     return replace(panel, centre=(centre[0], centre[1]))
 
 
-def _sales_area(part: Part, rng: np.random.Generator) -> tuple[Room, list[Block]]:
+def _sales_area(part: Area, rng: np.random.Generator) -> tuple[Room, list[Block]]:
     """A part without shelves: an office in one corner, and pallets in rows."""
     width, depth = (min(rng.uniform(4.0, 7.0), 0.6 * extent) for extent in part.size)
     x = part.x0 if rng.uniform() < 0.5 else part.x1 - width
@@ -221,7 +221,7 @@ def _led(drawn: WorldConfig, route: Route, listed: WorldConfig, over: Mirrored, 
     """
     departments = [_part(block) for block in listed.aisle_blocks]
     outline = np.array(departments)
-    bounds = Part(*outline[:, :2].min(axis=0).tolist(), *outline[:, 2:].max(axis=0).tolist())
+    bounds = Area(*outline[:, :2].min(axis=0).tolist(), *outline[:, 2:].max(axis=0).tolist())
 
     def moved(points: tuple[Point, ...]) -> tuple[Point, ...]:
         there: list[Point] = []
@@ -248,7 +248,7 @@ def _led(drawn: WorldConfig, route: Route, listed: WorldConfig, over: Mirrored, 
     return replace(route, waypoints=moved(route.waypoints), lead_in=moved(route.lead_in))
 
 
-def _is_comb(route: Route, departments: list[Part]) -> bool:
+def _is_comb(route: Route, departments: list[Area]) -> bool:
     """Tells whether laps lead into aisles."""
     return route.kind == "laps" and any(part.holds(at, 0.5) for part in departments for at in route.waypoints)
 

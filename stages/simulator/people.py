@@ -52,7 +52,7 @@ class Person:
     """Phase (rad) of the step; legs are together at multiples of pi."""
 
 
-class Part(NamedTuple):
+class BodyPart(NamedTuple):
     """A part of a body as shares of its height: forward and left offset, half sizes, lower and upper edge, swing."""
 
     ahead: float
@@ -66,12 +66,12 @@ class Part(NamedTuple):
 
 
 PARTS = (
-    Part(0.0, 0.055, 0.045, 0.045, 0.0, 0.49, 0.13),
-    Part(0.0, -0.055, 0.045, 0.045, 0.0, 0.49, -0.13),
-    Part(0.0, 0.0, 0.065, 0.115, 0.45, 0.84, 0.0),
-    Part(0.0, 0.14, 0.03, 0.026, 0.42, 0.82, -0.1),
-    Part(0.0, -0.14, 0.03, 0.026, 0.42, 0.82, 0.1),
-    Part(0.005, 0.0, 0.055, 0.045, 0.86, 1.0, 0.0),
+    BodyPart(0.0, 0.055, 0.045, 0.045, 0.0, 0.49, 0.13),
+    BodyPart(0.0, -0.055, 0.045, 0.045, 0.0, 0.49, -0.13),
+    BodyPart(0.0, 0.0, 0.065, 0.115, 0.45, 0.84, 0.0),
+    BodyPart(0.0, 0.14, 0.03, 0.026, 0.42, 0.82, -0.1),
+    BodyPart(0.0, -0.14, 0.03, 0.026, 0.42, 0.82, 0.1),
+    BodyPart(0.005, 0.0, 0.055, 0.045, 0.86, 1.0, 0.0),
 )
 """Legs, trunk, arms, head."""
 
@@ -81,7 +81,7 @@ def coverings(texture: Callable[[str, str], int], look: int) -> tuple[Coverings,
     name = f"person {look}"
     trousers, coat, face, hair = (texture(m, name) for m in ("trousers", "coat", "face", "hair"))
 
-    def covered(part: Part, sides: int, front: int, top: int) -> Coverings:
+    def covered(part: BodyPart, sides: int, front: int, top: int) -> Coverings:
         tall = 1.75 * (part.high - part.low)
         deep, wide = 3.5 * part.half_ahead, 3.5 * part.half_left
         over = np.full((1, 1), top)
@@ -175,7 +175,7 @@ class Walker:
         self._legs.append((time + took, float(goal[0]), float(goal[1]), self._heading, way + length))
 
 
-class Track(NamedTuple):
+class RobotTrack(NamedTuple):
     """Track of the robot: times (N,) in seconds, ascending, and poses (N, 3)."""
 
     times: Array
@@ -194,7 +194,7 @@ class Companion:
         self._phase = float(rng.uniform(0.0, 1.0))
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
-    def desired_place(self, seconds: float, track: Track, others: Array) -> Array | None:
+    def desired_place(self, seconds: float, track: RobotTrack, others: Array) -> Array | None:
         """Place (2,) that this person would like, given the robot's up to then; None: no room but `others'`."""
         poses = track.poses[-2000:]
         x, y = poses[-1, :2]
@@ -260,9 +260,9 @@ class Crowd:
                 start = (float(free[0, 0]), float(free[0, 1]))
                 self._walkers.append(Walker(stream(seed, "walker", day, number), start, clearance))
         self._everybody: list[Walker | Companion] = [*self._walkers, *self._companions]
-        self._known: tuple[Track, list[Array]] | None = None
+        self._known: tuple[RobotTrack, list[Array]] | None = None
 
-    def at(self, seconds: float, track: Track | None = None) -> tuple[Person, ...]:
+    def at(self, seconds: float, track: RobotTrack | None = None) -> tuple[Person, ...]:
         """All people at a time in seconds; companions only if the robot's track is known."""
         if track is None or not len(track.times):
             return tuple(walker.at(max(0.0, seconds)) for walker in self._walkers)
@@ -288,18 +288,18 @@ class Crowd:
         ]
         return self.visible(state, seconds, strolls)
 
-    def initial_state(self, track: Track) -> Array:
+    def initial_state(self, track: RobotTrack) -> Array:
         """State of all people at the start of a drive (P, 5), walkers first."""
         now = float(track.times[0])
         state = np.zeros((len(self._everybody), 5))
         state[:, GONE] = now - MIN_ABSENCE_S
-        return self._advanced(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
+        return self._advanced(state, now, 0.0, RobotTrack(track.times[:1], track.poses[:1]), begins=True)
 
-    def advanced(self, state: Array, seconds: float, until: float, track: Track) -> Array:
+    def advanced(self, state: Array, seconds: float, until: float, track: RobotTrack) -> Array:
         """State (P, 5) at time `until`, from the robot's track up to `seconds` alone."""
         steps = math.ceil((until - seconds) / STEP_S - 1e-9)
         last = max(1, int(np.searchsorted(track.times, seconds + 1e-9, side="right")))
-        known = Track(track.times[:last], track.poses[:last])
+        known = RobotTrack(track.times[:last], track.poses[:last])
         for number in range(steps):
             end = until if number == steps - 1 else seconds + STEP_S
             state = self._advanced(state, end, end - seconds, known)
@@ -321,7 +321,7 @@ class Crowd:
                     people.append(Person(at, float(row[HEADING]), RADIUS_M, who.height, who.look, stride))
         return tuple(people)
 
-    def _advanced(self, before: Array, now: float, took: float, track: Track, begins: bool = False) -> Array:
+    def _advanced(self, before: Array, now: float, took: float, track: RobotTrack, begins: bool = False) -> Array:
         """State one step later: each person in turn moves towards the desired place, avoiding others and the robot."""
         state = before.copy()
         robot = _expected(track, now)
@@ -418,7 +418,7 @@ def _out_of_sight(path: Array, robot: Array) -> Array | None:
     return path[far[-1]] if len(far) else None
 
 
-def _expected(track: Track, now: float) -> Array:
+def _expected(track: RobotTrack, now: float) -> Array:
     """Predicted position (2,) of the robot at constant velocity; its last one if the velocity is unknown."""
     at: Array = track.poses[-1, :2]
     if len(track.times) < 2:

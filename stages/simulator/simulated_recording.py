@@ -26,7 +26,7 @@ from .config import Day, Kidnapping, WorldConfig
 from .drawn_plan import laid_out
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
-from .people import Person, Track
+from .people import Person, RobotTrack
 from .ranges import azimuths, measure, round_bodies
 from .renderer import Scene
 from .robot import NO_PEOPLE, SimulatedDrive, drive, reach
@@ -216,7 +216,7 @@ class SimulatedRecording:
 
     def people_at(self, seconds: float) -> tuple[Person, ...]:
         """The people at a time."""
-        return self._world.people_at(seconds, Track(self._seconds, self.driven))
+        return self._world.people_at(seconds, RobotTrack(self._seconds, self.driven))
 
     def digest(self) -> str:
         """sha256 over the days of the world that the drive sees, route, day, kidnappings and the simulator's code."""

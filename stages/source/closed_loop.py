@@ -17,7 +17,7 @@ from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.drawn_starts import drawn_pose, drawn_way_back
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
-from omninav.stages.simulator.people import Person, Track
+from omninav.stages.simulator.people import Person, RobotTrack
 from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.robot import COLLISIONS, DISTANCE, around, at_rest, limits, reach, steer, teleport
 from omninav.stages.simulator.robot_camera import RobotCamera
@@ -205,7 +205,7 @@ class ClosedLoop(Source):
         """The robot is where it is now, and people have walked on until then: everybody who is about."""
         crowd, before = self._world.crowd, simulation.track
         simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-TRACK_TICKS:]
-        track = Track(simulation.track[:, 0], simulation.track[:, 1:])
+        track = RobotTrack(simulation.track[:, 0], simulation.track[:, 1:])
         if len(before):
             simulation.crowd = crowd.advanced(simulation.crowd, float(before[-1, 0]), now, track)
         else:

@@ -14,7 +14,7 @@ from omninav.stages.camera.model import Ring
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.unwarp.calibration import Calibration, Model, board_points, calibrated
+from omninav.stages.unwarp.checkerboard_calibration import BoardFit, Model, board_points, calibrated
 from omninav.stages.values.image import Image, Pixels
 
 from .camera_look import draw_panorama
@@ -114,7 +114,7 @@ def ring_of(pixels: Pixels) -> Ring:
         return Ring((width - 1) / 2, (height - 1) / 2, 0.0, min(width, height) / 2)
 
 
-def draw_calibration(found: Calibration, frames: list[int], corners: list[Array], pixels: Pixels) -> bytes:
+def draw_calibration(found: BoardFit, frames: list[int], corners: list[Array], pixels: Pixels) -> bytes:
     """A PNG: the panorama of an image, all corners with ten times their residuals, and each image's residual."""
     with plot(10.0, 8.0) as drawn:
         cells = drawn.canvas.add_gridspec(2, 2, width_ratios=[1.3, 1.0])

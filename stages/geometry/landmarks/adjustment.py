@@ -11,7 +11,7 @@ from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.pose_graph import motion_jacobian
 from omninav.stages.geometry.plane.se2 import between, wrap
 
-from .schur_complement import Eliminated, Frames, Visibility, covisibility, eliminate, landmark_steps, residuals
+from .schur_complement import Eliminated, Poses, Sightings, covisibility, eliminate, landmark_steps, residuals
 
 EASING = 2.0
 """Factor by which the scale of the loss (in sigmas) shrinks per step."""
@@ -109,12 +109,12 @@ def adjusted(
         return Adjusted(poses, points, np.zeros(len(lens.sigmas)), inliers, math.nan, lambda _: unknown)
     used = used[np.lexsort((references[used], landmarks[used]))]
     seen, starts = np.unique(landmarks[used], return_index=True)
-    visibility = Visibility(references[used].astype(np.int64), np.append(starts, len(used)))
+    sightings = Sightings(references[used].astype(np.int64), np.append(starts, len(used)))
     floating = pose_sigmas is None
     if pose_sigmas is None:
         pose_sigmas = np.full(poses.shape, math.inf)
         pose_sigmas[0] = 0.0
-    problem = _Problem(visibility, lens, used, sigma, poses if given is None else given, pose_sigmas, motions)
+    problem = _Problem(sightings, lens, used, sigma, poses if given is None else given, pose_sigmas, motions)
     state = problem.solved(_State(poses, points[seen], np.zeros(len(lens.sigmas))), max_steps)
     squares = problem.squares(state)
     agreeing = squares < INLIER_SIGMAS**2
@@ -155,14 +155,14 @@ class _Normal(NamedTuple):
 
 class _Problem:
     def __init__(
-        self, visibility: Visibility, lens: Lens, used: Ints, sigma: float, given: Array, pose_sigmas: Array,
+        self, sightings: Sightings, lens: Lens, used: Ints, sigma: float, given: Array, pose_sigmas: Array,
         motions: Motions | None,
     ) -> None:  # fmt: skip
-        self.visibility, self.lens, self.used, self.sigma = visibility, lens, used, sigma
+        self.sightings, self.lens, self.used, self.sigma = sightings, lens, used, sigma
         self.given, self.motions = given, motions
         self.held = 1.0 / np.clip(pose_sigmas, FIXED, FREE) ** 2
         self.held_camera = 1.0 / np.clip(lens.sigmas, FIXED, FREE) ** 2
-        self.pattern = covisibility(visibility, len(given))
+        self.pattern = covisibility(sightings, len(given))
 
     def solved(self, state: _State, max_steps: int) -> _State:
         squares = self.squares(state)
@@ -202,7 +202,7 @@ class _Problem:
         gradient = system.right_camera + self.held_camera * state.camera - normal.border.T @ alone
         camera = -np.linalg.solve(normal.corner, gradient)
         steps = -(alone + normal.through @ camera).reshape(right.shape)
-        return steps, camera, landmark_steps(system, self.visibility, steps, camera)
+        return steps, camera, landmark_steps(system, self.sightings, steps, camera)
 
     def normal(
         self, state: _State, looking: "_Looking", weights: Array, damping: float
@@ -212,7 +212,7 @@ class _Problem:
         from scipy.sparse.linalg import splu
 
         frames, weights = _frames(state.poses), weights / self.sigma**2
-        system = eliminate(frames, state.points, self.visibility, *looking, weights, damping, self.pattern)
+        system = eliminate(frames, state.points, self.sightings, *looking, weights, damping, self.pattern)
         number, freedoms = state.poses.shape
         size, diagonal = number * freedoms, np.arange(freedoms)
         blocks = system.diagonal.copy()
@@ -270,7 +270,7 @@ class _Problem:
         """Squared angles (O,) in sigmas."""
         positions, rotations, _ = _frames(state.poses)
         bearings = self.lens.bearings(state.camera)[self.used]
-        missed = residuals(positions, rotations, state.points, *self.visibility, bearings)
+        missed = residuals(positions, rotations, state.points, *self.sightings, bearings)
         return np.asarray(np.einsum("oi,oi->o", missed, missed) / self.sigma**2)
 
     def missed(self, state: _State) -> Array:
@@ -298,14 +298,14 @@ class _Problem:
         return _Looking(self.lens.bearings(camera)[self.used], out)
 
 
-def _frames(poses: Array) -> Frames:
+def _frames(poses: Array) -> Poses:
     turns = rotations_about(poses[:, 2], 2)
     axes = [turns[:, :, 2]]
     if poses.shape[1] == 5:
         tilted = turns @ rotations_about(poses[:, 4], 1)
         axes += [tilted[:, :, 0], turns[:, :, 1]]
         turns = tilted @ rotations_about(poses[:, 3], 0)
-    return Frames(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
+    return Poses(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
 
 
 def _rigid_motions(poses: Array) -> tuple[Array, Array]:

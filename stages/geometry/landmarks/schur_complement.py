@@ -18,7 +18,7 @@ TINY = 1e-12
 """Added to the diagonal of a landmark's block (1/m^2), which is singular where all its bearings are parallel."""
 
 
-class Visibility(NamedTuple):
+class Sightings(NamedTuple):
     """Which reference sees which landmark, sorted by landmark and reference.
 
     `references` (O,); `starts` (L + 1,): of landmark l the rows `starts[l]` to `starts[l + 1]`.
@@ -28,7 +28,7 @@ class Visibility(NamedTuple):
     starts: Ints
 
 
-class Frames(NamedTuple):
+class Poses(NamedTuple):
     """The references in the map's frame: `positions` (R, 2), `rotations` (R, 3, 3) from their own frames.
 
     `axes` (R, A, 3): unit axes about which each may turn.
@@ -62,13 +62,13 @@ class Eliminated(NamedTuple):
     mixed: Array
 
 
-def covisibility(visibility: Visibility, references: int) -> tuple[Ints, Ints]:
+def covisibility(sightings: Sightings, references: int) -> tuple[Ints, Ints]:
     """Which later references share a landmark with each: `starts` (R + 1,) into the sorted `others` (E,)."""
     from scipy import sparse  # slow to import, and seldom needed
 
-    ones = np.ones(len(visibility.references), np.int32)
-    shape = (len(visibility.starts) - 1, references)
-    seen: Any = sparse.csr_array((ones, visibility.references, visibility.starts), shape=shape)
+    ones = np.ones(len(sightings.references), np.int32)
+    shape = (len(sightings.starts) - 1, references)
+    seen: Any = sparse.csr_array((ones, sightings.references, sightings.starts), shape=shape)
     shared = sparse.triu(seen.T @ seen, 1, format="csr")
     shared.sort_indices()
     return shared.indptr.astype(np.int64), shared.indices.astype(np.int64)
@@ -94,7 +94,7 @@ def residuals(
 
 
 def eliminate(
-    frames: Frames, points: Array, visibility: Visibility, bearings: Array, lens: Array, weights: Array, damping: float,
+    frames: Poses, points: Array, sightings: Sightings, bearings: Array, lens: Array, weights: Array, damping: float,
     pattern: tuple[Ints, Ints],
 ) -> Eliminated:  # fmt: skip
     """The system of all references and the camera, of which each landmark's block is damped by a factor 1 + `damping`.
@@ -118,16 +118,16 @@ def eliminate(
         np.zeros((len(points), 3, shared)),
         np.zeros((len(bearings), freedoms, 3)),
     )
-    _eliminate(*frames, points, *visibility, bearings, lens, weights, damping, *pattern, *out)
+    _eliminate(*frames, points, *sightings, bearings, lens, weights, damping, *pattern, *out)
     return out
 
 
-def landmark_steps(system: Eliminated, visibility: Visibility, steps: Array, camera: Array) -> Array:
+def landmark_steps(system: Eliminated, sightings: Sightings, steps: Array, camera: Array) -> Array:
     """Steps of the landmarks (L, 3) that go with those of the references (R, F) and of the camera (K,)."""
     gradient = system.slope + system.shared @ camera
-    back = np.einsum("ofk,of->ok", system.mixed, steps[visibility.references])
+    back = np.einsum("ofk,of->ok", system.mixed, steps[sightings.references])
     if len(back):
-        gradient = gradient + np.add.reduceat(back, visibility.starts[:-1])
+        gradient = gradient + np.add.reduceat(back, sightings.starts[:-1])
     landmarks: Array = np.einsum("lij,lj->li", system.inverse, -gradient)
     return landmarks
 

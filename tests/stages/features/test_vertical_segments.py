@@ -12,7 +12,7 @@ from omninav.pipeline import Context
 from omninav.stages.features.global_colours import GlobalColours
 from omninav.stages.features.vertical_segments import (
     FindVerticalSegments,
-    Segments,
+    ImageSegments,
     prototypes,
     segments_of,
 )
@@ -113,11 +113,11 @@ def test_neighbours_that_look_alike_become_the_one_in_their_middle() -> None:
     order = np.argsort(lines, kind="stable")
     ends = np.tile([10.0, 30.0], (10, 1))
     look_of = np.array([0, 0, 0, 0, 0, 0, 0, 0, 0, 1])
-    segments = Segments(lines[order], ends, looks[look_of[order]])
+    segments = ImageSegments(lines[order], ends, looks[look_of[order]])
     kept, weights = prototypes(segments, 60, 1.6, 2.0, True)
     assert weights.tolist() == [7.0, 2.0, 1.0]
     assert segments.lines[kept[0]] == 1
-    apart = Segments(lines[order], ends + 40.0 * (np.arange(10) % 2)[:, None], looks[look_of[order]])
+    apart = ImageSegments(lines[order], ends + 40.0 * (np.arange(10) % 2)[:, None], looks[look_of[order]])
     assert len(prototypes(apart, 60, 1.6, 2.0, True)[0]) > 3  # one above the other are not the same
 
 

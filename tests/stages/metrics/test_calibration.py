@@ -7,13 +7,13 @@ from scipy.stats import mannwhitneyu
 
 from omninav.pipeline import Context
 from omninav.pipeline.report.headlines import headline_rows
-from omninav.stages.geometry.probability.calibration import (
+from omninav.stages.geometry.probability.consistency import log_odds_of_right
+from omninav.stages.geometry.probability.reliability import (
     area_under_roc,
     expected_calibration_error,
     reliability,
     squared_mahalanobis,
 )
-from omninav.stages.geometry.probability.consistency import log_odds_of_right
 from omninav.stages.metrics.calibration import Calibration
 from omninav.stages.plots.confidence_over_time import ConfidenceOverTime
 from omninav.stages.plots.reliability_diagram import ReliabilityDiagram

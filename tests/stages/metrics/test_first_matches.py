@@ -12,7 +12,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.geometry.appearance.feature_matching import Pairs
-from omninav.stages.metrics.first_matches import FirstMatches, Judged, half_widths, pairs_apart, shifted, summary
+from omninav.stages.metrics.first_matches import FirstMatches, JudgedMatches, half_widths, pairs_apart, shifted, summary
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
@@ -198,7 +198,7 @@ def test_images_without_a_true_pose_make_no_pair() -> None:
 def test_figures_of_pairs_are_medians_and_shares_of_all_matches() -> None:
     yes, no = True, False
     rights = np.array([yes, yes, no, yes]), np.array([no]), np.array([yes] * 5)
-    judged = [Judged(*each) for each in zip(rights, (0.1, 0.3, np.nan), (20, 7, 5), strict=True)]
+    judged = [JudgedMatches(*each) for each in zip(rights, (0.1, 0.3, np.nan), (20, 7, 5), strict=True)]
     assert summary(judged) == {
         "pairs": 3,
         "matched": 4.0,

@@ -5,7 +5,7 @@ import pytest
 
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.odometry_noise import OdometryNoiseModel
+from omninav.stages.motion.odometry_noise_model import OdometryNoiseModel
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import BridgedMotion, Motion
 

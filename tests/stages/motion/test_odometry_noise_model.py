@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from omninav.stages.motion.odometry_noise import OdometryNoiseModel
+from omninav.stages.motion.odometry_noise_model import OdometryNoiseModel
 from omninav.stages.values.pose import AssumedMotion, BridgedMotion, Motion
 
 NO_FLOOR = OdometryNoiseModel(rotation_floor=0.0, translation_floor=0.0)

@@ -11,7 +11,7 @@ from world_files import DEMO
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day
-from omninav.stages.simulator.people import PARTS, Person, Track, figures
+from omninav.stages.simulator.people import PARTS, Person, RobotTrack, figures
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
@@ -26,10 +26,10 @@ def busy() -> World:
 
 
 @pytest.fixture(scope="module")
-def track() -> Track:
+def track() -> RobotTrack:
     """A robot that drives along an aisle of the demo, 6 m at 0.1 m/s."""
     times = np.arange(0.0, 60.0, 0.05)
-    return Track(times, np.stack([2.0 + 0.1 * times, np.full_like(times, 4.5), np.zeros_like(times)], axis=1))
+    return RobotTrack(times, np.stack([2.0 + 0.1 * times, np.full_like(times, 4.5), np.zeros_like(times)], axis=1))
 
 
 def positions(people: tuple[Person, ...]) -> npt.NDArray[np.float64]:
@@ -47,7 +47,7 @@ def test_walkers_go_no_faster_than_people_do_and_get_about(busy: World) -> None:
     assert (np.ptp(paths, axis=0).max(axis=1) > 3.0).mean() > 0.7
 
 
-def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(busy: World, track: Track) -> None:
+def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(busy: World, track: RobotTrack) -> None:
     times = (40.0, 3.0, 55.5, 40.0)
     other = World(BUSY)
     forth = [busy.people_at(seconds, track) for seconds in times]
@@ -56,7 +56,7 @@ def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(b
     assert forth[0] != World(BUSY, day=1).people_at(40.0, track)
 
 
-def test_some_keep_the_robot_company_and_nobody_is_run_over_or_trodden_on(busy: World, track: Track) -> None:
+def test_some_keep_the_robot_company_and_nobody_is_run_over_or_trodden_on(busy: World, track: RobotTrack) -> None:
     walkers, beside = {person.height for person in busy.people_at(0.0)}, 0
     for seconds in np.arange(10.0, 60.0, 0.5):
         robot = track.poses[np.searchsorted(track.times, seconds), :2]
@@ -93,9 +93,9 @@ def test_over_a_drive_everybody_walks_and_nobody_jumps(route: str) -> None:
     assert seen > 0.85 * 12 * len(seconds)
 
 
-def test_nobody_knows_where_the_robot_will_go(busy: World, track: Track) -> None:
+def test_nobody_knows_where_the_robot_will_go(busy: World, track: RobotTrack) -> None:
     known = track.times <= 30.0
-    assert busy.people_at(30.0, track) == busy.people_at(30.0, Track(track.times[known], track.poses[known]))
+    assert busy.people_at(30.0, track) == busy.people_at(30.0, RobotTrack(track.times[known], track.poses[known]))
 
 
 def test_a_person_is_seen_where_it_stands(busy: World) -> None:

@@ -15,7 +15,7 @@ from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.tools.camera_calibrate import CalibrateCamera
 from omninav.stages.tools.camera_look import LookThroughCamera
-from omninav.stages.unwarp.calibration import board_points, calibrated
+from omninav.stages.unwarp.checkerboard_calibration import board_points, calibrated
 
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 322.0, 236.0, 28.095, 23.4125, 34.0, 238.0)
 LENS = Fisheye(640, 480, 150.0, 316.0, 243.0, 236.0)

@@ -7,8 +7,8 @@ import pytest
 from landmark_world import rotations
 
 from omninav.stages.geometry.landmarks.schur_complement import (
-    Frames,
-    Visibility,
+    Poses,
+    Sightings,
     covisibility,
     eliminate,
     landmark_steps,
@@ -16,7 +16,7 @@ from omninav.stages.geometry.landmarks.schur_complement import (
 )
 
 REFERENCES = np.array([0, 2, 3, 1, 1, 2, 0, 1, 2, 3])  # the second landmark is seen twice by one reference
-VISIBILITY = Visibility(REFERENCES, np.array([0, 3, 6, 10]))
+SIGHTINGS = Sightings(REFERENCES, np.array([0, 3, 6, 10]))
 DAMPING = 0.3
 
 
@@ -31,7 +31,7 @@ def problem():
 
 def missed(values, bearings, lens):
     poses, camera, points = values[:12].reshape(4, 3), values[12:14], values[14:].reshape(3, 3)
-    return residuals(poses[:, :2].copy(), rotations(poses), points, *VISIBILITY, bearings + lens @ camera).ravel()
+    return residuals(poses[:, :2].copy(), rotations(poses), points, *SIGHTINGS, bearings + lens @ camera).ravel()
 
 
 def test_a_step_is_that_of_the_whole_system(problem):
@@ -47,9 +47,9 @@ def test_a_step_is_that_of_the_whole_system(problem):
     damped = square + DAMPING * np.diag(np.diag(square))
     expected = -np.linalg.solve(damped, gradient)
 
-    frames = Frames(poses[:, :2].copy(), rotations(poses), np.tile([[[0.0, 0.0, 1.0]]], (4, 1, 1)))
-    pattern = covisibility(VISIBILITY, 4)
-    system = eliminate(frames, points, VISIBILITY, bearings, lens, weights, DAMPING, pattern)
+    frames = Poses(poses[:, :2].copy(), rotations(poses), np.tile([[[0.0, 0.0, 1.0]]], (4, 1, 1)))
+    pattern = covisibility(SIGHTINGS, 4)
+    system = eliminate(frames, points, SIGHTINGS, bearings, lens, weights, DAMPING, pattern)
     whole = np.zeros((14, 14))
     for one in range(4):
         whole[3 * one : 3 * one + 3, 3 * one : 3 * one + 3] = system.diagonal[one] + DAMPING * np.diag(
@@ -64,10 +64,10 @@ def test_a_step_is_that_of_the_whole_system(problem):
     whole[12:, 12:] = system.corner + DAMPING * np.diag(system.curvature_camera)
     step = -np.linalg.solve(whole, np.concatenate([system.right.ravel(), system.right_camera]))
     assert step == pytest.approx(expected[:14], rel=1e-5, abs=1e-8)
-    back = landmark_steps(system, VISIBILITY, step[:12].reshape(4, 3), step[12:])
+    back = landmark_steps(system, SIGHTINGS, step[:12].reshape(4, 3), step[12:])
     assert back.ravel() == pytest.approx(expected[14:], rel=1e-5, abs=1e-8)
 
 
 def test_references_that_share_a_landmark_are_listed_once():
-    starts, others = covisibility(VISIBILITY, 4)
+    starts, others = covisibility(SIGHTINGS, 4)
     assert [others[a:b].tolist() for a, b in pairwise(starts)] == [[1, 2, 3], [2, 3], [3], []]

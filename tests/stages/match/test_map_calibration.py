@@ -9,7 +9,7 @@ from made_beliefs import along_x
 from made_references import references
 
 from omninav.pipeline import Context
-from omninav.stages.match.calibration import calibrated, compared_with, right_and_wrong, spacing
+from omninav.stages.match.map_calibration import calibrated, compared_with, right_and_wrong, spacing
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.features import SegmentHistograms
@@ -52,7 +52,7 @@ def test_a_large_map_is_sampled_and_the_sample_stands_for_all():
 
 
 def test_a_sample_is_all_that_is_near_and_an_even_choice_of_what_is_far(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("omninav.stages.match.calibration.MAX_COMPARED", 3)
+    monkeypatch.setattr("omninav.stages.match.map_calibration.MAX_COMPARED", 3)
     chosen, each = compared_with(along_x(*range(10)).means, 5, 1.0)
     assert chosen.tolist() == [0, 3, 4, 6, 9]  # of 0, 1, 2, 3, 7, 8, 9 the first, the middle, and the last
     assert each == pytest.approx([7 / 3, 7 / 3, 1.0, 1.0, 7 / 3])

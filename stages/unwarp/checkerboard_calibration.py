@@ -30,7 +30,7 @@ OUTLIER_PX = 1.0
 """Residual above which a corner counts less: a board is blurred, or bent."""
 
 
-class Calibration(NamedTuple):
+class BoardFit(NamedTuple):
     """`camera`; `residuals` (boards, corners, 2): reprojected less found corners (pixels); `poses` (boards, 6): the
     boards' rotation vectors and places in the camera's frame (radians, squares)."""
 
@@ -107,7 +107,7 @@ def polynomial_start(ring: Ring, mirror: HyperbolicMirror) -> Array:
     return np.concatenate([[mirror.centre_x, mirror.centre_y, stretch, 0.0], fitted])
 
 
-def calibrated(model: Model, size: tuple[int, int], ring: Ring, corners: Sequence[Array], board: Array) -> Calibration:
+def calibrated(model: Model, size: tuple[int, int], ring: Ring, corners: Sequence[Array], board: Array) -> BoardFit:
     """The camera of a model that explains the corners (N, 2) of several images of a board (N, 3) best.
 
     `ring`: the part of the image that shows the world, as far as it is known; centre and radii of it are the start.
@@ -147,7 +147,7 @@ def _refined(
     poses: Array,
     board: Array,
     found: Array,
-) -> Calibration:
+) -> BoardFit:
     from scipy.optimize import least_squares
 
     def parts(numbers: Array) -> tuple[Camera, Array]:
@@ -161,7 +161,7 @@ def _refined(
         errors, begin, loss="soft_l1", f_scale=OUTLIER_PX, x_scale="jac", max_nfev=MAX_STEPS
     )
     camera, poses = parts(ended.x)
-    return Calibration(camera, _residuals(camera, poses, board, found), poses)
+    return BoardFit(camera, _residuals(camera, poses, board, found), poses)
 
 
 def _residuals(camera: Camera, poses: Array, board: Array, found: Array) -> Array:
