@@ -8,7 +8,15 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.plane.local_grid import (
+from omninav.stages.geometry.plane.roadmap import ahead_on
+from omninav.stages.geometry.plane.se2 import compose, wrap_angle
+from omninav.stages.values.command import Command
+from omninav.stages.values.homing import HomingVector
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.scan import Scan
+
+from .clearance import free_ahead, free_direction
+from .local_grid import (
     CELL_M,
     CELLS,
     OCCUPIED_COST,
@@ -21,14 +29,6 @@ from omninav.stages.geometry.plane.local_grid import (
     way_to,
     ways_from,
 )
-from omninav.stages.geometry.plane.roadmap import ahead_on
-from omninav.stages.geometry.plane.se2 import compose, wrap_angle
-from omninav.stages.values.command import Command
-from omninav.stages.values.homing import HomingVector
-from omninav.stages.values.pose import Motion
-from omninav.stages.values.scan import Scan
-
-from .clearance import free_ahead, free_direction
 
 RECENTRE_M = 1.5
 """Distance of the robot from the grid's middle at which the grid moves along, metres."""

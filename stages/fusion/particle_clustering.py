@@ -5,10 +5,11 @@ import math
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.probability.clusters import clusters
 from omninav.stages.geometry.probability.gaussians import floored
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
+
+from .clusters import clusters
 
 CELL_M = 0.5
 """Width of a cell, metres."""

@@ -16,13 +16,13 @@ from omninav.stages.geometry.two_views.epipolar import yaw_of
 from omninav.stages.geometry.two_views.ransac import AgreedPose
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
 from omninav.stages.geometry.two_views.triangulation import parallax, triangulate
-from omninav.stages.geometry.two_views.vertical import levelling, seen_leaning, vertical_of
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import LOST, MATCHED, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 
 from .camera_motion import camera_motion
+from .vertical import levelling, seen_leaning, vertical_of
 
 MIN_MAP_MOTION, MIN_ODOMETRY_M = 0.1, 0.05
 """Distances since the map was made, in its unit and in metres, from which they are compared for the unit in metres."""

@@ -4,9 +4,10 @@ import math
 from typing import Literal
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.two_views.generate_and_select import generate_and_select
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, relative_pose
 from omninav.stages.values.two_views import BearingPairs, RelativeView
+
+from .generate_and_select import generate_and_select
 
 MAX_ERROR_DEG = 0.5
 """Largest angle by which the two bearings of a pair may together miss the pose, degrees."""

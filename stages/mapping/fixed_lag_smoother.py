@@ -10,7 +10,6 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.odometry_motion import motion_gaussian
-from omninav.stages.geometry.plane.path_reconstruction import reconstruct_path
 from omninav.stages.geometry.probability.gaussians import squared_distances
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
@@ -18,6 +17,7 @@ from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, WholeView
 
+from .path_reconstruction import reconstruct_path
 from .unimodality import unimodal_state
 
 Pose = tuple[Array, Array]

@@ -6,9 +6,10 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.place_merging import merged_places, same_spots
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.topological_map import LoopHypotheses
+
+from .place_merging import merged_places, same_spots
 
 MIN_SHARE = 0.4
 """Share of the features that match, for views of two passes to show one spot."""

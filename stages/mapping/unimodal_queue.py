@@ -8,12 +8,12 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.odometry_motion import motion_gaussian
-from omninav.stages.geometry.plane.path_reconstruction import reconstruct_path
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.views import WholeView
 
+from .path_reconstruction import reconstruct_path
 from .unimodality import unimodal_state
 
 NEAR_BELOW = 7.81

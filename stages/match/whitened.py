@@ -6,12 +6,12 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.geometry.appearance.segments import cosine_similarities
-from omninav.stages.geometry.appearance.whitening import Whitening, learned_whitening
 from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
 from .reference_match import ReferenceMatch
+from .whitening import Whitening, learned_whitening
 
 MAX_LEARNED = 1024
 """References, at even steps, that a whitening is learned from."""

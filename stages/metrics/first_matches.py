@@ -14,10 +14,11 @@ from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.triangulation import angles_between
-from omninav.stages.geometry.two_views.true_matches import Motion, right_by_depth, right_by_epipolar
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
+
+from .true_matches import Motion, right_by_depth, right_by_epipolar
 
 COLUMN_RATIO = 0.8
 """Largest ratio of the nearest to the second nearest distance of vertical segments that match."""

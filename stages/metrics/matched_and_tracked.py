@@ -10,11 +10,12 @@ from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
-from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
+
+from .true_matches import right_by_epipolar
 
 SPECS = {
     "pairs.kept": MetricSpec(title="Right tracks / right matches", better="higher"),

@@ -7,9 +7,9 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.plane.smoothing import smoothed, smoothed_with_lag
 from omninav.stages.values.drive import Drive, known
 
+from .smoothing import smoothed, smoothed_with_lag
 from .trajectory_errors import pose_errors, specs
 
 WINDOW = 50

@@ -10,7 +10,6 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import compose, wrap
-from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.particles import share_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
 from omninav.stages.values.commands import Reinitialise
@@ -32,6 +31,8 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.track import Track
+
+from .consistency import consistency, log_odds_of_right
 
 MAX_IMAGES = 500
 """Images that are remembered, of a robot that stands or moves slowly."""

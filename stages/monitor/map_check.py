@@ -6,12 +6,13 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.appearance.segments import HEADINGS, similarities
-from omninav.stages.geometry.appearance.turn_fit import explained
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.maps import ReferenceGraph
+
+from .turn_fit import explained
 
 MIN_REFERENCES = 20
 """References without which nothing is said."""

@@ -9,10 +9,11 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.segments import HEADINGS, similarities
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.geometry.probability.consistency import consistency
 from omninav.stages.values.confidence import WrongPoseAgreement
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
+
+from .consistency import consistency
 
 MAX_COMPARED = 10_000
 """References of a larger map that an image is compared with, evenly spaced."""

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.appearance.turn_by_flow import smoothness, turn_by_flow
 from omninav.stages.geometry.arrays import Bytes
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
 
 from .odometry_noise_model import OdometryNoiseModel
+from .turn_by_flow import smoothness, turn_by_flow
 
 FLOOR_DEG = 0.02
 """Smallest standard deviation of a turn seen in the images, degrees."""

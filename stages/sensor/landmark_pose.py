@@ -17,7 +17,6 @@ from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched,
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.geometry.plane.se2 import compose, turned
-from omninav.stages.geometry.plane.stamp_jitter import StampJitter
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
@@ -25,6 +24,8 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.visual_words import VisualWords
+
+from .stamp_jitter import StampJitter
 
 WORD_REFERENCES = (10, 80)
 """References that share most words with the image, whose landmarks are looked for: at first, and where none of their

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints
-from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
@@ -22,6 +21,7 @@ from omninav.stages.values.similarity import Similarities, SimilarityField
 
 from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from .compared_rows import ComparedRows
+from .nearest_cells import NearestCells
 
 Shorts = npt.NDArray[np.int32]
 

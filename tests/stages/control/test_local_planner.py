@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.control.local_grid import cell_at
 from omninav.stages.control.local_planner import LocalPlanner, LocalPlannerState
-from omninav.stages.geometry.plane.local_grid import cell_at
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.pose import Motion

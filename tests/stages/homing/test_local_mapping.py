@@ -19,7 +19,6 @@ from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver
-from omninav.stages.geometry.two_views.vertical import levelling
 from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
@@ -31,6 +30,7 @@ from omninav.stages.homing.local_mapping import (
     matches_with,
     shown_sectors,
 )
+from omninav.stages.homing.vertical import levelling
 from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap

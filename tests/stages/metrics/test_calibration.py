@@ -7,7 +7,6 @@ from scipy.stats import mannwhitneyu
 
 from omninav.pipeline import Context
 from omninav.pipeline.report.headlines import headline_rows
-from omninav.stages.geometry.probability.consistency import log_odds_of_right
 from omninav.stages.geometry.probability.reliability import (
     area_under_roc,
     expected_calibration_error,
@@ -15,6 +14,7 @@ from omninav.stages.geometry.probability.reliability import (
     squared_mahalanobis,
 )
 from omninav.stages.metrics.calibration import Calibration
+from omninav.stages.monitor.consistency import log_odds_of_right
 from omninav.stages.plots.confidence_over_time import ConfidenceOverTime
 from omninav.stages.plots.reliability_diagram import ReliabilityDiagram
 from omninav.stages.values.belief import PoseEstimate

@@ -10,8 +10,8 @@ from small_run import small_run
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import chain
-from omninav.stages.geometry.plane.smoothing import contradicted, smoothed, smoothed_with_lag
 from omninav.stages.metrics.smoothed_trajectory import SmoothTrajectory
+from omninav.stages.metrics.smoothing import contradicted, smoothed, smoothed_with_lag
 from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.geometry.probability.consistency import log_odds_of_right
 from omninav.stages.monitor.confidence_monitor import (
     ConfidenceMonitor,
     ConfidenceMonitorState,
@@ -20,6 +19,7 @@ from omninav.stages.monitor.confidence_monitor import (
     share_counted,
     share_found,
 )
+from omninav.stages.monitor.consistency import log_odds_of_right
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.commands import Reinitialise

@@ -8,13 +8,13 @@ from made_references import references
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import similarities, turned_view
-from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import contrast_power
 from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
 from omninav.stages.sensor.near_references import NearReferences
+from omninav.stages.sensor.nearest_cells import NearestCells
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.similarity import Similarities

@@ -6,7 +6,6 @@ from made_beliefs import even
 from made_references import references
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.sensor.near_references import (
     NearReferences,
     background_similarity,
@@ -15,6 +14,7 @@ from omninav.stages.sensor.near_references import (
     similarity_field,
     weighted_quantile,
 )
+from omninav.stages.sensor.nearest_cells import NearestCells
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion

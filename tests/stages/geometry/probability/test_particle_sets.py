@@ -3,8 +3,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.plane import nearest_cells
-from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.geometry.probability.particles import (
     are_within,
@@ -16,6 +14,8 @@ from omninav.stages.geometry.probability.particles import (
     uniform_around,
     weighted_mean,
 )
+from omninav.stages.sensor import nearest_cells
+from omninav.stages.sensor.nearest_cells import NearestCells
 
 POSES = st.tuples(*[st.floats(-50, 50)] * 3)
 

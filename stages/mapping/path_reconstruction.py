@@ -4,8 +4,7 @@ import numpy as np
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array
-
-from .se2 import chain, compose, wrap
+from omninav.stages.geometry.plane.se2 import chain, compose, wrap
 
 
 def reconstruct_path(

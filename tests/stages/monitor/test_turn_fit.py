@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.appearance.turn_fit import MAX_TURN, explained, turn_fit
+from omninav.stages.monitor.turn_fit import MAX_TURN, explained, turn_fit
 
 TIMES = np.arange(80) * 0.5
 

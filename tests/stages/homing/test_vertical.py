@@ -7,7 +7,7 @@ import pytest
 
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.geometry.two_views.ransac import AgreedPose
-from omninav.stages.geometry.two_views.vertical import levelling, seen_leaning, vertical_of
+from omninav.stages.homing.vertical import levelling, seen_leaning, vertical_of
 
 UP = np.array([math.sin(math.radians(3.0)), -math.sin(math.radians(1.0)), 0.0])
 UP[2] = math.sqrt(1.0 - UP @ UP)

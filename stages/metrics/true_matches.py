@@ -4,9 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Array, Bools
-
-from .epipolar import shared_residuals, turn_about_vertical
-from .triangulation import angles_between, depths, parallax
+from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
+from omninav.stages.geometry.two_views.triangulation import angles_between, depths, parallax
 
 Motion = tuple[float, float, float]
 """Pose of the second view seen from the first: x forward, y left (m), turn (rad)."""

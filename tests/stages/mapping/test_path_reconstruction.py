@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from omninav.stages.geometry.plane.path_reconstruction import reconstruct_path
 from omninav.stages.geometry.plane.se2 import chain, compose, wrap
+from omninav.stages.mapping.path_reconstruction import reconstruct_path
 
 
 def root(covariance):

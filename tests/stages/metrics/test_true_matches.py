@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from omninav.stages.geometry.two_views.true_matches import right_by_depth, right_by_epipolar
+from omninav.stages.metrics.true_matches import right_by_depth, right_by_epipolar
 
 MOVED = (1.0, 0.5, 0.7)
 

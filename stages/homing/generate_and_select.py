@@ -5,9 +5,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from .epipolar import angular_residuals, decompose, eight_points, in_front
-from .ransac import AgreedPose
-from .relative_pose_ransac import agreement
+from omninav.stages.geometry.two_views.epipolar import angular_residuals, decompose, eight_points, in_front
+from omninav.stages.geometry.two_views.ransac import AgreedPose
+from omninav.stages.geometry.two_views.relative_pose_ransac import agreement
 
 MIN_PAIRS = 8
 """Pairs of a linear fit."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.plane.local_grid import (
+from omninav.stages.control.local_grid import (
     CELL_M,
     CELLS,
     cell_at,

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
-
-from .se2 import compose, turned, wrap
+from omninav.stages.geometry.plane.se2 import compose, turned, wrap
 
 JITTERS_S = np.append(0.0, 0.005 * np.sqrt(2.0) ** np.arange(11))
 """Standard deviations of stamps that are held against each other, s."""

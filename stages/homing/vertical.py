@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
-
-from .ransac import AgreedPose
-from .relative_pose_ransac import relative_pose
+from omninav.stages.geometry.two_views.ransac import AgreedPose
+from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
 
 MIN_TURN_DEG = 15.0
 """Smallest turn between two images that tells its axis, degrees."""

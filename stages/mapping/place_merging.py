@@ -4,9 +4,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from omninav.stages.geometry.appearance.place_clusters import medoids, renumbered
 from omninav.stages.geometry.arrays import Array, Ints
-
-from .place_clusters import medoids, renumbered
 
 MIN_GAP = 10
 """Views along the drive between two that are on different passes."""

@@ -5,11 +5,10 @@ from itertools import pairwise
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools, Ints
-
-from .drive_graph import SIGMA_PER_METRE, odometry_sigmas
-from .pose_errors import heading_errors_deg, position_errors
-from .pose_graph import optimised_poses
-from .se2 import between, chain, compose
+from omninav.stages.geometry.plane.drive_graph import SIGMA_PER_METRE, odometry_sigmas
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.pose_graph import optimised_poses
+from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 MIN_SIGMAS = np.array([0.001, 0.001, np.radians(0.02)])
 """Smallest standard deviation of an estimate (m, m, rad)."""

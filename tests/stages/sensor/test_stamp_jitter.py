@@ -3,9 +3,9 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
-from omninav.stages.geometry.plane import stamp_jitter
 from omninav.stages.geometry.plane.se2 import between, compose, turned
-from omninav.stages.geometry.plane.stamp_jitter import JITTERS_S, StampJitter
+from omninav.stages.sensor import stamp_jitter
+from omninav.stages.sensor.stamp_jitter import JITTERS_S, StampJitter
 
 INTERVAL_S, SPEED, SIGMAS = 0.2, 0.4, np.array([0.002, 0.002, 0.0006])
 

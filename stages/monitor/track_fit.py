@@ -6,8 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools, Complex, Ints
-
-from .se2 import between, wrap
+from omninav.stages.geometry.plane.se2 import between, wrap
 
 LAGS = (4, 8, 16, 32)
 """Steps between the two poses of a pair."""

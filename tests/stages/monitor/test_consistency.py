@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
+from omninav.stages.monitor.consistency import consistency, log_odds_of_right
 
 
 def test_places_agree_by_their_squared_distance_in_widths() -> None:

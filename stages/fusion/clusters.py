@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Ints
-
-from .particles import NEIGHBOUR_STEPS
+from omninav.stages.geometry.probability.particles import NEIGHBOUR_STEPS
 
 
 def clusters(poses: Array, metres: float, radians: float) -> Ints:
