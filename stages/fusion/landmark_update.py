@@ -118,22 +118,22 @@ class LandmarkUpdate(Stage):
         old = belief.weights * unsaid**novelty
         poses, weights, recovery, free = [belief.poses], [old], [], np.ones(len(belief.poses), np.bool_)
         for mean, covariance, probability in zip(fix.poses, fix.covariances, sure.tolist(), strict=True):
-            near = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL) & free
-            free &= ~near  # where two poses lie close together, a particle counts for the better one
-            share = float(np.add.reduce(belief.weights[near]))
+            local = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL) & free
+            free &= ~local  # where two poses lie close together, a particle counts for the better one
+            share = float(np.add.reduce(belief.weights[local]))
             if share > 0.0:
-                there, spread = weighted_moments(belief.poses[near], belief.weights[near])
-                away = there - mean
+                local_mean, spread = weighted_moments(belief.poses[local], belief.weights[local])
+                away = local_mean - mean
                 away[2] = wrap(away[2])
                 both = spread + covariance
                 agreement = probability * math.exp(-0.5 * float(away @ np.linalg.solve(both, away)))
                 spread = spread + np.diag([1e-12] * 3)
                 alpha = alpha_of_min_determinant(spread, covariance)
                 centre = mean + covariance @ np.linalg.solve(both, away)
-                _, product = intersected(there, spread, mean, covariance, alpha)
+                _, product = intersected(local_mean, spread, mean, covariance, alpha)
                 # The factor of this place, of belief and fix together, is raised to the novelty; both keep their ratio.
                 counted = (unsaid + agreement) ** (novelty - 1.0)
-                old[near] = belief.weights[near] * unsaid * counted
+                old[local] = belief.weights[local] * unsaid * counted
                 poses.append(self._drawn(ctx, centre, product))
                 weights.append(np.full(self.particles, share * agreement * counted / self.particles))
             if probability < least:

@@ -284,7 +284,7 @@ class LocalMapping(Stage):
         places = np.concatenate([places, local_map.places[owners]])
         usable = np.isfinite(bearings).all(axis=1)
         threshold = math.radians(MAX_RESECTION_ERROR_DEG)
-        found = three_point_pose(
+        resected = three_point_pose(
             bearings[usable] @ level.T,
             places[usable] @ level.T,
             ctx.rng,
@@ -292,22 +292,22 @@ class LocalMapping(Stage):
             refine=self.refine,
             planar=self.solver == "planar",
         )
-        found = found and seen_leaning(found, level)
+        resected = resected and seen_leaning(resected, level)
         agrees = np.zeros(len(bearings), np.bool_)
-        if found is not None:
-            agrees[usable] = found.inliers
+        if resected is not None:
+            agrees[usable] = resected.inliers
         inliers = len(np.unique(np.append(tracked, owners)[agrees]))  # tracked and matched is one feature
-        if found is None or inliers < MIN_INLIERS:
+        if resected is None or inliers < MIN_INLIERS:
             why = f"{inliers} tracked features agree on where the robot is, {MIN_INLIERS} are needed"
             return replace(local_map, state="lost", inliers=inliers, why=why)
-        jump = math.dist(found.translation, local_map.translation) * local_map.metres
+        jump = math.dist(resected.translation, local_map.translation) * local_map.metres
         if jump > MAX_JUMP_M:
             why = f"the place on which {inliers} features agree is {jump:.1f} m from where odometry leads"
             return replace(local_map, state="lost", inliers=inliers, why=why)
         kinds[tracked[~agrees[: len(tracked)]]] = LOST
         started = agrees[len(tracked) :] & (kinds[owners] == LOST)
         kinds[owners[started]], points[owners[started]] = MATCHED, matches.points[matched[started]]
-        moved, driven = math.hypot(*found.translation[:2]), math.hypot(*local_map.odometry[:2])
+        moved, driven = math.hypot(*resected.translation[:2]), math.hypot(*local_map.odometry[:2])
         metres = driven / moved if moved > MIN_MAP_MOTION and driven > MIN_ODOMETRY_M else local_map.metres
         return replace(
             local_map,
@@ -316,8 +316,8 @@ class LocalMapping(Stage):
             why="",
             kinds=kinds,
             points=points,
-            rotation=found.rotation,
-            translation=found.translation,
+            rotation=resected.rotation,
+            translation=resected.translation,
             metres=metres,
         )
 

@@ -265,12 +265,12 @@ def _update_weights(
             fading = gained if passive else gained * fitting
             out[c] = min(gained * fitting + (1.0 - fading) * weights[c], 1.0)
         else:
-            kept = 1.0
+            retained = 1.0
             if beta_forget > 0.0:
                 for k in range(len(shares)):
                     distance = np.hypot(places[c, 0] - means[k, 0], places[c, 1] - means[k, 1])
                     if distance < fade:
                         spread = np.sqrt(covariances[k, 0, 0]) + np.sqrt(covariances[k, 1, 1])
                         lost = beta_forget * (1.0 - distance / fade) * gain / spread
-                        kept *= 1.0 - shares[k] * min(lost, 1.0)
-            out[c] = kept * weights[c]
+                        retained *= 1.0 - shares[k] * min(lost, 1.0)
+            out[c] = retained * weights[c]

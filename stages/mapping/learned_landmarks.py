@@ -92,9 +92,9 @@ class LearnLandmarks(Stage):
         """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
         straightened. `ticks`, `odometry` and `truth` of all images tell how late these are stamped."""
         ctx.status("triangulating landmarks")
-        found = [each for each, event in zip(features, events, strict=True) if event is not None]
-        views, given = _views(found), map.pose_source == "truth"
-        check = CameraCheck.of(camera, found, views.bearings, given)
+        kept_features = [each for each, event in zip(features, events, strict=True) if event is not None]
+        views, given = _views(kept_features), map.pose_source == "truth"
+        check = CameraCheck.of(camera, kept_features, views.bearings, given)
         described = np.zeros(3) if camera is None else camera.mount
         mounted = np.zeros(3) if camera is None else camera.arm
         described_delay = 0.0 if camera is None else camera.delay or 0.0

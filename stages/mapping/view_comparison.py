@@ -74,22 +74,22 @@ class ViewComparison(Stage):
         taken = pose_rows([poses[row] if row < len(poses) else None for row in rows])
         logs = np.array([ticks[row].log for row in rows], np.int64)
         frames, orders = np.array(rows, np.int64), np.cumsum(np.where(np.diff(logs, prepend=-1) == 0, 1, ORDER_GAP)) - 1
-        tours, owners, kept = 1 + logs, np.full(len(rows), -1, np.int64), 0
+        tours, owners, known_count = 1 + logs, np.full(len(rows), -1, np.int64), 0
         if known is not None:
-            kept = len(known.views)
-            seen = [*map(known.views.features, range(kept)), *seen]
-            wholes = [*map(known.views.global_moments, range(kept)), *wholes]
+            known_count = len(known.views)
+            seen = [*map(known.views.features, range(known_count)), *seen]
+            wholes = [*map(known.views.global_moments, range(known_count)), *wholes]
             taken = np.concatenate([known.poses, taken])
             frames = np.append(known.frames, known.frames.max(initial=-1) + 1 + frames)
             orders = np.append(known.orders, known.orders.max(initial=-1) + 1 + orders)
-            tours, owners = np.append(np.zeros(kept, np.int64), tours), np.append(known.owner, owners)
+            tours, owners = np.append(np.zeros(known_count, np.int64), tours), np.append(known.owner, owners)
         if not seen:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
         ctx.status(f"comparing {len(seen)} views")
         options = ComparisonOptions(self.ratio, min_matches=self.min_matches, patch_distance=self.patch_distance)
         colours = np.stack([each.values for each in wholes]).astype(np.float64)
         close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance
-        distances, shares = compare_all(ctx, [view_features(each) for each in seen], close, kept, options)
+        distances, shares = compare_all(ctx, [view_features(each) for each in seen], close, known_count, options)
         return self.Out(
             views=ComparedViews(
                 features=tuple(seen),

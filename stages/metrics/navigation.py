@@ -102,8 +102,8 @@ class Navigation(MetricStage):
             shortest = metres_of_first(map, spots[0], planned)
         elif end_error is not None and isinstance(map, TopologicalMap) and goal is not None:
             shortest = shortest_metres(map, spots[0], goal)
-        found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
-        found |= {
+        values: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
+        values |= {
             "end_error_m": end_error,
             "path_length_m": driven,
             "shortest_m": shortest,
@@ -116,19 +116,19 @@ class Navigation(MetricStage):
         if map.pose_source == "truth":
             of_goals = goals_reached(drive, routes, map)
             reached = of_goals[0]
-            found |= {"reached": reached, "reached_rate": float(reached)}
+            values |= {"reached": reached, "reached_rate": float(reached)}
             if collisions is not None:
-                found["collision_free_rate"] = float(reached and collisions == 0)
+                values["collision_free_rate"] = float(reached and collisions == 0)
             if reached:
-                found["reached_error_m"] = end_error
+                values["reached_error_m"] = end_error
             if reached and shortest:
-                found["time_per_metre_s"] = found["time_s"] / shortest
-                found["path_length_ratio"] = driven / shortest
+                values["time_per_metre_s"] = values["time_s"] / shortest
+                values["path_length_ratio"] = driven / shortest
             if len(of_goals) > 1:
-                found |= {"goals": len(of_goals), "goals_reached_rate": float(np.mean(of_goals))}
+                values |= {"goals": len(of_goals), "goals_reached_rate": float(np.mean(of_goals))}
         if len(tallied) and map.pose_source == "truth" and isinstance(map, ReferenceGraph):
-            found["lost_m_per_km"] = lost_metres(drive)
-        return self.Out(metrics=Metrics({"navigation": found}, SPECS, HEADLINES, foremost=True))
+            values["lost_m_per_km"] = lost_metres(drive)
+        return self.Out(metrics=Metrics({"navigation": values}, SPECS, HEADLINES, foremost=True))
 
 
 def goals_reached(

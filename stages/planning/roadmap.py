@@ -137,18 +137,18 @@ class RoadmapPlanner(Stage):
             state.rivals = poses[1:]
         if state.ended:
             return _stopped(state)
-        here, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
+        pose, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
         state.lost_since = None if sure else tick.stamp if state.lost_since is None else state.lost_since
         if state.lost_since is not None and tick.stamp - state.lost_since > SEARCH_S * 1e9:
             state.ended, state.why = "gave up", f"for {SEARCH_S:g} s it has not found out where it is"
             return _stopped(state)
-        places = self._path(state, map, here)
+        places = self._path(state, map, pose)
         new = sure and math.isinf(state.left)
         told = fix is not None and fix.probabilities[0] >= MIN_PROBABILITY
-        at, known = fix.poses[0] if fix is not None and told else here, told or (state.doubtful and sure)
+        at, known = fix.poses[0] if fix is not None and told else pose, told or (state.doubtful and sure)
         away = math.dist(at[:2], state.goal[:2])
-        near = sure and math.isnan(state.goal[2]) and math.dist(here[:2], state.goal[:2]) <= NEAR_M
-        state.near_since = None if not near else tick.stamp if state.near_since is None else state.near_since
+        at_point = sure and math.isnan(state.goal[2]) and math.dist(pose[:2], state.goal[:2]) <= NEAR_M
+        state.near_since = None if not at_point else tick.stamp if state.near_since is None else state.near_since
         if state.near_since is not None and tick.stamp - state.near_since >= HOVER_S * 1e9:
             state.ended = "arrived"
             return _stopped(state)
@@ -160,7 +160,7 @@ class RoadmapPlanner(Stage):
                 state.arrival = away + ARRIVAL_M
             elif places is not None:
                 ctx.count("blocked_path")
-                ahead, _ = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
+                ahead, _ = ahead_on(_line(state, map, places), pose[:2], LOOKAHEAD_M)
                 away_m = np.hypot(*(map.poses[:, :2] - ahead).T)
                 more = np.maximum(DETOUR_M, 10.0 * state.extra)
                 state.extra = np.where(away_m <= BLOCKED_RADIUS_M, more, state.extra)
@@ -169,17 +169,17 @@ class RoadmapPlanner(Stage):
                     state.why = f"its way near ({x:.1f}, {y:.1f}) m was blocked {BLOCKED_HERE} times: {status.why}"
                     return _stopped(state)
                 self._plan(state, map)
-                places, new = self._path(state, map, here), True
+                places, new = self._path(state, map, pose), True
         if places is None:
             state.ended, state.why = "gave up", "no path leads to the goal"
             return _stopped(state)
         if new:
             state.number, state.places = state.number + 1, places
-        ahead, beyond = ahead_on(_line(state, map, places), here[:2], LOOKAHEAD_M)
-        x, y = ahead - here[:2]
-        left = math.hypot(x, y) + beyond
-        if new or left + LEG_M < state.left < math.inf:
-            state.leg, state.left = state.leg + 1, left
+        ahead, beyond = ahead_on(_line(state, map, places), pose[:2], LOOKAHEAD_M)
+        x, y = ahead - pose[:2]
+        remaining_m = math.hypot(x, y) + beyond
+        if new or remaining_m + LEG_M < state.left < math.inf:
+            state.leg, state.left = state.leg + 1, remaining_m
         turn = 0.0 if math.isnan(state.goal[2]) else wrap_angle(state.goal[2] - at[2])
         if known:
             state.docking = away <= state.arrival + (ARRIVAL_M if state.docking else 0.0)
@@ -192,10 +192,10 @@ class RoadmapPlanner(Stage):
         begun = state.left < math.inf
         vector = HomingVector(
             number=state.leg,
-            direction=wrap_angle(math.atan2(y, x) - here[2]),
+            direction=wrap_angle(math.atan2(y, x) - pose[2]),
             turn=turn,
-            distance=left,
-            ratio=1.0 - (state.left - left) / max(min(state.left, LEG_M), 1e-3) if begun else 1.0,
+            distance=remaining_m,
+            ratio=1.0 - (state.left - remaining_m) / max(min(state.left, LEG_M), 1e-3) if begun else 1.0,
             depth_ratio=1.0,
             metres=math.hypot(x, y) if begun and sure else None,
             inliers=0 if fix is None else int(fix.inliers[0]),

@@ -44,7 +44,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     wanted.add(TF_STATIC)
-    found: dict[str, list[Record]] = {topic: [] for topic in wanted}
+    records: dict[str, list[Record]] = {topic: [] for topic in wanted}
     poses = {topic: PoseTopic(topic) for topic in (topics.odometry, topics.truth) if topic}
     infos: list[Any] = []
     fixed, base = StaticTransforms(), ""
@@ -71,14 +71,14 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         except BadMessage as error:
             feed.drop("bad_message", str(error))
             continue
-        found[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
+        records[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
 
     if transforms is not None:
         transforms.require(name, feed.topics.get(transforms.topic, ""))
-    image_topic = _image_topic(name, feed, topics, found)
+    image_topic = _image_topic(name, feed, topics, records)
     odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
     truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
-    frames = _in_order(feed, name, image_topic, found[image_topic], "duplicate_frame")
+    frames = _in_order(feed, name, image_topic, records[image_topic], "duplicate_frame")
 
     def fetch_image(frame: int) -> Callable[[], Pixels]:
         message = feed.decode(image_topic, feed.fetch(frames[frame].location))
@@ -118,9 +118,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         feed=feed,
         fetch_image=fetch_image,
         files=[*files, *camera_files],
-        scans=_scans(name, feed, topics.scan, found),
+        scans=_scans(name, feed, topics.scan, records),
     )
-    told = set_back(found[image_topic]) if len(files) == 1 else ""
+    told = set_back(records[image_topic]) if len(files) == 1 else ""
     unsaid = mounted.unsaid(by_info)
     recording.mounted = mounted.in_words
     recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)

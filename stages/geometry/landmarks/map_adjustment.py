@@ -116,7 +116,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     moved, or by as much as it was itself, where that is more. Poses that images confirm as well as they can are kept
     as they were given, but for single ones that are off: images that show little bend poses and fit them no better.
     """
-    sigmas, found = np.tile(GIVEN_SIGMAS, (len(poses), 1)), _Found(poses, None)
+    sigmas, found = np.tile(GIVEN_SIGMAS, (len(poses), 1)), _Solution(poses, None)
     for miss, off_plane in zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), strict=True):
         fits = fitting_matches(_looking(views, seen, found.camera), matches, found.poses, off_plane)
         if found.camera is None and len(fits) and fits.mean() < MIN_FIT:
@@ -188,25 +188,25 @@ def adjusted_drive(
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
     motions = Motions(np.column_stack([along[:-1], along[1:]]), measured.motions, looseness * measured.sigmas)
-    found = _Found(straightened_drive(odometry[0], measured.motions, measured.sigmas, verified), None)
+    solution = _Solution(straightened_drive(odometry[0], measured.motions, measured.sigmas, verified), None)
     for miss in MISSES:
-        again = _bundled(views, tracks, found, seen, miss, None, motions, None)
-        if again is None:
+        refined = _bundled(views, tracks, solution, seen, miss, None, motions, None)
+        if refined is None:
             return AdjustedMap(odometry, np.empty(0), "too few landmarks are seen")
-        found = again
-    covariances = found.covariances
-    assert found.camera is not None
+        solution = refined
+    covariances = solution.covariances
+    assert solution.camera is not None
     assert covariances is not None
     depth = None
     if height:
-        seen_by = found.references, found.landmarks
-        lowest = lowest_plane(found.points, found.poses, *seen_by) if seen_motion else height
+        seen_by = solution.references, solution.landmarks
+        lowest = lowest_plane(solution.points, solution.poses, *seen_by) if seen_motion else height
         if lowest is not None:
             by = lowest / height
-            depth = floor_depth(found.points / by, found.poses / [by, by, 1.0], *seen_by, height)
+            depth = floor_depth(solution.points / by, solution.poses / [by, by, 1.0], *seen_by, height)
             depth = None if depth is None else depth * by
     scale = height / depth if height and depth is not None else None
-    poses = found.poses.copy()
+    poses = solution.poses.copy()
     poses[:, :2] = poses[0, :2] + (scale or 1.0) * (poses[:, :2] - poses[0, :2])
     poses = _wrapped(poses)
     units = np.array([scale or 1.0, scale or 1.0, 1.0])
@@ -216,10 +216,10 @@ def adjusted_drive(
     def uncertain() -> Array:
         return covariances(SIGMA_FACTOR) * np.outer(units, units)
 
-    return AdjustedMap(poses, found.camera, "", closures, scale, shown, uncertain, measured.slipped)
+    return AdjustedMap(poses, solution.camera, "", closures, scale, shown, uncertain, measured.slipped)
 
 
-class _Found(NamedTuple):
+class _Solution(NamedTuple):
     # Poses and what the camera is corrected by; the landmarks, and of each sighting its reference and its landmark; the
     # poses' covariances by the factor of a bearing's standard deviation.
     poses: Array
@@ -233,13 +233,13 @@ class _Found(NamedTuple):
 def _bundled(
     views: LocalViews,
     tracks: Tracks,
-    before: _Found,
+    before: _Solution,
     seen: Seen,
     miss: float,
     sigmas: Array | None,
     motions: Motions | None,
     given: Array | None,
-) -> _Found | None:
+) -> _Solution | None:
     # None where too few references see enough of the landmarks.
     centres, bearings = in_map_frame(_looking(views, seen, before.camera), before.poses)
     made = triangulated_tracks(
@@ -258,7 +258,7 @@ def _bundled(
     enough = np.bincount(references, minlength=len(before.poses)) >= MIN_SIGHTINGS
     if not enough.any() or enough.mean() < MIN_SHARE:
         return None
-    return _Found(out.poses, start + out.camera, out.points, references, landmarks, out.covariances)
+    return _Solution(out.poses, start + out.camera, out.points, references, landmarks, out.covariances)
 
 
 def _looking(views: LocalViews, seen: Seen, camera: Array | None) -> LocalViews:
