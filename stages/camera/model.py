@@ -14,8 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Value
-from omninav.pipeline.graph.registry import offered
+from omninav.pipeline import BadInput, Bounds, Value, offered
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Pixels
 

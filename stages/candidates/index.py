@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Context, Stage
 from omninav.stages.geometry.appearance.segments import HEADINGS, turned_views
 from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.point_cells import distinct

@@ -5,10 +5,8 @@ from typing import Annotated, Literal, NamedTuple
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Metrics, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
 from omninav.stages.geometry.arrays import Array, Bools, Floats
 from omninav.stages.values.features import SegmentHistograms

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput, cut
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, cut
 from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.encoded_image import MAX_PIXELS
 from omninav.stages.values.features import SegmentDescriptors

@@ -6,8 +6,7 @@ from typing import Annotated, Any, cast
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput, cut
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, cut
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.camera.rays import unit_vectors

@@ -4,9 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.files import digest_file, digest_text
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline import BadInput, digest_file, digest_text, read_small
 
 MAX_MODEL_BYTES = 1 << 30
 """Largest accepted model file, bytes."""

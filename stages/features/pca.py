@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Context, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.views import Coefficients

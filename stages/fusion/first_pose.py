@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles

@@ -4,8 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, Tick
 from omninav.stages.geometry.probability.particles import uniform_around
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.commands import Reinitialise

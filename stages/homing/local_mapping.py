@@ -6,8 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle

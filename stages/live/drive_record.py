@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from omninav.pipeline.files import named, open_itself
+from omninav.pipeline import named, open_itself
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import LogStream
 from omninav.stages.camera.model import Camera

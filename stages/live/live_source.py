@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Source, Tick
-from omninav.pipeline.files import user_path
+from omninav.pipeline import BadInput, Bounds, Context, Source, Tick, user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.geometry.plane.se2 import between

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, write_whole
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput
 from omninav.pipeline.mcap.message_types import header_stamp, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import camera_from_info

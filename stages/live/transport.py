@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Literal, NamedTuple, TypeVar
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput
 
 from .status import LiveStatus
 

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import BadInput
-from omninav.pipeline.graph.stored_rows import GatheredRows, StoredRows
+from omninav.pipeline import BadInput, GatheredRows, StoredRows
 from omninav.stages.geometry.appearance.segments import Rows
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap

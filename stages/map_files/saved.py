@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline import BadInput
+from omninav.pipeline import BadInput, user_path
 from omninav.pipeline.engine.artifact import artifact_digest, read_artifact, read_header, write_artifact
-from omninav.pipeline.files import user_path
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 

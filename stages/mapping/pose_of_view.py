@@ -2,8 +2,7 @@
 
 from typing import Literal
 
-from omninav.pipeline import Context
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Context
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS, Pose, PoseSource, frame_of
 

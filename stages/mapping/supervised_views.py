@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Context, Outputs, Stage
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.view_mixtures import ViewMixtures

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, Tick
 from omninav.stages.geometry.appearance.visual_distance import (
     MAX_GLOBAL_DISTANCE,
     MIN_MATCHES,

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Context, Outputs, Stage
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.similarity import RetrievedReferences
 from omninav.stages.values.topological_map import TopologicalMap

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs
 from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates

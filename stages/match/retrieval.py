@@ -5,9 +5,8 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import Rows, turned_views
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import wrap

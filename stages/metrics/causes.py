@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import counted
 from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch

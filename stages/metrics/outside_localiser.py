@@ -14,10 +14,19 @@ from typing import IO
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Metrics, MetricSpec, Outputs, Stage, Tick
-from omninav.pipeline.files import digest_file, digest_text
-from omninav.pipeline.graph.problems import cut
-from omninav.pipeline.graph.registry import refuse_untyped
+from omninav.pipeline import (
+    BadInput,
+    Context,
+    Metrics,
+    MetricSpec,
+    Outputs,
+    Stage,
+    Tick,
+    cut,
+    digest_file,
+    digest_text,
+    refuse_untyped,
+)
 from omninav.stages.recordings.localiser_folder import read_poses, write_folder
 from omninav.stages.recordings.recorded_images import RecordedImages
 from omninav.stages.values.belief import PoseEstimate

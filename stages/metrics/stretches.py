@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import counted
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.confidence import MIN_EMPTY, MIN_SEEN, MIN_SURE

@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.unbroken_view import of_one_place
 from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to

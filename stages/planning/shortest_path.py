@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 import networkx
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
-from omninav.pipeline.graph.problems import BadInput, nearest
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State, Tick, nearest
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.commands import GoalPoint

@@ -1,7 +1,6 @@
 """Writes the camera that a map's images showed as a file."""
 
-from omninav.pipeline import Context, Stage
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import Context, Stage, write_whole
 from omninav.stages.values.maps import ReferenceGraph
 
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, PlotStage
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import Context, PlotStage, counted
 from omninav.pipeline.report.chart import Chart, stacked
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors

@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, PlotStage
-from omninav.pipeline.graph.problems import counted
-from omninav.pipeline.graph.results import Slide
+from omninav.pipeline import Context, PlotStage, Slide, counted
 from omninav.pipeline.report.chart import Chart, Layer, broken
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors

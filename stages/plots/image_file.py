@@ -5,8 +5,7 @@ from typing import Annotated
 
 import cv2
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick, write_whole
 from omninav.stages.values.image import Image
 
 

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Context, Outputs, Shape, Stage, Tick, Value
 from omninav.stages.camera.model import seen_at
 from omninav.stages.camera.panorama_camera import panorama_camera
 from omninav.stages.camera.thumbnail import Thumbnail, thumbnail

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, PlotStage
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import Bounds, Context, PlotStage, counted
 from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive

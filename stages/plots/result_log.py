@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from importlib.resources import files
 
-from omninav.pipeline import Context, Stage
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import Context, Stage, write_whole
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.plots.pose_messages import path_bytes

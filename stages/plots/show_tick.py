@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Context, Outputs, Shape, Stage, State, Tick, Value
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.plots.pose_messages import path_bytes

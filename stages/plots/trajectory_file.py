@@ -5,8 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from omninav.pipeline import Context, Stage
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import Context, Stage, write_whole
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Plot, Stage
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import Context, Outputs, Plot, Stage, counted
 from omninav.pipeline.report.chart import broken
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known

@@ -12,11 +12,17 @@ from typing import Annotated, Any, get_args, get_origin
 import numpy as np
 import yaml
 
-from omninav.pipeline.graph.parameters import Parameter, read_parameters
-from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.problems import BadInput, nearest, shown
-from omninav.pipeline.graph.registry import offered
-from omninav.pipeline.graph.small_files import parse_yaml, read_yaml
+from omninav.pipeline import (
+    BadInput,
+    Parameter,
+    convert,
+    nearest,
+    offered,
+    parse_yaml,
+    read_parameters,
+    read_yaml,
+    shown,
+)
 from omninav.stages.camera.model import Camera, Key, camera_models, require_sight
 
 from .recording import UnreadableRecording

@@ -7,11 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from omninav.pipeline import Bounds
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.problems import nearest, shown
-from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline import Bounds, convert, nearest, read_yaml, shown, user_path
 
 from .recording import UnreadableRecording
 from .tables import Delimiter, Length, Time

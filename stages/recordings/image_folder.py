@@ -11,9 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.files import digest_file, user_path
-from omninav.pipeline.graph.problems import BadInput, shown
-from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline import BadInput, digest_file, read_small, shown, user_path
 from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.geometry.arrays import Array, Ints

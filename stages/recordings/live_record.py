@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline import convert_fields
 from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array

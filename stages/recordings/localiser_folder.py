@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import BadInput, counted
+from omninav.pipeline import BadInput, counted
 from omninav.stages.geometry.arrays import Array, Ints
 
 from .camera_yaml import parse_camera

@@ -5,9 +5,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline import BadInput, read_yaml, user_path
 from omninav.pipeline.mcap.message import Location, Losses, Record
 from omninav.pipeline.mcap.reader import LogReader
 

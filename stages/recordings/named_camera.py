@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import nearest
+from omninav.pipeline import nearest, user_path
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.values.image import Pixels

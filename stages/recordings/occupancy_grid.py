@@ -8,12 +8,17 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds
-from omninav.pipeline.files import digest_file, digest_text, user_path
-from omninav.pipeline.graph.parameters import read_parameters
-from omninav.pipeline.graph.ports import convert_fields
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.small_files import read_small, read_yaml
+from omninav.pipeline import (
+    BadInput,
+    Bounds,
+    convert_fields,
+    digest_file,
+    digest_text,
+    read_parameters,
+    read_small,
+    read_yaml,
+    user_path,
+)
 from omninav.stages.geometry.arrays import Bools, Bytes, Ints
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.floor_plan import FloorPlan

@@ -4,7 +4,7 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from omninav.pipeline.files import user_path
+from omninav.pipeline import user_path
 from omninav.stages.camera.model import Ring
 
 from .description import known_layouts

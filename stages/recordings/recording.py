@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, user_path
 from omninav.pipeline.mcap.message import BadMessage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Ints

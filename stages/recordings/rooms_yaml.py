@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.small_files import parse_yaml
+from omninav.pipeline import convert, parse_yaml, user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.values.rooms import Rooms
 

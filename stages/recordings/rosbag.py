@@ -14,9 +14,7 @@ import zstandard
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline import BadInput, read_yaml, user_path
 from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, Allowance, unpack_lz4, unpack_zstd
 from omninav.pipeline.mcap.message import BadMessage, Losses, Record
 from omninav.pipeline.mcap.message_types import has_header, header_stamp, refuse_long_arrays, standard_types

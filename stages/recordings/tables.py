@@ -16,8 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.graph.problems import cut, nearest
-from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline import cut, nearest, read_small
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .recording import UnreadableRecording

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from omninav.pipeline.files import digest_file
+from omninav.pipeline import digest_file
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import nearest
+from omninav.pipeline import nearest
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Bools

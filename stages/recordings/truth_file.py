@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import counted, cut
-from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline import counted, cut, read_small
 from omninav.stages.geometry.arrays import Array
 
 from .plausibility import MotionLimits, believed

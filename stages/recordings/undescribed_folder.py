@@ -3,7 +3,7 @@
 from collections import Counter
 from pathlib import Path
 
-from omninav.pipeline.files import user_path
+from omninav.pipeline import user_path
 
 from .description import Description, Frames
 from .image_folder import ImageFolder

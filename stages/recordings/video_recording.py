@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from omninav.pipeline.files import digest_file, user_path
+from omninav.pipeline import digest_file, user_path
 from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.encoded_image import MAX_PIXELS, Undecodable

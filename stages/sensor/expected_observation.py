@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from omninav.pipeline import Context
+from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.compiled import compiled
-from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties
 from omninav.stages.geometry.appearance.sorting_network import sorting_network
 from omninav.stages.geometry.arrays import Array, Floats, Ints

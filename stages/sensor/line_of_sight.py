@@ -5,10 +5,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline import BadInput, Context, Metrics, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Array
 
 from .config import Door, Kidnapping, Point, Room, Route, Side, WallPanel, WorldConfig

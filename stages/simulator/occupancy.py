@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import write_whole
 from omninav.stages.geometry.arrays import Bools
 
 from .world import World

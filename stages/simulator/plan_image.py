@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline import write_whole
 
 from .lighting import lamps_on
 from .world import World, outline

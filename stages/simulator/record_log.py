@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline import Context
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import Context, counted
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .config import Kidnapping, WorldConfig

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from omninav.pipeline import digest_file, digest_text
 from omninav.pipeline.engine.code_version import module_version, surroundings
-from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import camera, simulator
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane import odometry_noise, se2

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS
 from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
 

@@ -3,10 +3,7 @@
 import shlex
 from pathlib import Path
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.files import digest_file
-from omninav.pipeline.graph.problems import BadInput, nearest
-from omninav.pipeline.graph.small_files import read_small
+from omninav.pipeline import BadInput, Context, Outputs, Stage, digest_file, nearest, read_small
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.simulator.cameras import camera_of

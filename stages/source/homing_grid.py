@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.pipeline.files import digest_text
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick, digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.recordings.opening import open_recording

@@ -7,9 +7,7 @@ from typing import Annotated, Any
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, user_path
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid

@@ -8,10 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Source, Tick
+from omninav.pipeline import Bounds, Context, Source, Tick, counted, digest_file, user_path
 from omninav.pipeline.engine.code_version import module_version
-from omninav.pipeline.files import digest_file, user_path
-from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording

@@ -9,10 +9,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Source, State, Tick
-from omninav.pipeline.files import digest_text, user_path
-from omninav.pipeline.graph.contents import wrong_output
-from omninav.pipeline.graph.problems import cut
+from omninav.pipeline import BadInput, Context, Source, State, Tick, cut, digest_text, user_path, wrong_output
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose

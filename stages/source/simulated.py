@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline import Context
-from omninav.pipeline.files import digest_text
+from omninav.pipeline import Context, digest_text
 from omninav.stages.recordings.recording import Recording
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.record_log import record_log

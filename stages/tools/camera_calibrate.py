@@ -6,8 +6,7 @@ from typing import Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool
-from omninav.pipeline.files import user_path, write_whole
+from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
 from omninav.stages.camera.mirror_ring import RingNotFound, find_ring
 from omninav.stages.camera.model import Ring

@@ -4,9 +4,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool
-from omninav.pipeline.files import user_path
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import BadInput, Bounds, Context, Tool, counted, user_path
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.live.camera_device import MESSAGE, TOPIC, CameraDevice, device_camera, image_message
 from omninav.stages.recordings.camera_yaml import write_camera

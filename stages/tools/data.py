@@ -1,7 +1,6 @@
 """Lists the public data sets for which there is a layout."""
 
-from omninav.pipeline import BadInput, Context, Tool
-from omninav.pipeline.graph.problems import nearest
+from omninav.pipeline import BadInput, Context, Tool, nearest
 from omninav.stages.recordings.description import DataSet, known_layouts, read_description
 
 

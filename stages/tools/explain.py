@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Tool
+from omninav.pipeline import BadInput, Context, Tool, user_path
 from omninav.pipeline.api.run import Run
-from omninav.pipeline.files import user_path
 from omninav.stages.metrics.causes import stretches
 from omninav.stages.metrics.stretches import logs_of, row_of, summaries
 

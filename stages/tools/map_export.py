@@ -9,9 +9,8 @@ from typing import Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool
+from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path, write_whole
 from omninav.pipeline.engine.artifact import read_artifact
-from omninav.pipeline.files import user_path, write_whole
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.map_files.point_cloud import ply
 from omninav.stages.map_files.saved import SavedMap, read_saved

@@ -7,9 +7,8 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial import KDTree
 
-from omninav.pipeline import BadInput, Context, Tool
+from omninav.pipeline import BadInput, Context, Tool, user_path, write_whole
 from omninav.pipeline.engine.artifact import read_artifact, read_header
-from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.plots.drawing import draw_grid, draw_landmarks, draw_map, plan_axes
 from omninav.stages.recordings.occupancy_grid import read_occupancy

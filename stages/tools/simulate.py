@@ -1,7 +1,6 @@
 """Writes a drive through a simulated world as a log."""
 
-from omninav.pipeline import BadInput, Context, Tool
-from omninav.pipeline.files import user_path
+from omninav.pipeline import BadInput, Context, Tool, user_path
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.record_log import record_log
 

@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool
-from omninav.pipeline.files import user_path
+from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.messages import pose_of

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Covariances, Shape, Shares
+from omninav.pipeline import Bounds, Covariances, Shape, Shares, Value
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import mode_and_mean, weighted_mean
 

@@ -2,8 +2,7 @@
 
 from typing import Annotated, ClassVar, Literal, get_args
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Ints
 
 Probability = Annotated[float, Bounds(ge=0, le=1)]

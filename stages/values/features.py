@@ -5,8 +5,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape, UnitRows
+from omninav.pipeline import Bounds, Shape, UnitRows, Value
 from omninav.stages.geometry.appearance.segments import FeatureKind
 from omninav.stages.geometry.arrays import Array, Floats
 

@@ -5,8 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Ints
 
 Cells = npt.NDArray[np.uint8]

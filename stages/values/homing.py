@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical

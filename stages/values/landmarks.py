@@ -6,8 +6,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape, Starts
+from omninav.pipeline import Bounds, Covariances, RowsOf, Shape, Starts, Value
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 
 from .visual_words import VisualWords

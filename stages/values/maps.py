@@ -5,8 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Value
-from omninav.pipeline.graph.contents import RowsOf, Shape
+from omninav.pipeline import RowsOf, Shape, Value
 from omninav.stages.geometry.appearance.segments import FeatureKind, Rows
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 

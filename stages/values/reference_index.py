@@ -6,8 +6,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
-from omninav.pipeline.graph.contents import RowsOf, Shape
+from omninav.pipeline import RowsOf, Shape, Value
 from omninav.stages.geometry.arrays import Bytes, Floats
 
 

@@ -4,8 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 from omninav.stages.geometry.plane.se2 import chain, compose
 

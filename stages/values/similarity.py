@@ -3,8 +3,7 @@
 from functools import cached_property
 from typing import Annotated
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.probability.evidence import best_headings, centre_and_spread
 

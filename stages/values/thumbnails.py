@@ -4,8 +4,7 @@ from typing import Annotated
 
 import cv2
 
-from omninav.pipeline import Value
-from omninav.pipeline.graph.contents import Shape, Starts
+from omninav.pipeline import Shape, Starts, Value
 from omninav.stages.geometry.arrays import Bytes, Ints
 
 from .encoded_image import decode_image

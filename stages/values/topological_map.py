@@ -8,8 +8,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
+from omninav.pipeline import Bounds, RowsOf, Shape, Starts, Value
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 
 from .local_features import NO_SEGMENTS, GlobalDescriptor, LocalFeatures, VerticalSegments

@@ -4,8 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Value
-from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape
+from omninav.pipeline import BadInput, Bounds, Covariances, RowsOf, Shape, Value
 from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
 
 from .growable_arrays import GrowableArrays

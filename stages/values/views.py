@@ -4,8 +4,7 @@ from abc import abstractmethod
 from dataclasses import replace
 from typing import Annotated, Self
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.appearance.rotated_distances import turned_distances, turns_of_nearest
 from omninav.stages.geometry.appearance.spectra import best_turns, spectral_distances
 from omninav.stages.geometry.arrays import Array, Floats, Ints

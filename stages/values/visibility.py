@@ -5,8 +5,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape, Starts
+from omninav.pipeline import Bounds, Shape, Starts, Value
 from omninav.stages.geometry.arrays import Array, Bools
 
 

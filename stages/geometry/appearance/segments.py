@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from omninav.pipeline import StoredRows
 from omninav.pipeline.engine.compiled import compiled
-from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 from .best_segments import UNROLLED, selective_sum
