@@ -67,5 +67,9 @@ def test_a_folder_that_the_run_cannot_take_is_refused(tmp_path: Path, monkeypatc
     (tmp_path / "done" / "manifest.json").write_text("{}")
     assert main([*words, "hydra.run.dir=done"]) == 2
     assert "done: there is a run in it" in capsys.readouterr().err
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "truth.tum").write_text("1 2 3\n")
+    assert main([*words, "hydra.run.dir=data"]) == 2
+    assert "data: it holds truth.tum, which a run might overwrite; name an empty folder" in capsys.readouterr().err
     assert main([*words, "hydra.run.dir=new"]) == 0
     assert not (tmp_path / "new").exists()
