@@ -57,7 +57,7 @@ class Call:
             self.node.stage.setup(self.ctx)
         except BadInput:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failed(error, f"stage '{self.node.name}' ({self.node.target}) failed in setup") from error
 
     def run(self, values: dict[str, Any]) -> bool:
@@ -82,7 +82,7 @@ class Call:
             out = self.step(self.ctx, **given)
         except BadInput:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failed(error, self._place()) from error
         self.times.append(time.perf_counter() - start)
         if guarded and encode([given[name] for name in guarded]) != before:
@@ -103,7 +103,7 @@ class Call:
             if wrong is not None:
                 raise StageFailed(one_line(f"{self._place()}: its output '{name}' {wrong}"))
 
-    def _failed(self, error: Exception, place: str) -> Exception:
+    def _failed(self, error: BaseException, place: str) -> Exception:
         """The error that says which stage failed, and when."""
         message = f"{place}: {type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno in DISK:

@@ -83,7 +83,7 @@ class ConfidenceMonitorState(State):
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
-    `sure`: the estimate was since the robot began; `empty`: images in a row that say nothing.
+    `sure`: the estimate was since the robot began; `localised`: it is; `empty`: images in a row that say nothing.
     `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
     then, how surely the images so far would have shown some there, 0 to 1.
     """
@@ -98,6 +98,7 @@ class ConfidenceMonitorState(State):
     found: bool = False
     missed: float = 0.0
     sure: bool = False
+    localised: bool = False
     empty: int = 0
 
     def forget(self) -> None:
@@ -107,11 +108,14 @@ class ConfidenceMonitorState(State):
         self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
 
     def told(self, probability: float) -> TrackingState:
-        """The state that follows from the confidence; remembers that the robot was sure."""
-        if probability < MIN_SURE:
+        """The state that follows from the confidence; a robot that is not localised does not become so by images that
+        say nothing."""
+        empty = self.empty >= MIN_EMPTY
+        self.localised = probability >= MIN_SURE and (self.localised or not empty)
+        if not self.localised:
             return "lost" if self.sure else "searching"
         self.sure = True
-        return "blind" if self.empty >= MIN_EMPTY else "tracking"
+        return "blind" if empty else "tracking"
 
     def move(self, motion: Motion) -> None:
         """Carry all poses along with the robot."""
@@ -188,15 +192,15 @@ class ConfidenceMonitor(Stage):
         landmarks were looked for."""
         if ctx.tick.first_of_log or restart is not None:
             recent.forget()
-            recent.sure, recent.empty = False, 0
+            recent.sure, recent.localised, recent.empty = False, False, 0
         elif motion is not None:
             recent.move(motion)
         if track is not None and track.carried:
             recent.forget()
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
-        leads = None
-        if similarities is not None and similarities.values.size:
+        leads, seen = None, features is None or len(features) >= MIN_SEEN
+        if similarities is not None and similarities.values.size and seen:
             novelty = 1.0 if likelihood is None else likelihood.novelty
             leads = leads_of_best(similarities, map, pose, ELSEWHERE * gate)
             distinct, against = share_counted(leads.over_elsewhere), share_counted(leads.over_estimate)
@@ -230,8 +234,7 @@ class ConfidenceMonitor(Stage):
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
             probability *= self.right_in_conflict
-        seen = similarities is not None and (features is None or len(features) >= MIN_SEEN)
-        recent.empty = 0 if seen else recent.empty + 1
+        recent.empty = 0 if similarities is not None and seen else recent.empty + 1
         return self.Out(confidence=PoseConfidence(probability, recent.told(probability)), leads=leads)
 
 

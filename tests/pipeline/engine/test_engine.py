@@ -1,6 +1,7 @@
 """The engine: lifetimes, delays, absence, logs in a row, and going on from a checkpoint."""
 
 import math
+import sys
 from pathlib import Path
 
 import pytest
@@ -132,6 +133,13 @@ def test_a_failing_stage_is_named_with_the_place(early: bool, said: str):
     nodes = {"source": "Count", "breaks": {"_target_": "Fail", "early": early}}
     engine = Engine(graph_of(nodes, {"breaks": {"number": "source.number"}}))
     with pytest.raises(StageFailed, match=rf"stage 'breaks' \(toys.Fail\) failed {said}"):
+        engine.run()
+
+
+def test_a_stage_that_exits_has_failed_and_does_not_end_the_program():
+    engine = Engine(graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}}))
+    engine.calls["scale"].step = lambda ctx, number: sys.exit(0)
+    with pytest.raises(StageFailed, match=r"stage 'scale' \(toys.Scale\) failed at tick 0 .*: SystemExit: 0"):
         engine.run()
 
 

@@ -128,6 +128,16 @@ def test_a_robot_searches_until_it_is_sure_is_lost_when_it_no_longer_is_and_blin
     assert blind[14:] == ["tracking", "tracking", "tracking", "blind", "blind", "tracking"]
 
 
+def test_in_the_dark_agreeing_images_say_nothing_and_localise_no_robot():
+    recent, rng, states = ConfidenceMonitorState(), np.random.default_rng(1), []
+    for n, spread in enumerate((30.0, 30.0, 30.0, 0.05, 0.05, 0.05)):  # the belief settles without having seen anything
+        poses, tick = np.array([n, 0.0, 0.0]) + rng.normal(0.0, spread, (500, 3)), Tick(n, n, first_of_log=n == 0)
+        seen = {"features": features(7 if n < 5 else 200), "likelihood": Likelihood(np.ones(500))}
+        states.append(judged(ConfidenceMonitor(), poses, alike(n), recent, tick, **seen).state)
+        assert len(recent.places) == (n == 5)
+    assert states == [*["searching"] * 5, "tracking"]
+
+
 def test_it_falls_when_images_stop_to_agree_and_more_with_each():
     told = drive([*range(12), *[39 - n for n in range(18)]])
     assert told[11] > 0.9
