@@ -172,7 +172,7 @@ def _matrix(rows: Any, where: str) -> list[float]:
         flat = [float(number) for row in rows for number in (row if isinstance(row, list) else [row])]
     except (TypeError, ValueError):
         flat = []
-    if len(flat) != 9:
+    if len(flat) != 9 or [flat[3], *flat[6:]] != [0.0, 0.0, 0.0, 1.0]:
         raise UnreadableRecording(f"{where}: 'K' {MATRIX}")
     return flat
 

@@ -80,6 +80,7 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
         ("inner_radius_px: 34", "inner_radius_px: 340", "must be below"),
         ("  width: 640", "  width: [", "not valid YAML"),
         ("497.0", "0", "'K' must be"),
+        ("- - 0.0\n  - 0.0\n  - 1.0", "- - 319.5\n  - 239.5\n  - 1.0", r"'K' must be \[\[fx"),
     ],
 )
 def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) -> None:
