@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage, Tick
+from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage, Tick, counted
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
@@ -138,6 +138,12 @@ class LearnLandmarks(Stage):
             _sigmas(adjusted, poses, mount),
         )
         ctx.fact("landmarks", len(landmarks))
+        if not len(landmarks):
+            seen_features = np.median([len(each) for each in kept_features]) if kept_features else 0.0
+            ctx.warn(
+                f"the tour shows no landmarks: {counted(len(map), 'image')} with {seen_features:.0f} features in the "
+                "median; it is dark or blurred, has one image, or stands still"
+            )
         if len(adjusted.slipped):
             ctx.warn(_slipped(adjusted, map.poses if as_driven is None else as_driven.poses))
         poses = robot_poses(poses, mount)

@@ -1,5 +1,6 @@
 """Summary of a run's confidence where no ground truth says how right it was."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ MIN_WEIGHT = 0.5
 """Share of the belief that a confident estimate holds: more than everything else together."""
 MAX_SIGMA_M = 1.0
 """Largest standard deviation of the position of a confident estimate."""
+JUMP_M, JUMP_DEG = 0.2, 15.0
+"""Median differences from odometry's motion between images, beyond which a confident estimate jumps."""
 
 
 class Confidence(MetricStage):
@@ -43,13 +46,20 @@ class Confidence(MetricStage):
     share of frames in which it is below a half. `path_m` and `odometry_path_m`: lengths of the estimated path and of
     odometry's; `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame
     is from odometry's (medians): jumps of the estimate are large there. `similarity` of the best match, where the
-    comparison has one. Gives nothing where the log has ground truth.
+    comparison has one. Gives nothing where the log has ground truth. Warns of a confident estimate that jumps.
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
         values = confidence_of(drive.last_log)
+        step, turn = (values.get(f"{name}_off_odometry_{unit}", 0.0) for name, unit in (("step", "m"), ("turn", "deg")))
+        mean_step = values.get("odometry_path_m", math.inf) / max(1, len(drive.last_log) - 1)
+        if values.get("probability", 0.0) >= 0.5 and (turn > JUMP_DEG or step > max(JUMP_M, mean_step)):
+            ctx.warn(
+                f"from image to image the estimate moves by {step:.2f} m and {turn:.0f}° (medians) otherwise than "
+                "odometry, however sure it is: are all images of one camera, and in the order of the drive?"
+            )
         shown = (
             "probability",
             "doubtful_share",

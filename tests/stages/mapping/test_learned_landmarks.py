@@ -56,6 +56,13 @@ def test_only_images_that_became_references_are_used() -> None:
     assert some.landmarks.descriptors.tobytes() == alone.landmarks.descriptors.tobytes()
 
 
+def test_a_tour_of_one_image_is_warned_of() -> None:
+    poses, ctx, events = tour_poses()[:1], Context("landmarks"), [ReferenceEvent(0, "far")]
+    words = LearnVisualWords(words=300).step(Context("words"), seen_along(poses), events).words
+    assert not LearnLandmarks().step(ctx, seen_along(poses), events, graph_of(poses), words).map.landmarks.points.size
+    assert "the tour shows no landmarks: 1 image with" in ctx.warnings[0]
+
+
 def test_next_to_nothing_agrees_in_the_images_of_a_mirrored_camera() -> None:
     poses = tour_poses()
     mirrored = [replace(each, bearings=each.bearings * [1.0, -1.0, 1.0]) for each in seen_along(poses)]

@@ -90,6 +90,19 @@ def test_the_last_log_counts_and_its_estimates_against_odometry_s_turns():
     assert (values["confident_share"], values["first_confident_frame"]) == (1.0, 0)
 
 
+@pytest.mark.parametrize(("heading", "step", "confidence", "warned"), [
+    (0.0, 1.0, 0.9, False), (3.1, 1.0, 0.9, True), (0.2, 1.0, 0.9, False), (3.1, 1.0, 0.4, False),
+    (0.0, 2.5, 0.9, True),
+])  # fmt: skip
+def test_a_sure_estimate_that_jumps_against_odometry_is_warned_of(
+    heading: float, step: float, confidence: float, warned: bool
+):
+    estimates = [estimate(step * n, 0.1, 0.9, 0.0, heading * (n % 2)) for n in range(4)]
+    ctx = Context("confidence")
+    Confidence().step(ctx, dataclasses.replace(blind(estimates, METRE_BY_METRE), confidence=np.full(4, confidence)))
+    assert [("moves by" in warning) for warning in ctx.warnings] == [True] * warned
+
+
 def test_one_estimate_has_no_motion_to_compare():
     motion, last = [None, (3.0, 4.0, 0.0)], estimate(3.0, 0.5, 0.9)
     values = told(blind([None, last], motion))
