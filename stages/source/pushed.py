@@ -17,6 +17,7 @@ from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
 from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.opening import ring_found_in
+from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.values.command import Command
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, MAX_PIXELS, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
@@ -36,6 +37,8 @@ MAX_READINGS = 100_000
 MAX_MOTION_M = 1000.0
 """Largest motion between two images, m: more than any robot drives unseen. A drive that begins elsewhere is a
 `new_log`."""
+LIMITS = MotionLimits()
+"""Largest speeds of a robot that are not warned of."""
 
 
 class PushedFrame(NamedTuple):
@@ -164,6 +167,13 @@ class PushedSource(Source):
             raise BadInput(
                 f"step: {driven:g} m since the image before, expected at most {MAX_MOTION_M:g}; "
                 "leave it out, or start a new log with new_log=True"
+            )
+        seconds = 1.0 if frame.stamp is None else (stamp - position.stamp) / 1e9
+        turned = 0.0 if motion is None or first else abs(float(motion[2]))
+        if driven > LIMITS.speed * seconds or turned > LIMITS.turn * seconds:
+            ctx.warn(
+                f"a motion of {driven:.3g} m and {turned:.3g} rad in {seconds:.3g} s is faster than robots are: "
+                "are these metres and radians since the image before?"
             )
         measured = rows["motion"] is not None or rows["odometry"] is not None
         if measured:

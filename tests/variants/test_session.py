@@ -231,7 +231,9 @@ def test_motion_that_is_needed_and_missing_is_said_once_and_counted(recording, c
         warnings.simplefilter("always")
         session.step(image=recording.image(1))
         session.step(image=recording.image(2))
+        session.step(image=recording.image(3), motion=(0.1, 0.0, 20.0))  # degrees
     assert sum("came without motion, which" in str(warning.message) for warning in said) == 1
+    assert sum("20 rad in 1 s is faster than robots are" in str(warning.message) for warning in said) == 1
     assert session.close().manifest["dropped"]["source.no_motion"]["count"] == 2
 
 
