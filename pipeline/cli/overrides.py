@@ -118,6 +118,9 @@ def _how_to_write(word: str) -> str:
             "quotes hold several words together: type each by itself, name=value name=value; one value with = in it "
             f"stands in quotes within quotes: '{word.partition('=')[0]}=\"…\"'"
         )
+    name, _, value = word.partition("=")
+    if re.fullmatch(r"\+{0,2}[\w./@]+", name) and re.fullmatch(r"[^'\"\\$[{][^'\"\\$]*", value):
+        return f"write quotes within quotes: \"{name}='{value}'\""
     return "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
 
 

@@ -26,6 +26,10 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["++=x"], "++=x: there is no name behind ++: type ++name=value"),
         (["~"], "~: there is no name behind ~: type ~name=value"),
         (["a+=b"], "a+=b: cannot be read\n      write name=value"),
+        (
+            ["log=ümlaut.mcap"],
+            "log=ümlaut.mcap: cannot be read\n      write quotes within quotes: \"log='ümlaut.mcap'\"",
+        ),
         (["\u2013help"], "\u2013help: this begins with a typographic dash; type --help"),
         (["check", "\u2014config-dir", "my"], "type --config-dir"),
         (["log=\u201ca.mcap\u201d"], "these are typographic quotes; type ' or \" in their place"),
