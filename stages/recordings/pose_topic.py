@@ -11,7 +11,7 @@ from omninav.stages.geometry.arrays import Array
 
 from .plausibility import MotionLimits, believed, without_jumps
 from .stamps import Stamps
-from .topic_recording import Feed, in_order
+from .topic_recording import Feed, in_order, require_stamps
 
 Rows = npt.NDArray[np.int64]
 MAX_STAMP = 2**63 - 1
@@ -49,6 +49,9 @@ class PoseTopic:
         `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
         """
         poses, stamps = np.array(self._poses).reshape(-1, 3), np.array(self._stamps, np.int64)
+        if not jumps:
+            cure = ", or type topics.odometry=null to do without"
+            require_stamps(name, self.topic, "messages", stamps, cure)
         kept = in_order(feed, name, self.topic, stamps, np.array(self._log_times, np.int64))
         stamps, poses = stamps[kept], poses[kept]
         rows, begun, gaps = believed(stamps, poses, limits)

@@ -18,11 +18,13 @@ from omninav.stages.values.scan import Scan
 
 from .decode_ahead import DecodeAhead
 from .messages import scan_of
-from .recording import checked_image
+from .recording import UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 
 STALE = 1_000_000_000
 """Nanoseconds after which range readings say nothing any more."""
+UNSTAMPED = 0.9
+"""Share of a topic's messages with one stamp in common from which on its driver counts as one that sets none."""
 
 
 class Feed(Protocol):
@@ -63,6 +65,18 @@ def in_order(
     for stamp in stamps[kept[apart]]:
         feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {stamp} ns")
     return order[kept[~apart]]
+
+
+def require_stamps(name: str, topic: str, what: str, stamps: Stamps, cure: str = "") -> None:
+    """Raise `UnreadableRecording` where nearly all of a topic's messages have one stamp."""
+    values, counts = np.unique(stamps, return_counts=True)
+    if len(stamps) > 1 and (most := counts.max()) >= UNSTAMPED * len(stamps):
+        at = f"{values[counts.argmax()] / 1e9:.3f} s"
+        raise UnreadableRecording(
+            f"{name}: {topic}: {most:,} of its {len(stamps):,} {what} are stamped {at} "
+            "(the driver sets no header stamp), and log times are no substitute; "
+            f"record with a driver that stamps them{cure}"
+        )
 
 
 class TopicRecording:

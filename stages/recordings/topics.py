@@ -23,7 +23,7 @@ from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
-from .topic_recording import Feed, TopicRecording, in_order
+from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 from .transforms import TransformTopic
 
 SET_BACK_S = 10.0
@@ -76,6 +76,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     if transforms is not None:
         transforms.require(name, feed.topics.get(transforms.topic, ""))
     image_topic = _image_topic(name, feed, topics, records)
+    require_stamps(name, image_topic, "images", np.array([record.stamp for record in records[image_topic]], np.int64))
     odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
     truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
     frames = _in_order(feed, name, image_topic, records[image_topic], "duplicate_frame")

@@ -272,6 +272,18 @@ def test_a_message_that_cannot_be_is_counted_and_costs_only_itself(
     assert np.all(np.diff(recording.stamps) > 0)
 
 
+@pytest.mark.parametrize(("topic", "said"), [(IMAGE, "20 of its 20 images"), (ODOMETRY, "200 of its 201 messages")])
+def test_messages_of_a_driver_that_sets_no_stamp_are_refused(tmp_path: Path, topic: str, said: str) -> None:
+    @only(topic)
+    def unstamped(made: Made, number: int) -> list[Made]:
+        if topic == IMAGE or number:
+            made.content.header.stamp.sec, made.content.header.stamp.nanosec = 0, 0
+        return [made]
+
+    with refused(f"log.mcap: {topic}: {said} are stamped 0.000 s"):
+        open_recording(str(write_mcap(tmp_path / "log.mcap", messages(unstamped))))
+
+
 def test_undecodable_cut_off_and_blank_images_are_left_out_when_met(tmp_path: Path) -> None:
     bad = {
         3: b"no picture",
