@@ -14,7 +14,7 @@ from omninav.stages.geometry.arrays import Array
 from .plausibility import MotionLimits, believed
 from .positions import track_directions
 from .recording import Recording, UnreadableRecording
-from .stamps import Stamps, ascending_rows, poses_near
+from .stamps import Stamps, ascending_rows, poses_near, within
 from .tables import (
     ANGLES,
     LENGTHS,
@@ -85,7 +85,13 @@ def truth_from(
     likely = believed(stamps, poses, limits).rows
     shifted = recording.stamps + round(clock_offset_s * 1e9)
     truth = poses_near(stamps[likely], poses[likely], shifted, max_gap_s) if len(likely) > 1 else None
+    unlikely = len(stamps) - len(likely)
+    fast = f"of {len(stamps):,} beyond {limits.speed:g} m/s or {limits.turn:.3g} rad/s (nodes.source.limits)"
+    if too_fast := 2 * unlikely > len(stamps):
+        fast += "; are they millimetres? A TUM file is in metres, a CSV's columns may be x_mm and y_mm"
     if truth is None or not np.isfinite(truth).any():
+        if too_fast and within(shifted, stamps).any():
+            raise UnreadableRecording(f"{file}: {counted(unlikely, 'pose')} {fast}")
         raise UnreadableRecording(
             f"{file}: none of the images of {recording.name} has a pose in it: its times are {_span(stamps)}, "
             f"the images' {_span(shifted)}; clocks that differ: "
@@ -95,7 +101,7 @@ def truth_from(
     for kind, number, noun, what in (
         ("bad_truth_row", sum(lost.values()), "row", f"left out: {_listed(lost)}"),
         ("impossible_pose", impossible, "orientation", NO_ROTATION),
-        ("impossible_motion", len(stamps) - len(likely), "pose", "not believed (nodes.source.limits)"),
+        ("impossible_motion", unlikely, "pose", fast),
         ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", far),
     ):
         if number:

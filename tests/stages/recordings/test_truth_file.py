@@ -169,6 +169,20 @@ def test_clocks_that_do_not_meet_are_said_with_both_spans(tmp_path: Path) -> Non
         list(ticks(LogSource(log=log, truth=str(tum(tmp_path / "truth.tum", 0.0))), Context("source")))
 
 
+@pytest.mark.parametrize("still", [0, 50])
+def test_a_track_too_fast_for_a_robot_is_said_with_its_limit_and_perhaps_its_unit(tmp_path: Path, still: int) -> None:
+    rows = [f"{START / 1e9 + at:.3f} {1000 * max(n - still, 0)} 0 0 0 0 0 1" for n, at in enumerate(SECONDS)]
+    (tmp_path / "truth.tum").write_text("\n".join(rows))
+    log, ctx = str(write_mcap(tmp_path / "log.mcap")), Context("source")
+    source, said = LogSource(log=log, truth=str(tmp_path / "truth.tum")), "of 101 beyond 15 m/s or 12.6 rad/s"
+    if still:  # the part that stands still is believed
+        list(ticks(source, ctx))
+        assert said in ctx.details["impossible_motion"]
+        return
+    with refused(f"truth.tum: 101 poses {said}.*; are they millimetres"):
+        list(ticks(source, ctx))
+
+
 def replaced(kind: str, fields: str) -> Iterator[Made]:
     def change(made: Made) -> list[Made]:
         if made.topic != TRUTH:
