@@ -103,12 +103,10 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         stamps = stamps - view.delay_ns  # without a track there is nothing to be late against
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
-        keep = _seen_within(feed, name, "outside_odometry", stamps, odometry.stamps, topics.odometry)
+        keep = _seen_within(feed, name, "odometry", stamps, odometry.stamps, topics.odometry)
     elif truth is not None:
-        keep = _seen_within(feed, name, "no_position", stamps, truth.stamps, topics.truth)
+        keep = _seen_within(feed, name, "truth", stamps, truth.stamps, topics.truth)
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
-    if not frames:
-        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({_losses(feed)})")
     recording = TopicRecording(
         name=name,
         camera=view,
@@ -261,12 +259,18 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
     return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
 
 
-def _seen_within(feed: Feed, name: str, kind: str, stamps: Stamps, times: Stamps, topic: str | None) -> Bools:
-    """Which images lie in the time of a topic; the others are counted as lost."""
-    keep = within(stamps, times)
-    first, last = times[[0, -1]] / 1e9
+def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps, topic: str | None) -> Bools:
+    """Which images lie in the time of a topic; the others are counted as lost. Raises `UnreadableRecording` if all."""
+    keep, kind = within(stamps, times), {"odometry": "outside_odometry", "truth": "no_position"}[role]
+    span = "from {:.3f} to {:.3f} s".format(*times[[0, -1]] / 1e9)
     for stamp in stamps[~keep]:
-        feed.drop(kind, f"{name}: image at {stamp / 1e9:.3f} s, but {topic} is from {first:.3f} to {last:.3f} s")
+        feed.drop(kind, f"{name}: image at {stamp / 1e9:.3f} s, but {topic} is {span}")
+    if not keep.any():
+        images = "from {:.3f} to {:.3f} s".format(*stamps[[0, -1]] / 1e9)
+        raise UnreadableRecording(
+            f"{name}: no image can be used ({_losses(feed)}): images are {images}, {topic} is {span}; "
+            f"record both by one clock, or type topics.{role}=null to do without"
+        )
     return keep
 
 

@@ -326,6 +326,13 @@ def test_images_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
     assert recording.dropped == {"outside_odometry": FRAMES - len(recording.stamps)}
 
 
+@pytest.mark.parametrize(("gone", "role"), [(TRUTH, "odometry"), (ODOMETRY, "truth")])
+def test_clocks_without_a_common_moment_are_said_with_both_spans(tmp_path: Path, gone: str, role: str) -> None:
+    made = (later(m, 3600.0) if m.topic == IMAGE else m for m in messages() if m.topic != gone)
+    with refused(rf"images are from 1700003600\.267 to .* is from 1700000000\.000 to .* type topics\.{role}=null"):
+        open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+
+
 def test_truth_that_ends_early_leaves_images_without_truth_and_without_odometry_out(tmp_path: Path) -> None:
     made = [m for m in messages() if m.topic != TRUTH or m.stamp <= LAST]
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap", iter(made))))
