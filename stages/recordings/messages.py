@@ -26,6 +26,8 @@ MIN_SCAN_STEP = 1e-4
 """Smallest angle between two ranges of a scan, radians: below that of any scanner."""
 LEVELS_OF_A_BLANK = 2
 """A constant image may differ by this much after JPEG compression (rounding of one level to either side)."""
+ALIGNMENTS = (4, 8, 16, 32, 64, 128)
+"""Numbers of bytes to a multiple of which a driver may fill up the rows of a raw image."""
 
 _AS_BGR = {
     "bgr8": (3, None),
@@ -113,6 +115,9 @@ def _raw_pixels(message: Any) -> Pixels:
     data: Bytes = np.frombuffer(bytes(message.data), np.uint8)
     if width < 1 or height < 1 or step < width * channels or data.size < height * step:
         raise Undecodable(f"{data.size} bytes for {width} x {height} pixels of {message.encoding}")
+    padded = {-(-width * channels // bytes_) * bytes_ for bytes_ in ALIGNMENTS}
+    if step % width == 0 and step // width != channels and step not in padded:
+        raise Undecodable(f"rows hold {step // width} bytes a pixel, its encoding {message.encoding} has {channels}")
     rows = data[: height * step].reshape(height, step)[:, : width * channels]
     raw = np.ascontiguousarray(rows).reshape((height, width, channels) if channels > 1 else (height, width))
     return np.asarray(raw if conversion is None else cv2.cvtColor(raw, conversion), dtype=np.uint8)

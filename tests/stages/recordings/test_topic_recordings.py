@@ -421,6 +421,21 @@ def test_raw_images_are_read_with_their_row_padding(encoding: str) -> None:
             pixels_of(raw_image(encoding, cut))
 
 
+@pytest.mark.parametrize(
+    ("encoding", "width", "step", "bytes_"),
+    [("mono8", 48, 144, 3), ("bgr8", 160, 640, 4), ("mono8", 48, 96, 2), ("mono8", 64, 128, 0), ("bgr8", 12, 48, 0)],
+)
+def test_rows_of_another_number_of_channels_are_refused_and_padded_ones_read(
+    encoding: str, width: int, step: int, bytes_: int
+) -> None:
+    message = raw_image(encoding, np.zeros((16, step), np.uint8), width)
+    if not bytes_:
+        assert pixels_of(message).shape == (16, width, 3)
+        return
+    with pytest.raises(Undecodable, match=f"rows hold {bytes_} bytes a pixel, its encoding {encoding} has"):
+        pixels_of(message)
+
+
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
 def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
     colour = {"b": 200, "g": 100, "r": 20}
@@ -429,9 +444,9 @@ def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
     assert (pixels[4:12, 4:44] == (200, 100, 20)).all()
 
 
-def raw_image(encoding: str, rows: np.ndarray) -> object:
-    """A message of 48 x 16 pixels, whose rows may be longer."""
-    fields = {"height": 16, "width": 48, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
+def raw_image(encoding: str, rows: np.ndarray, width: int = 48) -> object:
+    """A message of 16 rows of pixels, which may be longer than its width."""
+    fields = {"height": 16, "width": width, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
     return make_message("sensor_msgs/msg/Image", fields)
 
 
