@@ -96,6 +96,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     view = mounted.camera
     if (width, height) != (view.width, view.height_px):
         hint = f"correct `image:` in {options.camera}" if options.camera else "give camera=PATH/camera.yaml"
+        if width * view.height_px == height * view.width:
+            hint = f"they are {width / view.width:.3g} times as large: the description is of another resolution; {hint}"
         raise UnreadableRecording(
             f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )

@@ -370,7 +370,9 @@ def test_every_user_error_is_one_line_that_names_the_log(tmp_path: Path) -> None
     nothing = write_mcap(tmp_path / "nothing.mcap", (m for m in messages() if m.topic != IMAGE))
     no_camera = write_mcap(tmp_path / "camera.mcap", camera=None)
     wrong_camera = write_mcap(tmp_path / "wrong.mcap", camera=CAMERA.replace(b"48", b"64"))
+    halved = write_mcap(tmp_path / "half.mcap", camera=CAMERA.replace(b"48", b"96").replace(b"16", b"32"))
     for log, said in (
+        (halved, "says 96 x 32; they are 0.5 times as large: the description is of another resolution; give camera="),
         (tmp_path / "text.bag", "not a readable bag"),
         (tmp_path / "gone.mcap", "no such file"),
         (nothing, "no images"),
