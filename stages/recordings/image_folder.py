@@ -133,7 +133,8 @@ class ImageFolder(Losses):
         frames = self._description.frames
         if table is None:
             pattern = frames.images.replace("{which}", self._description.which)
-            found = self._matching(pattern) if pattern else []
+            matching = self._matching(pattern) if pattern else []
+            found = [path for path in matching if not path.name.startswith(".")]  # a trash, or another system's notes
             if not found:
                 raise UnreadableRecording(f"{self._folder}: no image fits '{pattern}' (frames.images in {self._where})")
             self._rows = [f"frame {number}" for number in range(len(found))]

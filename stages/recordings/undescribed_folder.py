@@ -39,4 +39,5 @@ def _suffixes(folder: Path) -> Counter[str]:
     """Number of images of each kind in a folder, in the order of their names."""
     if not folder.is_dir():
         return Counter()
-    return Counter(path.suffix for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES)
+    shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
+    return Counter(path.suffix for path in shown if path.suffix.lower() in SUFFIXES)

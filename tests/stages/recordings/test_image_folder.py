@@ -299,6 +299,9 @@ def test_a_folder_of_images_alone_is_taken_in_the_order_of_its_numbers(tmp_path:
     for number in (10, 9, 1):
         cv2.imwrite(str(tmp_path / f"img{number}.png"), picture(number)[:, :32])
     (tmp_path / "thumbnail.JPG").write_bytes(b"")
+    for number in range(4):
+        (tmp_path / f"._img{number}.jpg").write_bytes(b"a Mac's notes")
+    cv2.imwrite(str(tmp_path / ".img0.png"), picture(0)[:, :32])
     (tmp_path / "notes.txt").write_text("of a walk")
     recording = open_recording(str(tmp_path), rate=4.0)
     assert recording.stamps.tolist() == [0, 250_000_000, 500_000_000]
