@@ -345,7 +345,6 @@ def _in_base_unit(text: str, unit: str) -> Decimal | None:
         raise UnreadableRecording(f"{cut(text)} is not in {' or '.join(family)}")
     value, base = number * family[written], next(name for name in family if family[name] == 1)
     if abs(value) > _MAX_MAGNITUDE[base]:
-        raise OutOfProportion(
-            f"{cut(text)} is out of all proportion, expected at most {_MAX_MAGNITUDE[base]:.0e} {base}"
-        )
+        most = float(_MAX_MAGNITUDE[base] / family[written])
+        raise OutOfProportion(f"{cut(text)} is out of all proportion, expected at most {most:.2g} {written}")
     return value

@@ -133,7 +133,10 @@ def test_a_file_that_begins_with_its_last_pose_is_read_from_its_end(tmp_path: Pa
             "t,x,y\n1700000000000000000,2,3\n",
             "line 2: column 't': .* out of all proportion.* called time_ns, time_us or",
         ),
-        ("1700000000000000000 0 0 0 0 0 0 1\n", "line 1: column 'time': .* times of a TUM file are in seconds"),
+        (
+            "1700000000000000000 0 0 0 0 0 0 1\n",
+            "line 1: column 'time': .* at most 4.6e.09 s; the times of a TUM file are in seconds",
+        ),
         ("1 1 0 0 0 0 0 0\n" * 9, "9 orientations whose quaternion is shorter than"),
     ],
 )
