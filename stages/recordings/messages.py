@@ -116,7 +116,7 @@ def _raw_pixels(message: Any) -> Pixels:
     if width < 1 or height < 1 or step < width * channels or data.size < height * step:
         raise Undecodable(f"{data.size} bytes for {width} x {height} pixels of {message.encoding}")
     padded = {-(-width * channels // bytes_) * bytes_ for bytes_ in ALIGNMENTS}
-    if step % width == 0 and step // width != channels and step not in padded:
+    if step % width == 0 and step // width in {1, 2, 3, 4} - {channels} and step not in padded:
         raise Undecodable(f"rows hold {step // width} bytes a pixel, its encoding {message.encoding} has {channels}")
     rows = data[: height * step].reshape(height, step)[:, : width * channels]
     raw = np.ascontiguousarray(rows).reshape((height, width, channels) if channels > 1 else (height, width))
