@@ -23,7 +23,7 @@ FEW = np.empty((0, 2), np.int64)
 
 
 @functools.cache
-def room(seed: int = 0, number: int = 1300) -> Points:
+def room(seed: int = 0, number: int = 600) -> Points:
     """Points scattered over the room."""
     return Points(np.random.default_rng(seed).uniform([0, 0, 0], [*SIZE, 2.2], (number, 3)))
 

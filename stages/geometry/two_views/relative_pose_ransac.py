@@ -89,11 +89,9 @@ def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, 
     pairs, agreeing = len(first), int(np.count_nonzero(pose.inliers))
     if pairs < 3 or agreeing < 3:
         return math.inf
-    limit = math.sin(threshold) ** 2
-    chance = sum(
-        float(_agree(pose.rotation, pose.translation, first, np.roll(second, shift, axis=0), limit).sum())
-        for shift in range(1, min(pairs, 40))
-    ) / (pairs * (min(pairs, 40) - 1))
+    limit, shifts = math.sin(threshold) ** 2, min(pairs, 40)
+    agreeing_by_chance = _agreeing_shifted(pose.rotation, pose.translation, first, second, limit, shifts)
+    chance = agreeing_by_chance / (pairs * (shifts - 1))
     # At least this many of the other pairs: the tail of a binomial distribution.
     tail = float(betainc(agreeing - 2, pairs - agreeing + 1, max(chance, 1e-6)))
     return 2.0 * pairs * (pairs - 1) * tail
@@ -134,6 +132,15 @@ def _agree(R: Array, t: Array, first: Array, second: Array, limit: float) -> Boo
     for n in range(len(first)):
         agrees[n] = _squares(R, t, first[n], second[n])[0] < limit
     return agrees
+
+
+@compiled(nogil=True)
+def _agreeing_shifted(R: Array, t: Array, first: Array, second: Array, limit: float, shifts: int) -> int:
+    agreeing = 0
+    for shift in range(1, shifts):
+        for n in range(len(first)):
+            agreeing += _squares(R, t, first[n], second[n - shift])[0] < limit
+    return agreeing
 
 
 @compiled(nogil=True)
