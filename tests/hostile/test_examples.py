@@ -1,5 +1,6 @@
 """Files that once made a reader fail, and files of their kinds: each is used as far as it is good, or refused."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.artifact import artifact_bytes, read_artifact
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.source.log import LogSource
+from omninav.stages.values.landmarks import Landmarks
 from omninav.stages.values.maps import ReferenceGraph
 
 HOSTILE = DATA / "hostile"
@@ -28,29 +30,34 @@ def poses_like(poses: np.ndarray) -> bytes:
     return artifact_bytes(map)
 
 
-def landmarks_like(**fields: Any) -> bytes:
-    """A map whose landmarks have these fields, its sums right."""
+def landmarks_like(**fields: Callable[[Landmarks], Any]) -> bytes:
+    """A map whose landmarks have these fields, each made of the right landmarks, its sums right."""
     map = with_few_landmarks()
-    return artifact_bytes(replace(map, landmarks=replace(map.landmarks, **fields)))
+    assert map.landmarks is not None
+    wrong = {name: field(map.landmarks) for name, field in fields.items()}
+    return artifact_bytes(replace(map, landmarks=replace(map.landmarks, **wrong)))
 
 
-FEW = with_few_landmarks().landmarks
-assert FEW is not None
+WRONG: dict[str, Callable[[], bytes]] = {
+    "'poses' has the shape (6,), expected (R, 3)": lambda: poses_like(np.zeros(6)),
+    "'poses' holds nan, expected finite numbers": lambda: poses_like(np.full((6, 3), np.nan)),
+    "'features' has the shape (6, 10, 20), expected (R, segments, bins), R = 5": lambda: poses_like(np.zeros((5, 3))),
+    "'landmarks': 'points' holds nan, expected finite": lambda: landmarks_like(
+        points=lambda few: np.full_like(few.points, np.nan)
+    ),
+    "'words' are of descriptors of 8 numbers": lambda: landmarks_like(
+        descriptors=lambda few: few.descriptors[:, :4].copy()
+    ),
+    "'words': 'words' names a row": lambda: landmarks_like(
+        words=lambda few: replace(few.words, words=few.words.words - np.int32(1))
+    ),
+}
+"""What is said of a map, and what makes its bytes."""
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (poses_like(np.zeros(6)), "'poses' has the shape (6,), expected (R, 3)"),
-        (poses_like(np.full((6, 3), np.nan)), "'poses' holds nan, expected finite numbers"),
-        (poses_like(np.zeros((5, 3))), "'features' has the shape (6, 10, 20), expected (R, segments, bins), R = 5"),
-        (landmarks_like(points=np.full_like(FEW.points, np.nan)), "'landmarks': 'points' holds nan, expected finite"),
-        (landmarks_like(descriptors=FEW.descriptors[:, :4].copy()), "'words' are of descriptors of 8 numbers"),
-        (landmarks_like(words=replace(FEW.words, words=FEW.words.words - np.int32(1))), "'words': 'words' names a row"),
-    ],
-)
-def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path: Path, content: bytes, said: str):
-    (tmp_path / MAP).write_bytes(content)
+@pytest.mark.parametrize("said", WRONG)
+def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path: Path, said: str):
+    (tmp_path / MAP).write_bytes(WRONG[said]())
     with pytest.raises(BadInput) as refused:
         read_artifact(tmp_path / MAP)
     assert said in str(refused.value)
