@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from background_runs import run_here
@@ -30,6 +31,19 @@ gc.set_threshold(50_000)  # as in `omninav`: what pytest has imported is looked 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whole runs first: where a long file is the last one, the other process has nothing to do."""
     items.sort(key=lambda item: item.path.relative_to(ROOT / "tests").parts[0] in ("pipeline", "stages"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `--dist loadfile` files go to processes whole, and those of `contract` to one: they compose the same."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    scheduler = LoadFileScheduling(config, log)
+    of_file = scheduler._split_scope
+    scheduler._split_scope = lambda id: "contract" if id.startswith("tests/contract/") else of_file(id)
+    return scheduler
 
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
