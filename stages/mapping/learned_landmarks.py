@@ -139,7 +139,7 @@ class LearnLandmarks(Stage):
         )
         ctx.fact("landmarks", len(landmarks))
         if not len(landmarks):
-            seen_features = np.median([len(each) for each in kept_features]) if kept_features else 0.0
+            seen_features = np.median([0 if each is None else len(each) for each in kept_features] or [0])
             ctx.warn(
                 f"the tour shows no landmarks: {counted(len(map), 'image')} with {seen_features:.0f} features in the "
                 "median; it is dark or blurred, has one image, or stands still"
