@@ -170,7 +170,7 @@ class PushedSource(Source):
             )
         seconds = 1.0 if frame.stamp is None else (stamp - position.stamp) / 1e9
         turned = 0.0 if motion is None or first else abs(float(motion[2]))
-        if driven > LIMITS.speed * seconds or turned > LIMITS.turn * seconds:
+        if not first and (driven > LIMITS.speed * seconds or turned > LIMITS.turn * seconds):
             ctx.warn(
                 f"a motion of {driven:.3g} m and {turned:.3g} rad in {seconds:.3g} s is faster than robots are: "
                 "are these metres and radians since the image before?"
