@@ -60,14 +60,14 @@ def localised(other_end: OtherEnd) -> str:
     return call(other_end, "is_localized", "std_srvs/srv/Trigger")
 
 
+def is_heard(other_end: OtherEnd) -> bool:
+    other_end.order("matched", TOPICS["/odom"])
+    return bool(other_end.wait("matched"))
+
+
 def drive(other_end: OtherEnd) -> str:
     """Publish the recorded drive until the robot is localised; what the service says then."""
-
-    def is_heard() -> bool:
-        other_end.order("matched", TOPICS["/odom"])
-        return bool(other_end.wait("matched"))
-
-    until(is_heard)
+    until(lambda: is_heard(other_end))
     for message in sorted(LogReader(DRIVE).scan(set(TOPICS)), key=lambda record: record.log_time):
         other_end.publish(TOPICS[message.topic], bytes(message.data))
         if message.topic != "/odom":
@@ -111,6 +111,7 @@ def test_the_node_is_led_through_its_life_and_starts_afresh_after_a_kill(
     assert open_run(tmp_path / "runs/latest").manifest["status"] == "running"
     node.kill()
     until(lambda: open_run(tmp_path / "runs/latest").manifest["status"] == "complete")  # its run has ended well
+    until(lambda: not is_heard(other_end))  # a request is lost that goes to the node that is gone
     start("-p", "autostart_node:=true")
     assert "tracking" in drive(other_end)
     assert change(other_end, DEACTIVATE)
