@@ -43,16 +43,17 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     `folders` are those of `--config-dir`.
     """
     problems, parsed = parsed_words(words)
-    groups = {name: _options(name, folders) for name in _groups(folders)}
+    groups = _groups(folders)
     swaps = [word for word in parsed if word.key_or_group in groups]
-    options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group], folders)]
+    unknown = [[*_unknown_option(word, _options(word.key_or_group, folders), folders)] for word in swaps]
+    options = [problem for found in unknown for problem in found]
     deciding = [word for word in parsed if word.key_or_group in decisive_settings()]
-    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group], folders))]
+    known = [word for word, found in zip(swaps, unknown, strict=True) if not found]
     plain = _plain([*known, *deciding], folders)
     for word in parsed if plain else ():
         # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
         if word not in swaps and not (options and word.key_or_group.startswith(WITHIN_GRAPH)):
-            problems += _unknown_setting(word, plain, list(groups))
+            problems += _unknown_setting(word, plain, groups)
     problems += options
     if not problems and message.startswith(("Ambiguous value", "Sweep parameters")):
         problems = [_several_values(word) for word in parsed if word.is_sweep_override()]
