@@ -69,7 +69,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
         raise BadInput(f"{' '.join(typed)}: experiments run on the command line: omninav {' '.join(typed)}")
     with composed(typed) as config:
         made = Configuration(tuple(typed), complete(config))
-    made.prepared  # noqa: B018 - raises what is wrong with the graph
+    _ = made.prepared  # raises what is wrong with the graph
     return made
 
 

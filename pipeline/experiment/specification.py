@@ -89,7 +89,7 @@ class Claim:
     above: Other | None = None
     not_above: Other | None = None
     lowest: bool = False
-    """Whether the value is `not_above` that of each other condition."""
+    """Asks that the value is `not_above` that of each other condition."""
     among: tuple[str, ...] = ()
     """Factors in which the other conditions of `lowest` differ; by default those of `of`."""
     scale: float = 1.0

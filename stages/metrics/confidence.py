@@ -53,7 +53,7 @@ class Confidence(MetricStage):
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
         values = confidence_of(drive.last_log)
-        step, turn = (values.get(f"{name}_off_odometry_{unit}", 0.0) for name, unit in (("step", "m"), ("turn", "deg")))
+        step, turn = values.get("step_off_odometry_m", 0.0), values.get("turn_off_odometry_deg", 0.0)
         mean_step = values.get("odometry_path_m", math.inf) / max(1, len(drive.last_log) - 1)
         if values.get("probability", 0.0) >= 0.5 and (turn > JUMP_DEG or step > max(JUMP_M, mean_step)):
             ctx.warn(

@@ -52,7 +52,7 @@ WRONG: dict[str, Callable[[], bytes]] = {
         words=lambda few: replace(few.words, words=few.words.words - np.int32(1))
     ),
 }
-"""What is said of a map, and what makes its bytes."""
+"""Makers of maps with wrong content, by what the refusal says."""
 
 
 @pytest.mark.parametrize("said", WRONG)
