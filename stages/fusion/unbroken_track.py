@@ -43,8 +43,9 @@ DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
 class UnbrokenTrackState(State):
     """The pose (3,) that landmarks confirmed last, carried by odometry, and the path on which they did (m).
 
-    `since`: way since then, on which the robot may have been carried as far as `carried`; `against`: way on which
-    landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m). `bearings`
+    `since`: way since then, on which the robot may have been carried as far as `carried` and turned by `turned` (rad);
+    `against`: way on which landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m).
+    `bearings`
     (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
     """
 
@@ -52,6 +53,7 @@ class UnbrokenTrackState(State):
     confirmed: float = 0.0
     since: float = 0.0
     carried: float = 0.0
+    turned: float = 0.0
     against: float = 0.0
     elsewhere: float = 0.0
     moved: Array = field(default_factory=lambda: np.zeros(3))
@@ -61,13 +63,13 @@ class UnbrokenTrackState(State):
     def confirm(self, pose: Array, length: float) -> None:
         """Go on from a pose (3,) that was confirmed over a path of this length (m)."""
         self.pose, self.confirmed = pose.copy(), length
-        self.since, self.carried, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0
+        self.since, self.carried, self.turned, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0, 0.0
 
     def leads_to(self, pose: Array) -> bool:
         """Tells whether a robot that was on the track may be at a pose (3,) by now."""
         away, turned = pose - self.pose, abs(float(wrap(pose[2] - self.pose[2])))
         near = math.hypot(away[0], away[1]) < NEAR[0] + self.carried + DRIFT * self.since
-        return near and turned < NEAR[1] + TURN_DRIFT * self.since
+        return near and turned < NEAR[1] + self.turned + TURN_DRIFT * self.since
 
 
 class UnbrokenTrack(Stage):
@@ -145,12 +147,13 @@ class UnbrokenTrack(Stage):
         if agrees and (not state.confirmed or state.leads_to(poses[0])):
             state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_), False
-        how = carried(before, now, camera_step(moved, mount)) if len(before[0]) else Carried(math.inf, False)
+        how = carried(before, now, camera_step(moved, mount)) if len(before[0]) else Carried(math.inf)
         state.carried = max(state.carried, how.at_most)
+        state.turned += how.turned
         # a narrow view turns out of what it saw
         surely = how.surely and driven < FREQUENT[0] and abs(float(moved[2])) < FREQUENT[1]
         if math.isinf(state.carried):
-            state.confirmed, state.carried = 0.0, 0.0
+            state.confirmed, state.carried, state.turned = 0.0, 0.0, 0.0
         if agrees:  # the belief gave way, and may have been right before
             state.elsewhere += driven
             if state.elsewhere >= state.confirmed:

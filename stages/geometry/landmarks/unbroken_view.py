@@ -40,10 +40,12 @@ narrow aisle 21 of 31 of two images 0.45 m apart did; of 2,367 images 1.5 m and 
 
 
 class Carried(NamedTuple):
-    """A bound, `at_most`, of how far (m) from where odometry says a robot was carried, and whether it `surely` was."""
+    """A bound, `at_most`, of how far (m) from where odometry says a robot was carried, whether it `surely` was, and by
+    how much it was `turned` otherwise (rad)."""
 
     at_most: float
-    surely: bool
+    surely: bool = False
+    turned: float = 0.0
 
 
 def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array) -> Carried:
@@ -56,13 +58,15 @@ def carried(before: tuple[Array, Bytes], now: tuple[Array, Bytes], motion: Array
     second = np.ascontiguousarray(now[0][pairs.second])
     fitting = _fitting_at_best(first, second, motion, TOLERANCE)
     if _fits(fitting, len(first)):
-        return Carried(0.0, False)
+        return Carried(0.0)
     if len(first) < SAME_SURROUNDINGS and fitting < MAX_FITTING:
         seen = min(len(before[0]), len(now[0]))
         return Carried(math.inf, seen >= MIN_FEATURES and len(first) < MIN_MATCHED * seen)
     azimuths = [np.arctan2(each[:, 1], each[:, 0]) for each in (first, second)]
     turned = np.exp(1j * (azimuths[1] - azimuths[0] + motion[2])).mean()  # of far points: the turn odometry missed
-    return Carried(SURROUNDINGS_M if turned.real > SAME_HEADING else math.inf, False)
+    if turned.real <= SAME_HEADING:
+        return Carried(math.inf)
+    return Carried(SURROUNDINGS_M, turned=abs(float(np.angle(turned))))
 
 
 def of_one_place(one: tuple[Array, Bytes], other: tuple[Array, Bytes], turn: float) -> bool:

@@ -50,6 +50,7 @@ def driven(
     twin_from: int,
     jump_at: int | None = None,
     turned_at: int | None = None,
+    turn: float = math.pi,
     probability: float = 0.96,
     scale: float = 0.5,
     dark_at: int | None = None,
@@ -57,14 +58,14 @@ def driven(
     twin: np.ndarray = TWIN,
 ) -> list:
     """Drives ahead, and returns the stage's output for each image. From image `twin_from` on landmarks show a `twin`
-    so far away; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned, which odometry does not
-    measure; the one of `dark_at` shows nothing."""
+    so far away; at `jump_at` the robot is carried 40 m ahead, and at `turned_at` turned by `turn`, which odometry does
+    not measure; the one of `dark_at` shows nothing."""
     believed = np.column_stack([step * np.arange(IMAGES), np.zeros(IMAGES), np.full(IMAGES, 0.1)])
     poses = believed.copy()
     if jump_at is not None:
         poses[jump_at:, 0] += 40.0
     if turned_at is not None:
-        poses[turned_at:, 2] += math.pi
+        poses[turned_at:, 2] += turn
     images, state, stage, out = seen_from(poses), UnbrokenTrackState(), UnbrokenTrack(), []
     if dark_at is not None:
         images[dark_at] = NOTHING
@@ -83,6 +84,12 @@ def test_a_hall_that_looks_the_same_is_left_out_for_as_long_a_way_as_the_track_w
     assert [each.fix is not None for each in out] == [True] * 10 + [False] * 8 + [True] * 6  # 9 x 0.3 m before
     assert all(each.track.unbroken and not each.belief.recovery_particles for each in out[10:18])
     assert out[-1].belief.recovery_particles == 1
+
+
+def test_landmarks_count_that_show_the_turn_which_odometry_missed():
+    swung = np.array([0.0, 0.0, 0.7])
+    assert all(each.fix is not None for each in driven(10, turned_at=10, turn=0.7, twin=swung))
+    assert not any(each.fix is not None for each in driven(10, twin=swung)[10:14])
 
 
 def test_the_next_of_shelves_that_look_the_same_is_left_out():

@@ -31,9 +31,11 @@ def test_what_shows_too_few_features_or_another_room_is_of_no_place() -> None:
     assert not alike(seen_from(room(), HERE), seen_from(room(seed=5), HERE), 0.0)
 
 
-@pytest.mark.parametrize(("fitting", "expected"), [(14, (math.inf, True)), (15, (5.0, False)), (25, (0.0, False))])
+@pytest.mark.parametrize(
+    ("fitting", "expected"), [(14, (math.inf, True, 0.0)), (15, (5.0, False, 0.0)), (25, (0.0, False, 0.0))]
+)
 def test_fifteen_matches_that_fit_odometry_tell_of_the_same_surroundings(
-    fitting: int, expected: tuple[float, bool]
+    fitting: int, expected: tuple[float, bool, float]
 ) -> None:
     motion = np.array([0.3, 0.0, 0.0])
     here, there = (seen_from(room(number=800), pose) for pose in (HERE, compose(HERE, motion)))
@@ -43,4 +45,14 @@ def test_fifteen_matches_that_fit_odometry_tell_of_the_same_surroundings(
     others = np.tile(there.descriptors[:1], (len(there.bearings), 1))  # of which none is clearly the most similar
     descriptors = np.concatenate([there.descriptors[both], others])
     found = carried((here.bearings, here.descriptors), (bearings, descriptors), motion)
-    assert found == expected
+    assert found[:2] == expected[:2]
+    assert found.turned == pytest.approx(expected[2], abs=0.03)
+
+
+@pytest.mark.parametrize("turn", [-30.0, 40.0])
+def test_a_turn_that_odometry_missed_is_measured_from_both_images(turn: float) -> None:
+    there = seen_from(room(), compose(HERE, np.array([0.3, 0.0, math.radians(turn)])))
+    here = seen_from(room(), HERE)
+    found = carried((here.bearings, here.descriptors), (there.bearings, there.descriptors), np.array([0.3, 0.0, 0.0]))
+    assert found.at_most == 5.0
+    assert math.degrees(found.turned) == pytest.approx(abs(turn), abs=3.0)
