@@ -28,6 +28,10 @@ from omninav.stages.camera.model import Camera, Key, camera_models, require_sigh
 from .recording import UnreadableRecording
 
 Keys = dict[str, set[str]]
+OTHER_SIZE = 1.5
+"""Ratio of an image's centre to half its sides above which it is of another resolution."""
+SAME_SIDES = 0.1
+"""Relative difference up to which the ratios of columns and rows agree."""
 MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of a pixel or more"
 
 
@@ -54,6 +58,7 @@ def camera_from(content: Any, where: str, size: tuple[int, int] | None = None) -
     try:
         camera = model(**{name: value for name, value in found.items() if value is not None})
         require_sight(camera)
+        _require_own_centre(camera)
     except (ValueError, BadInput) as error:
         raise UnreadableRecording(f"{where}: {error}") from None
     return camera
@@ -123,6 +128,24 @@ def _annotations(kind: Any) -> list[Any]:
     if get_origin(kind) is Annotated:
         return list(arguments[1:])
     return [extra for argument in arguments if get_args(argument) for extra in _annotations(argument)]
+
+
+def _require_own_centre(camera: Camera) -> None:
+    """Raise ValueError where the image's centre is that of another resolution, or its coordinates are exchanged."""
+    x, y = getattr(camera, "centre_x", None), getattr(camera, "centre_y", None)
+    if x is None or y is None:
+        return
+    width, height = camera.width, camera.height_px
+    scale, sides = x / width + y / height, width / height
+    found = f"the centre ({x:g}, {y:g}) of an image of {width} x {height}"
+    same = abs(x / width - y / height) < SAME_SIDES * scale
+    if same and not 1.0 / OTHER_SIZE < scale < OTHER_SIZE:
+        raise ValueError(
+            f"{found} is that of one {scale:.2g} times as large; give centre and focal lengths of its size"
+        )
+    exchanged = max(abs(2.0 * x / height - 1.0), abs(2.0 * y / width - 1.0)) < SAME_SIDES
+    if exchanged and not 1.0 - 2.0 * SAME_SIDES < sides < 1.0 + 2.0 * SAME_SIDES:
+        raise ValueError(f"{found} has its column and row exchanged: expected ({y:g}, {x:g})")
 
 
 def _model(content: dict[str, Any], where: str) -> type[Camera]:

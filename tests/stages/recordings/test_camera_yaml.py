@@ -1,6 +1,7 @@
 """camera.yaml: read, written back, and refused by key."""
 
 import dataclasses
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -87,6 +88,24 @@ def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) 
     assert old in HOUSE
     with refused(said):
         parse_camera(HOUSE.replace(old, new, 1), "camera.yaml")
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "said"),
+    [
+        (639.0, 479.0, r"the centre \(639, 479\) of an image of 640 x 480 is that of one 2 times as large"),
+        (160.0, 120.0, "is that of one 0.5 times as large; give centre and focal lengths of its size"),
+        (239.5, 319.5, r"has its column and row exchanged: expected \(319\.5, 239\.5\)"),
+        (350.0, 200.0, ""),
+    ],
+)
+def test_a_centre_of_another_image_or_exchanged_is_refused(x: float, y: float, said: str) -> None:
+    content = {
+        "projection": "perspective", "image": {"width": 640, "height": 480}, "height": 0.9,
+        "K": [[497.0, 0.0, x], [0.0, 497.0, y], [0.0, 0.0, 1.0]],
+    }  # fmt: skip
+    with refused(said) if said else nullcontext():
+        parse_camera(yaml.safe_dump(content), "camera.yaml")
 
 
 @pytest.mark.parametrize(
