@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, write_whole
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State, Tick, write_whole
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array
@@ -141,7 +141,12 @@ class RobotDriver(Stage):
 
     def _begin(self, robot: RobotDriverState, tick: Tick, camera: Camera) -> None:
         if self.camera_file is not None:
-            write_whole(Path(self.camera_file), write_camera(camera))
+            path, text = Path(self.camera_file), write_camera(camera)
+            if path.exists() and path.read_bytes() != text.encode():
+                raise BadInput(
+                    f"camera={path}: it is there, and not this world's camera; type another name, or delete it"
+                )
+            write_whole(path, text)
         robot.first = robot.first or tick.stamp
         self._started = self._free = time.monotonic() - (tick.stamp - robot.first) / 1e9
         self._offset = time.time_ns() - tick.stamp

@@ -43,12 +43,14 @@ def _read(path: Path) -> SavedMap:
 
 
 def target(out: str, sources: Sequence[SavedMap]) -> Path:
-    """The file to write. Raises BadInput where it is no `.omap`, or one of the maps that are read."""
+    """The file to write. Raises BadInput where it is no `.omap`, a map that is read, or one learned from a log."""
     path = user_path(out)
     if path.suffix != ".omap":
         raise BadInput(f"out={out}: a map is written to a file that ends in .omap; type out=NAME.omap")
     if path.resolve() in (source.path.resolve() for source in sources):
         raise BadInput(f"out={out}: this map is read; type another name")
+    if path.exists() and "made_by" not in read_header(path)["facts"]:
+        raise BadInput(f"out={out}: it is there, and was not made of other maps; type another name, or delete it")
     return path
 
 

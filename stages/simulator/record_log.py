@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline import Context, counted
+from omninav.pipeline import BadInput, Context, counted
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .config import Kidnapping, WorldConfig
@@ -33,14 +33,16 @@ def record_log(
     """Write a simulated drive, or one on each of several days: a log, camera.yaml, a floor plan, an occupancy grid.
 
     Floor plan and grid are those of the first day. The same arguments give the same bytes. Raises
-    `UnreadableRecording` for an unknown route.
+    `UnreadableRecording` for an unknown route, and `BadInput` where the file is a log that was not simulated.
     """
+    camera, floor = path.with_suffix(".camera.yaml"), path.with_suffix(".plan.png")
+    if path.exists() and not floor.exists():
+        raise BadInput(f"log={path}: it is there, and was not simulated; type another name, or delete it")
     days = in_order(day)
     ctx.status(f"building {world.name} and planning {route}")
     drives = [SimulatedRecording(world, route, day, kidnappings) for day in days]
     ctx.status("rendering the first image (a minute if the renderer has to be compiled)")
     record(drives, path, progress=ctx.progress)
-    camera, floor = path.with_suffix(".camera.yaml"), path.with_suffix(".plan.png")
     camera.write_text(write_camera(drives[0].camera), encoding="utf-8")
     built = World(world, days[0])
     driven = {f"{route}, day {drive.day}": drive.truth for drive in drives}

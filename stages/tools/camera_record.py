@@ -38,6 +38,8 @@ class RecordCamera(Tool):
         path = user_path(self.out)
         if path.suffix != ".mcap":
             raise BadInput(f"record: out={self.out:.100} is no .mcap; type out=camera.mcap")
+        if path.exists():
+            raise BadInput(f"record: {path} is there; type another name, or delete it")
         device = CameraDevice(str(self.device))
         ctx.status("recording; Ctrl-C ends it")
         try:

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.live import publish_truth, robot_driver
 from omninav.stages.live.robot_driver import CameraStop, ClockJump, RobotDriver, RobotDriverState
@@ -92,6 +92,11 @@ def test_the_camera_fails_and_the_clock_leaps_when_they_are_told_to(wire):
 def test_the_camera_is_described_in_a_file(wire, tmp_path):
     Drive(camera_file=str(tmp_path / "robot.camera.yaml")).tick()
     assert read_camera(tmp_path / "robot.camera.yaml").height == CAMERA.height
+    Drive(camera_file=str(tmp_path / "robot.camera.yaml")).tick()
+    (tmp_path / "mine.yaml").write_text("projection: donut")
+    with pytest.raises(BadInput, match="it is there, and not this world's camera"):
+        Drive(camera_file=str(tmp_path / "mine.yaml")).tick()
+    assert (tmp_path / "mine.yaml").read_text() == "projection: donut"
 
 
 def test_in_real_time_a_tick_takes_its_time(wire, monkeypatch):

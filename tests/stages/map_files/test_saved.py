@@ -31,9 +31,14 @@ def test_a_map_made_of_others_says_what_their_files_agree_on_and_which_they_were
     both = read_saved(str(tmp_path / "both.omap"))
     refuse_other_views([*both, sources[0], *both])  # it says nothing of its features
     assert target(str(tmp_path / "new.omap"), sources) == tmp_path / "new.omap"
-    for wrong, said in (("new.zip", "ends in .omap"), ("other.omap", "this map is read")):
+    assert target(str(tmp_path / "both.omap"), sources) == tmp_path / "both.omap"
+    for wrong, said, read in (
+        ("new.zip", "ends in .omap", sources),
+        ("other.omap", "this map is read", sources),
+        ("other.omap", "it is there, and was not made of other maps", sources[:1]),
+    ):
         with pytest.raises(BadInput, match=said):
-            target(str(tmp_path / wrong), sources)
+            target(str(tmp_path / wrong), read)
 
 
 @pytest.mark.parametrize(("given", "least", "most"), [(None, 1, None), ("a", 2, None), (["a", "b", "c"], 1, 2)])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from world_files import DEMO
 
-from omninav.pipeline import Context
+from omninav.pipeline import BadInput, Context
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
@@ -245,3 +245,10 @@ def test_a_kidnapping_after_the_end_of_the_drive_is_told(tmp_path: Path):
     said = Context("simulate")
     record_log(tmp_path / "out.mcap", EXACT, "there", 1, (*KIDNAPPED, Kidnapping(at=600.0, turn=1.0)), said)
     assert [warning.rpartition(", ")[2] for warning in said.warnings] == ["the robot is not carried at 600 s"]
+
+
+def test_a_log_that_was_not_simulated_is_not_written_over(tmp_path: Path):
+    (tmp_path / "mine.mcap").write_bytes(b"precious")
+    with pytest.raises(BadInput, match=r"mine\.mcap: it is there, and was not simulated"):
+        record_log(tmp_path / "mine.mcap", EXACT, "there", 1, (), Context("simulate"))
+    assert (tmp_path / "mine.mcap").read_bytes() == b"precious"

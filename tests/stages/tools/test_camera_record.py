@@ -33,6 +33,8 @@ def test_images_that_come_too_fast_are_left_out(tmp_path: Path, device: str) -> 
     out = str(tmp_path / "drive.mcap")
     RecordCamera(device=device, out=out, camera="perspective", rate_hz=0.01).run(Context("record"))
     assert len(open_recording(out).stamps) == 1
+    with pytest.raises(BadInput, match=r"drive\.mcap is there; type another name"):
+        RecordCamera(device=device, out=out, camera="perspective").run(Context("record"))
 
 
 def test_what_cannot_be_recorded_is_said(tmp_path: Path, device: str) -> None:
