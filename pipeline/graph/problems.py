@@ -69,12 +69,12 @@ def cut(value: Any) -> str:
 
 
 HINTS = {
-    errno.ENOSPC: "free some space; `omninav resume` goes on with a run that has begun",
-    errno.EDQUOT: "free some space; `omninav resume` goes on with a run that has begun",
+    errno.ENOSPC: "free some space; a run that had begun goes on by `omninav resume`",
+    errno.EDQUOT: "free some space; a run that had begun goes on by `omninav resume`",
     errno.EFBIG: "a file may not grow so large; raise the limit (`ulimit -f`), or name another disk",
-    errno.EROFS: "nothing can be written there; give other folders: runs=FOLDER cache=FOLDER/.cache",
-    errno.EACCES: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",
-    errno.EPERM: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",
+    errno.EROFS: "nothing can be written there; name another place, of a run: runs=FOLDER cache=FOLDER/.cache",
+    errno.EACCES: "it cannot be read or written by you; name another, of a run: runs=FOLDER cache=null",
+    errno.EPERM: "it cannot be read or written by you; name another, of a run: runs=FOLDER cache=null",
     errno.ENAMETOOLONG: "a name has at most 255 characters, and a path 4095",
     errno.ELOOP: "these links lead to each other; name a file",
     errno.ENOENT: "is its folder there?",

@@ -236,7 +236,7 @@ def test_hostile_words_are_refused_in_a_few_short_lines(
     ("number", "said"),
     [
         (errno.ENOSPC, "No space left on device; free some space"),
-        (errno.EROFS, "Read-only file system; nothing can be written there; give other folders: runs=FOLDER"),
+        (errno.EROFS, "Read-only file system; nothing can be written there; name another place, of a run: runs=FOLDER"),
         (errno.EACCES, "Permission denied; it cannot be read or written by you"),
     ],
 )
