@@ -17,8 +17,8 @@ from .channel import channel_key, held_key
 from .codec import encode
 
 VALIDATED_TICKS = 10
-"""First calls of a stage whose outputs are checked against what their types state: enough for a mistake in the stage
-itself, and without a price later."""
+"""First calls of a stage of ours whose outputs are checked against what their types state, and of another's whose
+inputs must stay as they are; outputs of another's are always checked, since a NaN may come late."""
 
 
 class StageFailed(Exception):
@@ -30,7 +30,9 @@ class Call:
 
     def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str], validate: bool = False) -> None:
         self.node, self.ctx = node, ctx
-        self.to_check = math.inf if validate else VALIDATED_TICKS
+        foreign = not node.target.startswith(f"{BUILT_IN}.")  # tests check ours
+        self.to_check = math.inf if validate or foreign else VALIDATED_TICKS
+        self.to_guard = VALIDATED_TICKS if foreign else 0
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
         self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
@@ -46,9 +48,10 @@ class Call:
             elif wire.hold:
                 key = held_key(wire.origin)
             self.inputs.append((wire.to_port, key, instead, port.optional))
-        foreign = node.lifetime == "tick" and not node.target.startswith(f"{BUILT_IN}.")  # tests check ours
-        ports = (wire.to_port for wire in wires if foreign and wire.origin not in static)
-        self.guarded = [name for name in ports if not getattr(node.signature.inputs[name].type, "in_place", False)]
+        given = [wire for wire in wires if not getattr(node.signature.inputs[wire.to_port].type, "in_place", False)]
+        each = [wire.to_port for wire in given if wire.origin not in static]
+        self.guarded = each if node.lifetime == "tick" else []
+        self.guarded_once = [wire.to_port for wire in given if wire.origin in static]  # a map may be large
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def set_up(self) -> None:
@@ -75,7 +78,7 @@ class Call:
                     values[origin] = None
                 return True
             given[port] = value
-        guarded = self.guarded if self.to_check > 0 else []
+        guarded = self.guarded + self.guarded_once if self.to_guard else []
         before = encode([given[name] for name in guarded]) if guarded else b""
         start = time.perf_counter()
         try:
@@ -87,6 +90,7 @@ class Call:
         self.times.append(time.perf_counter() - start)
         if guarded and encode([given[name] for name in guarded]) != before:
             raise StageFailed(f"{self._place()}: it changes its inputs, which others read too; write to a copy")
+        self.to_guard, self.guarded_once = max(0, self.to_guard - 1), []
         if self.outputs and out is not None and not isinstance(out, Outputs):
             raise StageFailed(f"{self._place()}: step gave a value of type {type(out).__name__}, expected its Out")
         for name, origin in self.outputs:

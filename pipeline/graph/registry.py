@@ -22,6 +22,7 @@ import pkgutil
 import re
 import shlex
 import sys
+import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -150,7 +151,10 @@ def _load(module_name: str) -> ModuleType:
     except (UnknownStage, KeyboardInterrupt):
         raise
     except BaseException as error:  # a plugin may raise anything while it is imported
-        raise UnknownStage(f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from None
+        files = {module_name, str(user_path(module_name).resolve())}
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
+        what = f"cannot be imported{f', line {lines[-1]}' if lines else ''}: {type(error).__name__}: {error}"
+        raise UnknownStage(f"module '{module_name}' {what}") from None
 
 
 @contextmanager

@@ -136,7 +136,9 @@ def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
         text = str(sealed.get("config", ""))
         if digest_text(text) != began.config:
             again = shlex.join(began.argv)
-            raise BadInput(f"{folder}: config.yaml is damaged, or was changed by hand; delete this folder and start again: {again}")
+            raise BadInput(
+                f"{folder}: config.yaml is damaged, or was changed by hand; delete this folder and start again: {again}"
+            )
         report_damage(f"{folder}: config.yaml is damaged, or was changed by hand; it is written again as it was")
     return began, text
 

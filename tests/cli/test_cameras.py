@@ -192,6 +192,7 @@ def test_a_camera_model_that_cannot_be_imported_is_named_where_another_is_missin
     assert refused.returncode == 2
     assert "'projection' cannot be 'stretched'" in refused.stderr
     assert "camera.broken: module 'broken.py' cannot be imported" in refused.stderr
+    assert "broken.py' cannot be imported, line " in refused.stderr
 
 
 def test_a_setting_that_a_tool_does_not_take_is_one_problem(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from omninav.pipeline import Context
@@ -14,7 +15,7 @@ from omninav.pipeline.engine.prefix import cached_prefix, following, keep_prefix
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
-from toys import Number, graph_of_toys
+from toys import Big, Number, graph_of_toys
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -153,6 +154,10 @@ def test_a_stage_that_gives_something_else_or_changes_what_others_read_too_is_na
     said = r"stage 'scribble' \(toys.Scribble\) failed at tick 3 .*: it changes its inputs"
     with pytest.raises(StageFailed, match=said):
         Engine(graph_of(nodes, {"scribble": {"big": "source.big"}})).run()
+    nodes = {"source": "Count", "scribble": "Scribble"}
+    graph = build(graph_of_toys(nodes, {"scribble": {"big": "artifacts.map"}}), {"map": Big})
+    with pytest.raises(StageFailed, match=r"failed: it changes its inputs"):
+        Engine(graph, artifacts={"map": Big(np.zeros(3))}).run()
 
 
 FULL = {
@@ -292,8 +297,8 @@ def test_a_result_that_is_given_every_tick_is_there_though_no_tick_runs_again(tm
     assert found == [{"latest": 9.0}, {"latest": 9.0}]
 
 
-@pytest.mark.parametrize(("since", "validate"), [(VALIDATED_TICKS - 1, False), (VALIDATED_TICKS + 3, True)])
-def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, validate: bool):
+@pytest.mark.parametrize("since", [VALIDATED_TICKS - 1, VALIDATED_TICKS + 3])
+def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int):
     nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": since}}
     graph = graph_of(nodes, {"doubt": {"number": "source.number"}})
     said = (
@@ -301,14 +306,18 @@ def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, val
         r" not a valid Certainty: 'share' holds nan, expected finite numbers"
     )
     with pytest.raises(StageFailed, match=said):
-        Engine(graph, {}, EngineOptions(validate=validate)).run()
+        Engine(graph).run()
 
 
-def test_later_outputs_are_checked_only_where_asked_for():
+def test_later_outputs_of_ours_are_checked_only_where_asked_for(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("omninav.pipeline.engine.call.BUILT_IN", "toys")
     nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": VALIDATED_TICKS}}
-    engine = Engine(graph_of(nodes, {"doubt": {"number": "source.number"}}))
+    graph = graph_of(nodes, {"doubt": {"number": "source.number"}})
+    engine = Engine(graph)
     engine.run()
     assert engine.ticks == 20
+    with pytest.raises(StageFailed, match=f"failed at tick {VALIDATED_TICKS} "):
+        Engine(graph, {}, EngineOptions(validate=True)).run()
 
 
 def test_a_source_knows_who_reads_it_on_the_way_to_a_delayed_wire(tmp_path: Path):
