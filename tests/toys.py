@@ -160,7 +160,7 @@ class Noise(GivesNumber):
 class Add(GivesNumber):
     """The sum of two numbers, the second of which may be missing."""
 
-    def step(self, ctx: Context, number: Number, other: Number | None = None) -> GivesNumber.Out:
+    def step(self, ctx: Context, number: Number, other: Number | None) -> GivesNumber.Out:
         return self.Out(number=Number(number.value + (other.value if other else 0.0)))
 
 

@@ -1,5 +1,6 @@
 """A node made ready to run: one call of its step each tick, from the tick's values and back into them."""
 
+import inspect
 import math
 import time
 from array import array
@@ -36,6 +37,10 @@ class Call:
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
         self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
+        wired = {wire.to_port for wire in wires}
+        for name, argument in inspect.signature(self.step).parameters.items():
+            if name in node.signature.inputs.keys() - wired and argument.default is argument.empty:
+                self.fixed[name] = None  # it is optional, or the graph would be refused
         self.outputs = [(name, f"{node.name}.{name}") for name in node.signature.outputs]
         self.skips = f"skipped.{node.name}"
         self.inputs: list[tuple[str, str, str | None, bool]] = []

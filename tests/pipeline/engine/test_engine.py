@@ -309,6 +309,11 @@ def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int):
         Engine(graph).run()
 
 
+def test_an_optional_input_without_a_wire_is_none():
+    graph = graph_of({"source": "Count", "sum": "Add"}, {"sum": {"number": "source.number"}})
+    assert Engine(graph, wanted=("sum.number",)).run()["sum.number"].value == 9.0
+
+
 def test_later_outputs_of_ours_are_checked_only_where_asked_for(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("omninav.pipeline.engine.call.BUILT_IN", "toys")
     nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": VALIDATED_TICKS}}
