@@ -230,10 +230,23 @@ def compare_strips(recent: InputConflictsState) -> None:
         strips = np.stack(list(run))
         first, end = end, end + len(strips)
         if len(strips) > 1:
-            recent.rows[first + 1 : end or None, 8:10] = np.column_stack(turns_and_correlations(strips))
+            seen = turns_and_correlations(without_covered(strips))
+            recent.rows[first + 1 : end or None, 8:10] = np.column_stack(seen)
     recent.strips = recent.strips[-1:]
 
 
+def without_covered(strips: Floats) -> Floats:
+    """Strips (N, rows, columns) in which columns that never change while others do count as even: something covers
+    them, and would hide the turns of the others."""
+    covered = np.ptp(strips, axis=0).max(axis=0) < COVERED_GREY
+    if not MIN_COVERED < covered.mean() < 1.0 - MIN_COVERED:
+        return strips
+    return np.where(covered, strips[:, :, ~covered].mean(axis=2, keepdims=True), strips)
+
+
+COVERED_GREY, MIN_COVERED = 6.0, 0.1
+"""Largest change of a pixel that is covered (grey levels of 255), and the smallest share of columns that is, or is not,
+for a cover to be told from a wall and from a robot that stands."""
 MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
 """Images before a leap of the clock, and what it is at least (s, and times the usual interval)."""
 LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)

@@ -27,6 +27,7 @@ from omninav.stages.monitor.input_conflicts import (
     remember,
     tracked,
     turned,
+    without_covered,
 )
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.image import Strip
@@ -294,6 +295,20 @@ def test_images_are_compared_with_the_ones_before_and_not_across_cameras() -> No
     np.testing.assert_allclose(recent.rows[[1, 2, 4], 9], 1.0, atol=1e-3)
     assert abs(recent.rows[2, 8]) == pytest.approx(math.pi / 2, abs=0.01)
     assert len(recent.strips) == 1
+
+
+def test_what_covers_half_of_the_images_hides_no_turn() -> None:
+    seen = np.random.default_rng(1).uniform(50.0, 200.0, (4, 72)).astype(np.float32)
+    strips = np.stack([np.roll(seen, 3 * number, axis=1) for number in range(6)])
+    strips[:, :, 36:] = 90.0
+    recent = InputConflictsState()
+    for stamp, strip in enumerate(strips):
+        remember(recent, stamp * 10**9, strip)
+    compare_strips(recent)
+    np.testing.assert_allclose(recent.rows[1:, 8], recent.rows[1, 8], atol=0.03)
+    assert abs(recent.rows[1, 8]) == pytest.approx(math.radians(15.0), abs=0.03)
+    still = np.repeat(strips[:1], 3, axis=0)
+    assert without_covered(still) is still
 
 
 @pytest.mark.parametrize(("interval_s", "remembered"), [(0.24, 5), (0.25, 9), (0.13, 5), (0.1, 3)])
