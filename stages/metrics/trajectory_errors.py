@@ -10,6 +10,8 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
 
+from .truth_misfit import truth_misfit
+
 HEADLINES = (
     "position_error_m.median",
     "position_error_m.p90",
@@ -45,6 +47,7 @@ class TrajectoryErrors(MetricStage):
     (None if it never did); the errors and loss rate again under `after_convergence`. `odometry_alone` starts at the
     first true pose, and says how far off it ended. The top level is the last log, and `logs` has one entry per log
     where there are several. Frames without truth or without estimate are left out and counted.
+    Warns of a truth that fits the estimates of a sure robot only once it is changed.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
@@ -60,6 +63,8 @@ class TrajectoryErrors(MetricStage):
             return self.Out(metrics=Metrics({"frames": 0}))
         if not drive.has_truth:
             ctx.fact("errors", "not measured: the log has no ground truth")
+        elif misfit := truth_misfit(drive.last_log):
+            ctx.warn(misfit)
         values = dict(per_log[-1])
         if len(per_log) > 1:
             values["logs"] = per_log

@@ -12,6 +12,7 @@ from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
+from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.conflicts import FOREIGN, Conflicts
@@ -23,7 +24,6 @@ from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 from omninav.stages.values.similarity import Similarities
 
 from .confidence_monitor import best_place
-from .track_fit import agreement, track_fit
 from .turn_fit import TurnFit, clipped, explained, turn_fit
 
 INTERVAL_S = 0.25

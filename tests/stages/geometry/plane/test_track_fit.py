@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.stages.geometry.plane.se2 import chain, compose
-from omninav.stages.monitor.track_fit import agreement, track_fit
+from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 
 MOTIONS = np.column_stack([np.full(60, 0.3), np.zeros(60), 0.15 * np.sin(np.arange(60) / 5.0) + 0.05])
 TRACK = chain(MOTIONS)
