@@ -87,7 +87,7 @@ def _factories() -> dict[str, str]:
 
 def cores() -> int:
     """Number of processors that this process may use."""
-    return len(os.sched_getaffinity(0))
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def local(settings: ExecutorSettings) -> Executor:

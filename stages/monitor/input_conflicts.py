@@ -346,8 +346,9 @@ def turned(watched: Watched, length_scale_m: float) -> str:
             f"odometry turns by {math.degrees(wild):.0f} degrees {over}, the images by {images}, and not together: "
             "check the unit of its heading (radians)"
         )
-    correlation = float(np.corrcoef(clipped(seen[known]), clipped(turns))[0, 1])
     if fit.sign < 0 and fit.as_is < REVERSED_AS_IS:
+        both = np.stack([clipped(seen[known]), clipped(turns)])
+        correlation = float(both.prod(axis=0).sum() / np.linalg.norm(both, axis=1).prod())
         blame = whose(watched, length_scale_m)
         return f"the images turn against odometry's turns (correlation {correlation:.2f} {over}): {blame}"
     return ""
