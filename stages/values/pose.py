@@ -1,5 +1,6 @@
 """Poses and motions in the plane: metres, radians, x forward, y left, heading counter-clockwise."""
 
+import math
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Value
@@ -8,7 +9,9 @@ Coordinate = Annotated[float, Bounds(ge=-1e8, le=1e8)]
 """Metres, or radians: no map is larger than the Earth."""
 Spread = Annotated[float, Bounds(ge=0, le=1e8)]
 """A standard deviation, in metres or radians."""
-StartPose = tuple[Coordinate, Coordinate, Coordinate, Spread, Spread]
+Heading = Annotated[float, Bounds(ge=-2.0 * math.pi, le=2.0 * math.pi)]
+"""A heading that a user types, in radians: degrees are mostly beyond."""
+StartPose = tuple[Coordinate, Coordinate, Heading, Spread, Spread]
 """A first pose as a user gives it: x, y (m), heading (rad), sigma_xy (m), sigma_heading (rad)."""
 
 

@@ -209,6 +209,7 @@ def test_neither_an_experiments_folder_nor_a_report_runs_a_program_unasked(capsy
         ("checkpoint_s=nan",),
         ("seed=1e400",),
         ("start=[1e400,0,0,1,1]",),
+        ("start=[1,2,90,1,1]",),
         ("kidnappings=[{at: 1e308, turn: 1e308}]",),
         ("'log=\"~nobody_of_that_name/x.mcap\"'",),
         ("log=/dev/zero",),

@@ -87,6 +87,9 @@ def test_a_comparison_marks_the_best_and_shows_differing_settings():
     assert any(line.strip("│ ").startswith("seed ") for line in lines)
     assert not any("m.k" in line for line in lines)
     assert not any("odometry alone" in line for line in lines)
+    assert "different logs" not in lines[-1]
+    other = compared("runs/c", measured(), log="other.mcap")
+    assert "these are runs of different logs" in printed(compare_table([*runs, other]))
 
 
 def test_where_more_is_better_the_largest_is_marked():
