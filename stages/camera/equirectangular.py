@@ -1,10 +1,12 @@
-"""A finished panorama: azimuths and elevations at equal steps."""
+"""A finished panorama: azimuths and elevations at equal steps, and the camera that would have taken one."""
 
 import math
 from typing import Self
 
 from omninav.stages.geometry.arrays import Array
+from omninav.stages.values.image import Image, Panorama
 
+from .model import Camera
 from .strip import Strip
 
 
@@ -26,3 +28,15 @@ class Equirectangular(Strip, projection="equirectangular"):
         """
         half = math.pi / 2 if width == 2 * height else None
         return cls(width, height, width / 2, elevation_top=half, elevation_bottom=half and -half)
+
+
+def panorama_camera(panorama: Panorama) -> Equirectangular:
+    """The camera that would have taken a panorama; its elevations are a guess where the panorama does not say them."""
+    rows, columns = panorama.pixels.shape[:2]
+    top, bottom = panorama.elevation_top, panorama.elevation_bottom
+    return Equirectangular(columns, rows, columns / 2, elevation_top=top, elevation_bottom=bottom)
+
+
+def camera_behind(image: Image | Panorama, camera: Camera | None) -> Camera | None:
+    """The camera that an image is to be read by: a panorama's own, else the one that is given with it."""
+    return panorama_camera(image) if isinstance(image, Panorama) else camera

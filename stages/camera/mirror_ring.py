@@ -4,14 +4,11 @@ from typing import cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.image import Pixels
 
 from .model import Ring
-
-Grey = npt.NDArray[np.float32]
 
 
 class RingNotFound(ValueError):
@@ -23,7 +20,7 @@ MIN_SCORE = 1.0
 parts of these images without a whole ring, panoramas and noise score 0.49 to 0.99."""
 
 
-def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
+def radial_edges(grey: Floats, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
     """Share of a circle that is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
     A ray counts at a radius where the step of brightness across it is large against the steps around it (a tenth of the
@@ -53,7 +50,7 @@ def find_ring(pixels: Pixels) -> Ring:
     height, width = pixels.shape[:2]
     scale = max(1.0, max(height, width) / 240.0)
     small = cv2.resize(pixels, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
-    grey = cast(Grey, cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32))
+    grey = cast(Floats, cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32))
     h, w = grey.shape
     smallest, largest = int(0.28 * min(h, w)), int(0.62 * min(h, w))
     outer_radii = np.arange(smallest, largest - 2)
@@ -62,7 +59,7 @@ def find_ring(pixels: Pixels) -> Ring:
     span, step = 0.16 * min(h, w), 0.02 * min(h, w)
     while step > 0.2:
         # Blurred as wide as the step, so that the right circle is seen from the nearest centre that is tried.
-        blurred = cast(Grey, cv2.GaussianBlur(grey, (0, 0), max(1.0, 0.7 * step)))
+        blurred = cast(Floats, cv2.GaussianBlur(grey, (0, 0), max(1.0, 0.7 * step)))
         middle, best = centre, -1.0
         offsets = np.arange(-span, span + step / 2, step)
         for dy in offsets:

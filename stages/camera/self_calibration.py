@@ -1,4 +1,4 @@
-"""A camera that is calibrated by the landmarks it sees: its fields as parameters of the bundle adjustment."""
+"""A camera that is calibrated by what it sees: its fields in the bundle adjustment, and the elevations of a strip."""
 
 import math
 from collections.abc import Mapping
@@ -10,18 +10,25 @@ import numpy as np
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.landmarks.adjustment import Lens, rotations_about
+from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches, fitting_matches
 
+from .equirectangular import Equirectangular
 from .model import Camera
+from .strip import Strip
 
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
 """The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor shows it best."""
-
-
 TILT = ("roll", "pitch")
 """Parameters of a camera that leans (rad): it is turned about x by the roll, then about y by the pitch."""
 TILT_SIGMA = math.radians(3.0)
 """Standard deviation of a camera's roll and pitch (rad) that nothing says: of what is screwed on by eye."""
+STEPS = math.radians(2.5), math.radians(0.5)
+"""Spacing of the horizons that are tried, of all and around the best (rad): 5 degrees off, half as many fit."""
+MIN_GAIN = 1.3
+"""Factor by which more matches must fit than with the horizon in the middle."""
+MIN_FITTING = 100
+"""Matches that must fit: fewer agree with some horizon by chance."""
 
 
 def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:
@@ -80,3 +87,39 @@ def observed(camera: Camera, poses_given: bool) -> dict[str, float]:
     if camera.ring is None or not camera.elevations_known or not numbers >= set(AXIS):
         return {}
     return {**AXIS, **({"yaw": math.inf} if poses_given else {})}
+
+
+def with_elevations_found(
+    camera: Camera, pixels: Array, views: LocalViews, matches: PairMatches, poses: Array
+) -> Equirectangular | None:
+    """The strip with the elevations at which most matches fit the motion between their references.
+
+    `pixels` (F, 2) of all features, `poses` (R, 3) of the references. Pixels are taken to be square. None where the
+    camera is no strip or says its elevations, and where the guess, the horizon in the middle, is about as good.
+    """
+    if not isinstance(camera, Strip) or camera.elevations_known or not len(matches.first):
+        return None
+    height = min(2.0 * math.pi * camera.height_px / camera.width, math.pi)
+    guess = Equirectangular(
+        camera.width,
+        camera.height_px,
+        camera.column_of_forward,
+        height=camera.height,
+        yaw=camera.yaw,
+        sense=camera.sense,
+        elevation_top=0.5 * height,
+        elevation_bottom=-0.5 * height,
+    )
+
+    def fitting(strip: Strip) -> int:
+        return int(fitting_matches(views.looking_along(strip.unproject(pixels)[0]), matches, poses).sum())
+
+    lowest, highest = height - 0.5 * math.pi, 0.5 * math.pi
+    best, number, first, last = guess, 0, lowest, highest
+    for step in STEPS:
+        for top in np.arange(first, last + step, step).clip(lowest, highest).tolist():
+            strip = replace(guess, elevation_top=top, elevation_bottom=top - height)
+            if (fits := fitting(strip)) > number:
+                best, number = strip, fits
+        first, last = best.elevations[0] - step, best.elevations[0] + step
+    return best if number >= max(MIN_GAIN * fitting(guess), MIN_FITTING) else None

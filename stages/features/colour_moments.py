@@ -4,17 +4,15 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Bools, Floats
+from omninav.stages.geometry.arrays import Array, Bools, Floats
 from omninav.stages.values.image import Pixels
-
-Sums = npt.NDArray[np.float64]
 
 PAIRS = ((2, 1), (2, 0), (1, 0))
 """Red with green, red with blue, green with blue: channels of a blue-green-red image."""
 
 
 @compiled(nogil=True)
-def add_pixel(sums: Sums, blue: float, green: float, red: float) -> None:
+def add_pixel(sums: Array, blue: float, green: float, red: float) -> None:
     """One more pixel in the ten sums of a patch: 1, b, g, r, bb, gg, rr, rg, rb, gb."""
     sums[0] += 1.0
     sums[1] += blue
@@ -29,7 +27,7 @@ def add_pixel(sums: Sums, blue: float, green: float, red: float) -> None:
 
 
 @compiled(nogil=True)
-def correlations(sums: Sums, out: Floats) -> None:
+def correlations(sums: Array, out: Floats) -> None:
     """C_RG, C_RB, C_GB of a patch's ten sums into `out` (3,); 0 where a channel does not vary.
 
     C_PQ = int P'Q' / sqrt(int P'^2 int Q'^2), P' = P - mean, in [-1, 1], which neither offset nor scale of a channel
@@ -49,7 +47,7 @@ def correlations(sums: Sums, out: Floats) -> None:
 
 
 @compiled(nogil=True)
-def _disc_colours(pixels: Pixels, seen: Bools, points: Sums, radii: Sums, out: Floats) -> None:
+def _disc_colours(pixels: Pixels, seen: Bools, points: Array, radii: Array, out: Floats) -> None:
     rows, columns = seen.shape
     sums = np.empty(10)
     for n in range(len(points)):

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, cut
+from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, seen_at
-from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import BadInput
+from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, Ring
-from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Image, Panorama, Pixels
 

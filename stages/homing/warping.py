@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Annotated
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
+from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera
-from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Image, Panorama

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput
+from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, require_elevations, seen_at
-from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Image, Panorama
 

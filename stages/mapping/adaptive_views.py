@@ -22,9 +22,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
-from .pending_updates import PendingUpdates, ready_updates, start_over
-from .view_cap import within_cap
-from .view_events import view_event
+from .view_updates import PendingUpdates, ready_updates, start_over, view_event, within_cap
 
 DEFAULT_LENGTH_SCALE_M = 0.3
 """Distance over which views are similar where the threshold does not tell."""

@@ -10,8 +10,16 @@ import numpy as np
 from omninav.pipeline import Context, MetricSpec
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import turned
-from omninav.stages.camera.self_calibration import AXIS, TILT, adjustable, corrected, leaning, observed, with_tilt
-from omninav.stages.camera.strip_elevations import with_elevations_found
+from omninav.stages.camera.self_calibration import (
+    AXIS,
+    TILT,
+    adjustable,
+    corrected,
+    leaning,
+    observed,
+    with_elevations_found,
+    with_tilt,
+)
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches

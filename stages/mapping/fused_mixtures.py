@@ -17,9 +17,7 @@ from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
 from .applied_update import AppliedUpdate, record_update
-from .pending_updates import PendingUpdates, ready_updates, start_over
-from .view_cap import within_cap
-from .view_events import view_event
+from .view_updates import PendingUpdates, ready_updates, start_over, view_event, within_cap
 
 Parts = tuple[Array, Array, Array, Array]
 Average = Literal["visits", "halves"]

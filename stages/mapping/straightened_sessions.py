@@ -8,14 +8,12 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, Outputs, Stage, Tick
 from omninav.stages.geometry.arrays import Array, Bools
-from omninav.stages.geometry.plane.drive_graph import closure_sigmas, placed_drives, straightened_drives
+from omninav.stages.geometry.plane.drive_graph import Closures, closure_sigmas, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.views import NoveltyThreshold
-
-from .session_closures import closures_between
 
 SPECS = {
     "straightened.sessions": MetricSpec(title="Drives that the map was learned from", context=True),
@@ -120,3 +118,27 @@ class StraightenSessions(Stage):
             )
             for row in np.flatnonzero(learned).tolist()
         )
+
+
+def closures_between(sessions: Sessions, max_distance: float, min_gap_m: float, samples: int) -> Closures:
+    """For each view the most alike of each earlier drive, and of its own at least `min_gap_m` metres back.
+
+    A pair counts up to `max_distance`, in the views' unit. Of more than `samples` views so many, evenly spaced, look
+    for partners.
+    """
+    values, drives, driven = sessions.values, sessions.drives, sessions.driven
+    pairs, turns = [], []
+    for query in np.unique(np.linspace(0, len(sessions) - 1, min(samples, len(sessions))).astype(np.int64)).tolist():
+        view = sessions.view(query)
+        distances = view.distances(values[:query])
+        distances[(drives[:query] == drives[query]) & (driven[:query] > driven[query] - min_gap_m)] = math.inf
+        best = [
+            int(rows[distances[rows].argmin()])
+            for drive in range(drives[query] + 1)
+            if len(rows := np.flatnonzero(drives[:query] == drive))
+        ]
+        near = np.array([row for row in best if distances[row] <= max_distance], np.int64)
+        if len(near):
+            pairs += [(row, query) for row in near.tolist()]
+            turns += view.turns(values[near]).tolist()
+    return Closures(np.array(pairs, np.int64).reshape(-1, 2), np.array(turns))

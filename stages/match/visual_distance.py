@@ -6,11 +6,11 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.many_views import ManyViews
 from omninav.stages.geometry.appearance.visual_distance import (
     MAX_GLOBAL_DISTANCE,
     MIN_MATCHES,
     ComparisonOptions,
+    ManyViews,
     PatchDistance,
     colour_distances,
 )

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
+from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, seen_at
-from omninav.stages.camera.panorama_camera import camera_behind
 from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures

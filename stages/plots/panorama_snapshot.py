@@ -6,8 +6,8 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Shape, Stage, Tick, Value
+from omninav.stages.camera.equirectangular import panorama_camera
 from omninav.stages.camera.model import seen_at
-from omninav.stages.camera.panorama_camera import panorama_camera
 from omninav.stages.camera.thumbnail import Thumbnail, thumbnail
 from omninav.stages.geometry.arrays import Bools, Floats
 from omninav.stages.values.image import Panorama, Windows

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds
-from omninav.stages.geometry.arrays import Array, Bools
+from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 
 from .stamps import Stamps
-
-Rows = npt.NDArray[np.int64]
 
 MIN_INTERVAL_S = 0.05
 """Stamps of a busy computer come in bunches: of two that are closer, this interval is judged."""
@@ -44,8 +41,8 @@ class BelievedTrack(NamedTuple):
     measured is believed: about poses left out, and before jumps.
     """
 
-    rows: Rows
-    jumps: Rows
+    rows: Ints
+    jumps: Ints
     gaps: Stamps
 
 
@@ -64,7 +61,7 @@ def believed(stamps: Stamps, poses: Array, limits: MotionLimits) -> BelievedTrac
     return BelievedTrack(rows, jumps, np.column_stack([stamps[rows[:-1][torn]], stamps[rows[1:][torn]]]))
 
 
-def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tuple[Rows, Rows]:
+def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tuple[Ints, Ints]:
     """The longest chain of stretches by dynamic programming: its rows, and which of these start again.
 
     `torn` (N - 1,): where a pose between two is missing. There a stretch ends too, since more is possible.
@@ -91,7 +88,7 @@ def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tu
         best = number if score[number] > score[best] else best
     if score[best] < MIN_STRETCH:
         return nothing, nothing
-    rows: list[Rows] = []
+    rows: list[Ints] = []
     begun: list[int] = []
     while best >= 0:
         rows.append(np.arange(firsts[best], ends[best]))
@@ -101,7 +98,7 @@ def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tu
     return kept, np.searchsorted(kept, np.array(begun[::-1], np.int64))
 
 
-def without_jumps(stamps: Stamps, poses: Array, jumps: Rows) -> Array:
+def without_jumps(stamps: Stamps, poses: Array, jumps: Ints) -> Array:
     """Poses (N, 3) as they would be had the track gone on: over each jump with the step from before it, at most.
 
     Of `believed`: before each jump lie two poses or more.
@@ -131,7 +128,7 @@ def possible_between(before: Array, after: Array, seconds: float, limits: Motion
     return abs(math.remainder(heading - heading_then, 2 * math.pi)) <= limits.turn * max(seconds, MIN_INTERVAL_S)
 
 
-def _resumes(firsts: Rows, ends: Rows, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Bools:
+def _resumes(firsts: Ints, ends: Ints, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Bools:
     """Tells whether a track can be at the first pose of a stretch, soon after the end of one before: (S - back,)."""
     last, first = ends[:-back] - 1, firsts[back:]
     possible = _possible(stamps[last], poses[last], stamps[first], poses[first], limits)

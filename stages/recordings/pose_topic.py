@@ -1,22 +1,25 @@
-"""The poses on one topic: gathered as they are read, then put in order, and what no robot does left out."""
+"""The poses on one topic, also of transforms: gathered as they are read, put in order, impossible ones left out."""
 
 import math
 from array import array
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from omninav.stages.geometry.arrays import Array
+from omninav.pipeline.mcap.message import Record
+from omninav.stages.geometry.arrays import Array, Ints
 
+from .messages import TRANSFORMS_TYPE, pose_of
 from .plausibility import MotionLimits, believed, without_jumps
+from .recording import UnreadableRecording
 from .stamps import Stamps
 from .topic_recording import Feed, in_order, require_stamps
 
-Rows = npt.NDArray[np.int64]
 MAX_STAMP = 2**63 - 1
 """Largest time stamp, ns: the year 2262. A later one is out of order in any log."""
 NOWHERE = (float("nan"),) * 3
+MAX_FRAMES = 20
+"""Pairs of frames that are named where the wanted one is not there."""
 
 
 class PoseTrack(NamedTuple):
@@ -66,7 +69,7 @@ class PoseTopic:
         return PoseTrack(stamps, poses, gaps)
 
     def _drop(
-        self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Rows, limits: MotionLimits
+        self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Ints, limits: MotionLimits
     ) -> None:
         """Count some rows of a track, and say of the first what it would need of the robot, by its neighbour."""
         if not len(rows):
@@ -84,3 +87,33 @@ class PoseTopic:
             detail += "; most are like this: check the unit (m, rad)"
         for _ in rows:
             feed.drop(kind, detail)
+
+
+class TransformTopic(PoseTopic):
+    """Transforms of `child` in `parent` from a topic (`/tf`), in the order of their own stamps."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        topic, self.parent, self.child = (*name.split(":"), "", "")[:3]
+        super().__init__(topic)
+        self._seen: dict[str, None] = {}
+
+    def add_message(self, record: Record, message: Any) -> None:
+        """Every transform in it that is meant. Raises ValueError for one that cannot be, as `pose_of`."""
+        for each in message.transforms:
+            frames = each.header.frame_id.strip("/"), each.child_frame_id.strip("/")
+            if frames == (self.parent.strip("/"), self.child.strip("/")):
+                at = each.header.stamp
+                self.add(at.sec * 1_000_000_000 + at.nanosec, record.log_time, pose_of(each))
+            elif len(self._seen) < MAX_FRAMES:
+                self._seen[":".join(frames)] = None
+
+    def require(self, log: str, kind: str) -> None:
+        """Raise `UnreadableRecording` where there was no such transform, naming those that there were."""
+        if kind != TRANSFORMS_TYPE:
+            raise UnreadableRecording(
+                f"{log}: {self.topic} carries {kind or 'nothing'}, not transforms; truth=/tf:PARENT:CHILD"
+            )
+        if not len(self):
+            known = ", ".join(f"{self.topic}:{pair:.80}" for pair in self._seen) or "none"
+            raise UnreadableRecording(f"{log}: no transform {self.name:.80}; type truth= with one of: {known}")

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import cut, nearest, read_small
-from omninav.stages.geometry.arrays import Array, Bools
+from omninav.stages.geometry.arrays import Array, Bools, Shorts
 
 from .recording import UnreadableRecording
 from .stamps import Stamps
@@ -119,7 +119,7 @@ class RowBlock(NamedTuple):
     begins, with their number: `starts` (rows + 1,)."""
 
     cells: Any
-    starts: npt.NDArray[np.int32]
+    starts: Shorts
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class CsvTable:
     path: Path
     names: tuple[str, ...]
     blocks: Sequence[RowBlock]
-    lines: npt.NDArray[np.int32]
+    lines: Shorts
     """The line of the file on which each row ends, from 1: (rows,)."""
 
     def index(self, column: str | int) -> int:

@@ -19,12 +19,11 @@ from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
-from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack
+from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, require_stamps
-from .transforms import TransformTopic
 
 SET_BACK_S = 10.0
 """Records of one topic that lie in a file earlier than what comes before them by so much tell of a clock set back."""

@@ -6,9 +6,9 @@ import numpy as np
 
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.appearance.best_segments import sorting_network
 from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties
-from omninav.stages.geometry.appearance.sorting_network import sorting_network
-from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
@@ -17,7 +17,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 
-from .near_references import NearReferences, Shorts, fading
+from .near_references import NearReferences, fading
 
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.

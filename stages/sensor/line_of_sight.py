@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Context, Metrics, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Bools, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Ints, Shorts
 from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
@@ -87,7 +87,7 @@ def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) 
 
 
 @compiled(nogil=True)
-def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
+def grow_areas(cells: Cells, points: Array) -> tuple[Runs, Shorts]:
     """Cells from which points are visible, by constrained region growing (Wolf, Burgard & Burkhardt 2005, section V).
 
     `points` (T, 2): row and column in cells, in free cells. From a point's own cell the area grows over its eight
@@ -175,9 +175,7 @@ def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[floa
 
 
 @compiled(nogil=True)
-def _headings(
-    starts: npt.NDArray[np.int32], runs: Runs, points: Array, where: Ints, centres: Array, window: float
-) -> Bools:
+def _headings(starts: Shorts, runs: Runs, points: Array, where: Ints, centres: Array, window: float) -> Bools:
     seen = np.zeros((len(centres), HEADING_BINS), np.bool_)
     half = min(round(window / (2 * math.pi) * HEADING_BINS), HEADING_BINS // 2)
     for t in range(len(points)):

@@ -6,11 +6,10 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
@@ -22,8 +21,6 @@ from omninav.stages.values.similarity import Similarities, SimilarityField
 from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
 from .compared_rows import ComparedRows
 from .nearest_cells import NearestCells
-
-Shorts = npt.NDArray[np.int32]
 
 CELLS_PER_LENGTH_SCALE = 4
 CUTOFF_SIGMAS = 3.0

@@ -4,12 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Ints
-
-Shorts = npt.NDArray[np.int32]
+from omninav.stages.geometry.arrays import Array, Ints, Shorts
 
 MAX_CELLS = 1 << 26
 """Cells over an area; a huge one has larger cells."""

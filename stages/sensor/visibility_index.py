@@ -7,12 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints, Shorts
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.grid import cells_of
 from omninav.stages.values.visibility import VisibilityAreas
 
-Shorts = npt.NDArray[np.int32]
 Numbers = npt.NDArray[np.uint32]
 
 

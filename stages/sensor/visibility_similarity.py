@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
 
-from .visibility_index import Cells, Looks, Numbers, Shorts
+from .visibility_index import Cells, Looks, Numbers
 
 Single = np.floating[Any]
 

@@ -9,7 +9,8 @@ import numpy as np
 from omninav.pipeline import BadInput, Context, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import unit_vectors
-from omninav.stages.geometry.appearance.visual_compass import Strip, turn_between
+from omninav.stages.geometry.appearance.visual_compass import turn_between
+from omninav.stages.geometry.arrays import Floats
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.unwarp.table import RemapTable, remap_table
@@ -41,7 +42,7 @@ class VisualCompass:
         self._camera: Camera | None = None
         self._table: RemapTable | None = None
 
-    def view(self, image: Image, camera: Camera) -> Strip | None:
+    def view(self, image: Image, camera: Camera) -> Floats | None:
         """Part of an image that is kept: (rows, columns) grey about the horizon; None without the full circle."""
         if camera is not self._camera:
             self._camera, self._table = camera, _table(camera)
@@ -60,7 +61,7 @@ class DeadReckoning(State):
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
-    view: Strip | None = None
+    view: Floats | None = None
 
     def advance(self, motion: Motion) -> None:
         """Add a motion."""
@@ -83,7 +84,7 @@ def dead_reckon(
     return motion
 
 
-def assumed_motion(before: Strip | None, after: Strip | None, seconds: float, speed: float) -> AssumedMotion:
+def assumed_motion(before: Floats | None, after: Floats | None, seconds: float, speed: float) -> AssumedMotion:
     """Straight on by a guessed speed (m/s) for some seconds, with half of the turn before and half of it after."""
     turn, sigma_turn = 0.0, BLIND_SIGMA * seconds
     if before is not None and after is not None:

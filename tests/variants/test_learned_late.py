@@ -12,8 +12,8 @@ from omninav.stages.mapping.adaptive_views import AdaptiveViews
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
-from omninav.stages.mapping.pending_updates import PendingUpdates
 from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueState
+from omninav.stages.mapping.view_updates import PendingUpdates
 from omninav.stages.metrics.map_history import MapHistory
 from omninav.stages.metrics.mislocalised_references import MislocalisedReferences
 from omninav.stages.plots.changed_mixtures import ChangedMixtures

@@ -1,12 +1,32 @@
-"""The selective sum over a view's segments, as machine code without loops."""
+"""The selective sum over a view's segments by a sorting network, as machine code without loops."""
 
+import functools
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from .sorting_network import sorting_network
+from omninav.stages.geometry.arrays import Ints
+
+
+@functools.cache
+def sorting_network(length: int) -> Ints:
+    """Pairs (i, j), i < j, whose exchange in this order sorts `length` items: Batcher's odd-even merge sort. (P, 2)."""
+    pairs = []
+    p = 1
+    while p < length:
+        k = p
+        while k >= 1:
+            for j in range(k % p, length - k, 2 * k):
+                for i in range(min(k, length - j - k)):
+                    if (i + j) // (2 * p) == (i + j + k) // (2 * p):
+                        pairs.append((i + j, i + j + k))
+            k //= 2
+        p *= 2
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
 
 llvm: Any = cgutils
 UNROLLED = range(24, 49)

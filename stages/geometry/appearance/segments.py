@@ -10,8 +10,7 @@ from omninav.pipeline import StoredRows
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 
-from .best_segments import UNROLLED, selective_sum
-from .sorting_network import sorting_network
+from .best_segments import UNROLLED, selective_sum, sorting_network
 
 Rows = Floats | StoredRows[np.float32]
 """Views of a map, in memory or in its file."""

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-Strip = npt.NDArray[np.float32]
+from omninav.stages.geometry.arrays import Floats
 
 
-def turn_between(before: Strip, after: Strip) -> float:
+def turn_between(before: Floats, after: Floats) -> float:
     """The turn (rad, counter-clockwise) between two panoramas (rows, columns) of grey levels.
 
     The shift of the columns at which they correlate best around the full circle, summed over rows; between columns by
@@ -20,7 +20,7 @@ def turn_between(before: Strip, after: Strip) -> float:
     return turns_and_correlations(np.stack([before, after]))[0][0]
 
 
-def turns_and_correlations(strips: Strip) -> tuple[list[float], list[float]]:
+def turns_and_correlations(strips: Floats) -> tuple[list[float], list[float]]:
     """Turns and correlations of successive panoramas (N, rows, columns): N - 1 of each.
 
     A turn is what `turn_between` finds; the correlation at that turn is 1 where the two are equal.

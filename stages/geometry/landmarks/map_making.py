@@ -6,11 +6,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
-from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints, Shorts
 from omninav.stages.geometry.plane.se2 import between, turned
 
 from .pair_check import fit_motion
@@ -214,7 +213,7 @@ RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))
 """Median of a Rayleigh distribution of scale 1: of an angle whose two parts are normal."""
 
 
-def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Ints, npt.NDArray[np.int32]]:
+def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Ints, Shorts]:
     """Landmarks of each reference: starts (R + 1,) and the landmarks (O,)."""
     owners = views.owners[sightings.features]
     order = np.argsort(owners, kind="stable")
@@ -222,9 +221,7 @@ def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Int
     return np.concatenate([[0], np.cumsum(counts)]), sightings.landmarks[order].astype(np.int32)
 
 
-def similarity_rows(
-    starts: Ints, words: npt.NDArray[np.int32], weights: Floats, size: int, references: Ints
-) -> Iterator[Floats]:
+def similarity_rows(starts: Ints, words: Shorts, weights: Floats, size: int, references: Ints) -> Iterator[Floats]:
     """Similarities (R,) of each of some references to all R by their visual words, one row after the other."""
     from scipy.sparse import csr_matrix  # slow to import, and not needed without landmarks
 

@@ -4,10 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Bools, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Ints, Shorts
 
 CELLS_PER_RADIUS = 4
 ROWS = 1 << 31
@@ -25,7 +24,7 @@ class PointCells(NamedTuple):
     width: float
     numbers: Ints
     starts: Ints
-    order: npt.NDArray[np.int32]
+    order: Shorts
 
 
 def sort_into_cells(points: Array, radius: float) -> PointCells:

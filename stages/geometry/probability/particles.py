@@ -4,10 +4,9 @@ import itertools
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.arrays import Array, Bools, Ints
+from omninav.stages.geometry.arrays import Array, Bools, Ints, Shorts
 from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
 
 NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
@@ -174,7 +173,7 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float, headings: int) -> 
 
 
 @compiled(nogil=True)
-def _slot(slots: npt.NDArray[np.int32], cells: Ints, number: int) -> int:
+def _slot(slots: Shorts, cells: Ints, number: int) -> int:
     last = len(slots) - 1  # a power of two, less one
     at = (number * 40503) & last
     while slots[at] >= 0 and cells[slots[at]] != number:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omninav.stages.camera.equirectangular import camera_behind, panorama_camera
 from omninav.stages.camera.model import seen_at
-from omninav.stages.camera.panorama_camera import camera_behind, panorama_camera
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.values.image import Image, Panorama, column_azimuths

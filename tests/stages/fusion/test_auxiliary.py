@@ -3,8 +3,7 @@ import pytest
 from made_beliefs import along_x, even
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.auxiliary import auxiliary_filter
-from omninav.stages.fusion.conditional_resampling import ConditionalResampling
+from omninav.stages.fusion.conditional_resampling import ConditionalResampling, auxiliary_filter
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.clusters import clusters
-from omninav.stages.fusion.particle_clustering import ParticleClustering
+from omninav.stages.fusion.particle_clustering import ParticleClustering, clusters
 from omninav.stages.values.belief import GaussianMixture, Particles
 
 

@@ -9,7 +9,7 @@ from made_view_maps import learned, view
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.pending_updates import PendingUpdates
+from omninav.stages.mapping.view_updates import PendingUpdates
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures

@@ -14,7 +14,7 @@ from omninav.stages.mapping.adaptive_views import AdaptiveViews
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
 from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
-from omninav.stages.mapping.pending_updates import PendingUpdates
+from omninav.stages.mapping.view_updates import PendingUpdates
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.metrics.view_map_size import stored_bytes
 from omninav.stages.values.belief import GaussianMixture

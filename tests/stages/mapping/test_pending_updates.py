@@ -4,7 +4,7 @@ import pytest
 from made_beliefs import along_x
 from made_view_maps import view
 
-from omninav.stages.mapping.pending_updates import PendingUpdates, start_over
+from omninav.stages.mapping.view_updates import PendingUpdates, start_over
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures

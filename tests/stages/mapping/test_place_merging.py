@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.appearance.place_clusters import medoids
-from omninav.stages.mapping.place_merging import distances_along, merged_places, same_spots
+from omninav.stages.mapping.merged_places import distances_along, merged_places, same_spots
 
 NUMBER = 12
 AT = np.concatenate([np.arange(NUMBER), np.arange(NUMBER) + 0.1])

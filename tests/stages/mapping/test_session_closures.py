@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.mapping.session_closures import closures_between
+from omninav.stages.mapping.straightened_sessions import closures_between
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.views import Coefficients
 

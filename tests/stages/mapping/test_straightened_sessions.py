@@ -9,8 +9,7 @@ from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.keyframe_history import KeyframeHistory
-from omninav.stages.mapping.session_closures import closures_between
-from omninav.stages.mapping.straightened_sessions import StraightenSessions
+from omninav.stages.mapping.straightened_sessions import StraightenSessions, closures_between
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions

@@ -3,8 +3,7 @@
 import numpy as np
 from made_view_maps import learned
 
-from omninav.stages.mapping.view_cap import within_cap
-from omninav.stages.mapping.view_events import view_event
+from omninav.stages.mapping.view_updates import view_event, within_cap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 

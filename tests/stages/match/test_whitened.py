@@ -10,8 +10,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.last_view import LastView
-from omninav.stages.match.whitened import WhitenedMatch
-from omninav.stages.match.whitening import learned_whitening
+from omninav.stages.match.whitened import WhitenedMatch, learned_whitening
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentColours, SegmentDescriptors
 from omninav.stages.values.maps import ReferenceGraph

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.motion.turn_by_flow import turn_by_flow
-from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState
+from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState, turn_by_flow
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
 

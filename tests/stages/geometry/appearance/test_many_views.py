@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.appearance.many_views import ROWS, ManyViews
 from omninav.stages.geometry.appearance.visual_distance import (
+    ROWS,
     ComparisonOptions,
+    ManyViews,
     PatchDistance,
     Patches,
     Segments,

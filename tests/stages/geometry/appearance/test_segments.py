@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omninav.stages.geometry.appearance.best_segments import sorting_network
 from omninav.stages.geometry.appearance.segments import (
     cosine_similarities,
     euclidean_similarities,
@@ -12,7 +13,6 @@ from omninav.stages.geometry.appearance.segments import (
     turned_view,
     turned_views,
 )
-from omninav.stages.geometry.appearance.sorting_network import sorting_network
 
 RNG = np.random.default_rng(0)
 
