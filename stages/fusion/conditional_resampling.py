@@ -65,14 +65,9 @@ class ConditionalResampling(Stage):
                     return self.Out(belief=chosen)
             likelihood = (1.0 - self.outlier_probability) * likelihood + self.outlier_probability * agreement
             rows = systematic(particles.weights * likelihood, len(particles.poses), float(ctx.rng.random()))
-            return self.Out(belief=equally_weighted(particles.poses[rows]))
+            return self.Out(belief=Particles(particles.poses[rows], np.full(len(rows), 1.0 / len(rows))))
         ctx.count("disagreed")
         return self.Out(belief=mix_with_hypothesis(particles, hypothesis, self.keep, ctx.rng))
-
-
-def equally_weighted(poses: Array) -> Particles:
-    """Particles of equal weights, sum 1."""
-    return Particles(poses, np.full(len(poses), 1.0 / len(poses)))
 
 
 def mix_with_hypothesis(

@@ -1,7 +1,5 @@
 """Fuses mixtures from several sources into one belief by weighted covariance intersection."""
 
-from typing import Literal
-
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
@@ -16,7 +14,6 @@ from omninav.stages.geometry.probability.gaussians import (
 )
 from omninav.stages.values.belief import GaussianMixture
 
-Rule = Literal["det_ratio", "det_min"]
 MAX_DISTANCE = 7.81
 """Squared Mahalanobis distance below which two components correspond: 95 % with 3 degrees of freedom."""
 MERGE_BELOW = 2.0
@@ -39,11 +36,7 @@ def alpha_of_min_determinant(cov_a: Array, cov_b: Array) -> float:
 
 
 def fuse(
-    a: tuple[Array, Array, Array],
-    b: tuple[Array, Array, Array],
-    gamma: float,
-    alpha: Rule = "det_ratio",
-    weighted: bool = True,
+    a: tuple[Array, Array, Array], b: tuple[Array, Array, Array], gamma: float, weighted: bool = True
 ) -> tuple[Array, Array, Array]:
     """Fuse two mixtures (means, covariances, weights > 0); the result's weights sum to those of both.
 
@@ -54,9 +47,7 @@ def fuse(
     source. Raises ValueError where a covariance is not positive definite.
     """
     mean_a, cov_a, weight_a, mean_b, cov_b, weight_b = (np.ascontiguousarray(each, np.float64) for each in (*a, *b))
-    means, covariances, weights, definite = _fuse(
-        mean_a, cov_a, weight_a, mean_b, cov_b, weight_b, gamma, alpha == "det_ratio", weighted
-    )
+    means, covariances, weights, definite = _fuse(mean_a, cov_a, weight_a, mean_b, cov_b, weight_b, gamma, weighted)
     if not definite:
         raise ValueError("a covariance is not positive definite")
     return means, covariances, weights
@@ -113,7 +104,6 @@ def _fuse(
     cov_b: Array,
     weight_b: Array,
     gamma: float,
-    by_ratio: bool,
     weighted: bool,
 ) -> tuple[Array, Array, Array, bool]:
     size_a, size_b = len(weight_a), len(weight_b)
@@ -149,11 +139,7 @@ def _fuse(
             if not match[i, j]:
                 continue
             share_a, share_b = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
-            if by_ratio:
-                alpha = alpha_by_ratio(log_det_a[i], log_det_b[j], share_a, share_b)
-            else:
-                inverse_into(cov_b[j], inverse)
-                alpha = _min_determinant(cov_a[i], inverse)
+            alpha = alpha_by_ratio(log_det_a[i], log_det_b[j], share_a, share_b)
             definite &= intersect_into(mean_a[i], cov_a[i], mean_b[j], cov_b[j], alpha, means[at], covariances[at])
             weights[at] = weight_a[i] * weight_b[j] * (1.0 / matched_a[i] + 1.0 / matched_b[j])
             at += 1
@@ -173,10 +159,9 @@ class CovarianceIntersection(Stage):
     `MAX_COMPONENTS` stay. Covariances do not shrink where sources agree (erratum 4).
     """
 
-    alpha: Rule = "det_ratio"
-    """Weight of the second covariance: `det_ratio` (the paper's), or `det_min`, the smallest determinant."""
     weighted: bool = True
-    """Whether `det_ratio` uses the components' weights (Gross, Koenig & Mueller) or not (Porta & Kroese)."""
+    """Whether the second covariance's weight alpha, the ratio of determinants, takes the components' weights into
+    account (Gross, Koenig & Mueller) or not (Porta & Kroese)."""
 
     class Out(Outputs):
         """The belief after all sources; weights sum to 1."""
@@ -195,7 +180,7 @@ class CovarianceIntersection(Stage):
         belief = _positive(prediction)
         for source in (hypothesis, fixes, other):
             if source is not None:
-                belief = fuse(belief, _positive(source), MAX_DISTANCE, self.alpha, self.weighted)
+                belief = fuse(belief, _positive(source), MAX_DISTANCE, self.weighted)
         if not len(belief[2]):
             return self.Out(belief=prediction)
         return self.Out(belief=GaussianMixture(*self._simplified(*belief)))

@@ -96,23 +96,15 @@ class ImportanceResampling(Stage):
         main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - recovery)
         if proposals is None or not recovery:
             return self.Out(belief=Particles(main[0], main[1] / np.add.reduce(main[1])))
-        others = self._resample_recovery(
-            ctx,
-            np.concatenate([poses[tracked:], proposals.poses]),
-            np.concatenate([weights[tracked:], proposals.weights * (new / total)]),
-            np.concatenate([likelihood.values[tracked:], np.full(len(proposals.poses), likelihood.novelty)]),
-            recovery,
-        )
-        both = np.concatenate([main[1], others[1]])
-        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / np.add.reduce(both), recovery))
-
-    def _resample_recovery(
-        self, ctx: Context, poses: Array, weights: Array, fitness: Array, number: int
-    ) -> tuple[Array, Array]:
         # Drawn by fit and corrected in the weights: drawn by weight, old hypotheses would displace new ones before
         # evidence for these could accumulate.
-        drawn = systematic(fitness, number, float(ctx.rng.random()))
-        return poses[drawn], weights[drawn] / fitness[drawn] * (np.add.reduce(fitness) / number)
+        poses = np.concatenate([poses[tracked:], proposals.poses])
+        weights = np.concatenate([weights[tracked:], proposals.weights * (new / total)])
+        fitness = np.concatenate([likelihood.values[tracked:], np.full(len(proposals.poses), likelihood.novelty)])
+        drawn = systematic(fitness, recovery, float(ctx.rng.random()))
+        weights = weights[drawn] / fitness[drawn] * (np.add.reduce(fitness) / recovery)
+        both = np.concatenate([main[1], weights])
+        return self.Out(belief=Particles(np.concatenate([main[0], poses[drawn]]), both / np.add.reduce(both), recovery))
 
     def _resampled(self, ctx: Context, poses: Array, weights: Array, wanted: int) -> tuple[Array, Array]:
         # The weights keep their sum, which is below 1 where there are recovery particles.

@@ -31,6 +31,8 @@ StateCovariance = Literal["first", "every_update"]
 Components = tuple[Array, Array, Array, Array]
 MIN_SIMILARITY = 0.2
 """Similarity from which a view learns the state."""
+MIN_WEIGHT = 0.01
+"""Weight below which a component is removed."""
 MERGE_BELOW = 7.81
 """Squared Mahalanobis distance below which components are merged."""
 FITS_BELOW = 7.81
@@ -54,7 +56,7 @@ class AdaptiveViews(Stage):
        With `forgetting: active`, components of all other views near the state: w = (1 - b) w with b = beta_forget
        max(1 - distance / s, 0) `FORGET_GAIN` s / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11); s is the
        distance over which views are similar, as measured with the threshold.
-    4. Components below `min_weight` are removed, and views without any (erratum 9: after the weights have grown).
+    4. Components below `MIN_WEIGHT` are removed, and views without any (erratum 9: after the weights have grown).
 
     Updates wait until there is a threshold, all but a map's first. The paper does not learn from a state of several
     modes. Here each mode of weight p updates the views with S p >= `MIN_SIMILARITY`, with p times the count, and w =
@@ -65,8 +67,8 @@ class AdaptiveViews(Stage):
     """Similarity over distance: linear, quadratic (1 - d^2/E^2), cosine, or step (1 up to the threshold)."""
     forgetting: Forgetting = "active"
     """`active`; `passive`, the model of Porta & Kroese that Table 1 compares with; or `none`."""
-    beta: Annotated[float, Bounds(gt=0, le=1)] = 0.1
-    """Learning rate of the weights."""
+    beta: Annotated[float, Bounds(gt=MIN_WEIGHT / MIN_SIMILARITY, le=1)] = 0.1
+    """Learning rate of the weights; with less, a new place could be dropped as it is learned."""
     state_covariance: StateCovariance = "first"
     """Updates in which a state's covariance counts: the `first` of a component, or `every_update` (equation 14 to
     the letter). The state has most of its covariance from the same map, so that with `every_update` covariances grow
@@ -80,22 +82,12 @@ class AdaptiveViews(Stage):
     """Smallest standard deviation of its heading."""
     max_views: Annotated[int, Bounds(ge=0)] = 0
     """Views of the map, above which the weakest are removed; 0: no limit."""
-    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    """Weight below which a component is removed; below 0.2 beta, so that none is removed at once."""
 
     class Out(Outputs):
         """The map and its changes in this tick."""
 
         map: ViewMixtures
         events: ViewEvent | None = None
-
-    def __post_init__(self) -> None:
-        """A component's first weight must be above `min_weight`."""
-        if (1.0 - 1e-9) * self.beta * MIN_SIMILARITY < self.min_weight:
-            raise ValueError(
-                f"min_weight: {self.min_weight:g} is not below {MIN_SIMILARITY:g} beta = "
-                f"{self.beta * MIN_SIMILARITY:g}, so that a new place could be dropped as it is learned"
-            )
 
     def step(
         self,
@@ -168,7 +160,7 @@ class AdaptiveViews(Stage):
         )
         touched: Ints = map.ids[np.unique(map.owner[weights != map.weights])]
         map.put(weights=weights)
-        map.keep_components(map.weights >= self.min_weight)
+        map.keep_components(map.weights >= MIN_WEIGHT)
         map.keep_views(np.bincount(map.owner, minlength=len(map)) > 0)
         return touched
 

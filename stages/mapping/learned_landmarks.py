@@ -9,6 +9,7 @@ from omninav.pipeline import Context, Metrics, MetricSpec, Outputs, Stage, Tick,
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
     AdjustedMap,
@@ -17,21 +18,7 @@ from omninav.stages.geometry.landmarks.map_adjustment import (
     adjusted_to_given,
     found_with_mount,
 )
-from omninav.stages.geometry.landmarks.map_making import (
-    LocalViews,
-    PairMatches,
-    bearing_sigma,
-    fitting_matches,
-    local_views,
-    mean_descriptors,
-    neighbouring_pairs,
-    pair_matches,
-    sightings_by_reference,
-    similarity_rows,
-    tracks_of,
-    triangulated,
-    widely_seen,
-)
+from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.geometry.plane.image_delay import RobotPath, found_delay
 from omninav.stages.geometry.plane.mount import camera_poses, robot_covariances, robot_poses
 from omninav.stages.geometry.plane.se2 import compose
@@ -113,11 +100,11 @@ class LearnLandmarks(Stage):
         poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)
         matches = tour.matched(poses) if tour.matches is None else tour.matches
         views = check.levelled(views, adjusted.camera)
-        tracks = tracks_of(views, matches, fitting_matches(views, matches, poses))
-        sightings = widely_seen(views, triangulated(views, tracks, poses))
-        starts, seen = sightings_by_reference(views, sightings)
-        sigma = bearing_sigma(views, sightings, poses)
-        looks = mean_descriptors(views, sightings)
+        tracks = map_making.tracks_of(views, matches, map_making.fitting_matches(views, matches, poses))
+        sightings = map_making.widely_seen(views, map_making.triangulated(views, tracks, poses))
+        starts, seen = map_making.sightings_by_reference(views, sightings)
+        sigma = map_making.bearing_sigma(views, sightings, poses)
+        looks = map_making.mean_descriptors(views, sightings)
         left_out = left_out_poses(views, sightings, looks, poses, sigma, _candidates(words))
         landmarks = Landmarks(
             sightings.points.astype(np.float32),
@@ -180,7 +167,7 @@ class _Tour:
     def matched(self, poses: Array) -> PairMatches:
         """Matches of references that are neighbours by their poses (R, 3)."""
         unit = length_scale(poses, self.map.features, self.map.kind) or DEFAULT_M
-        return pair_matches(self.views, neighbouring_pairs(poses, _rows(self.words), unit))
+        return map_making.pair_matches(self.views, map_making.neighbouring_pairs(poses, _rows(self.words), unit))
 
     def as_given(self, poses: Array) -> AdjustedMap:
         """Adjust poses (R, 3) that may be exact."""
@@ -236,17 +223,19 @@ def _sigmas(adjusted: AdjustedMap, poses: Array, mount: Array) -> Array | None:
 
 def _candidates(words: VisualWords) -> list[Ints]:
     samples = samples_of(len(words))
-    rows = similarity_rows(words.starts, words.words, words.weights, len(words.centres), samples)
+    rows = map_making.similarity_rows(words.starts, words.words, words.weights, len(words.centres), samples)
     return [other_references(int(reference), row) for reference, row in zip(samples, rows, strict=True)]
 
 
 def _views(found: Sequence[LocalFeatures | None]) -> LocalViews:
     bearings = [np.empty((0, 3)) if each is None else each.bearings for each in found]
-    return local_views(bearings, [each.descriptors for each in found if each is not None])
+    return map_making.local_views(bearings, [each.descriptors for each in found if each is not None])
 
 
 def _rows(words: VisualWords) -> Iterator[Floats]:
-    return similarity_rows(words.starts, words.words, words.weights, len(words.centres), np.arange(len(words)))
+    return map_making.similarity_rows(
+        words.starts, words.words, words.weights, len(words.centres), np.arange(len(words))
+    )
 
 
 def _words(adjusted: AdjustedMap, moved: float, given: bool) -> str:

@@ -179,7 +179,7 @@ class ImageFolder(Losses):
 
     def _read(self, path: Path) -> Pixels:
         """The image of a frame, of one file or of two side by side."""
-        images = [_image_at(file) for file in self._files(path)]
+        images = [decode_image(read_small(file, MAX_FILE_BYTES)) for file in self._files(path)]
         if len({len(image) for image in images}) > 1:
             raise Undecodable(f"{len(images[0])} rows, but the image beside it has {len(images[1])}")
         return images[0] if len(images) == 1 else np.hstack(images)
@@ -307,10 +307,6 @@ def _glob(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
             below.setdefault(os.stat(path)[1:3], path)  # its inode and device
         folders = list(below.values())
     return (path for one in folders for path in one.glob(parts[-1]))
-
-
-def _image_at(path: Path) -> Pixels:
-    return decode_image(read_small(path, MAX_FILE_BYTES))
 
 
 def _is_turned(path: Path) -> bool:

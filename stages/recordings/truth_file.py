@@ -11,26 +11,11 @@ import numpy as np
 from omninav.pipeline import counted, cut, read_small
 from omninav.stages.geometry.arrays import Array
 
+from . import tables
 from .plausibility import MotionLimits, believed
 from .positions import track_directions
 from .recording import Recording, UnreadableRecording
 from .stamps import Stamps, ascending_rows, poses_near, within
-from .tables import (
-    ANGLES,
-    LENGTHS,
-    MAX_TABLE_BYTES,
-    NO_TIME,
-    TIMES,
-    Angle,
-    CsvTable,
-    Length,
-    OutOfProportion,
-    Time,
-    read_table,
-    table_of,
-    text_lines,
-    unit_named,
-)
 
 COLUMNS = {
     "time": ("t", "time", "timestamp", "stamp", "sec", "seconds"),
@@ -47,7 +32,7 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 LIKE_HEADING = re.compile(r"heading|hdg|yaw|theta|(?<![a-z])psi(?![a-z])|azimuth|bearing|orientation|rotation|quat")
 NO_HEADING = re.compile(r"rate|vel|speed|acc|std|sigma|var|cov|err|dot")
 """Names of columns that may hold a heading, and those among them that hold its speed or its error."""
-UNITS = {"time": TIMES, "x": LENGTHS, "y": LENGTHS, "heading": ANGLES}
+UNITS = {"time": tables.TIMES, "x": tables.LENGTHS, "y": tables.LENGTHS, "heading": tables.ANGLES}
 DEFAULT_UNITS: dict[str, Any] = {"time": "s", "x": "m", "y": "m"}
 MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
 """Tilt that no robot on a floor or a hillside has (degrees), and the share of a file's orientations that may have it.
@@ -113,7 +98,7 @@ def truth_from(
 def read_trajectory(file: Path) -> Trajectory:
     """The trajectory in a file. Raises `UnreadableRecording` or another `BadInput`."""
     times, poses, impossible, doubts = trajectory_rows(file)
-    placed, timed, headed = np.isfinite(poses[:, :2]).all(axis=1), times != NO_TIME, np.isfinite(poses[:, 2])
+    placed, timed, headed = np.isfinite(poses[:, :2]).all(axis=1), times != tables.NO_TIME, np.isfinite(poses[:, 2])
     if not headed[placed & timed].any():  # one heading that is missing costs its own row, not the others' headings
         headed[:] = True
     known = np.flatnonzero(placed & timed & headed)
@@ -140,7 +125,7 @@ def read_trajectory(file: Path) -> Trajectory:
 
 def trajectory_rows(file: Path) -> Rows:
     """The rows of a file as they stand, in TUM's format or a CSV table. Raises `BadInput`."""
-    head = read_small(file, MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
+    head = read_small(file, tables.MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
     lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     tum = lines and "," not in lines[0] and len(lines[0].split()) == 8
     return _tum(file) if tum else _csv(file)
@@ -150,7 +135,7 @@ def _tum(file: Path) -> Rows:
     """Rows of `timestamp x y z qx qy qz qw`, with lines of comments."""
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        for number, line in enumerate(text_lines(file), 1):
+        for number, line in enumerate(tables.text_lines(file), 1):
             cells = line.split()
             if not cells or cells[0].startswith("#"):
                 continue
@@ -161,12 +146,14 @@ def _tum(file: Path) -> Rows:
 
     names = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
     columns = {name: number for number, name in enumerate(names) if name != "z"}
-    return _poses(table_of(file, names, rows()), columns, DEFAULT_UNITS, "the times of a TUM file are in seconds")
+    return _poses(
+        tables.table_of(file, names, rows()), columns, DEFAULT_UNITS, "the times of a TUM file are in seconds"
+    )
 
 
 def _csv(file: Path) -> Rows:
     """A table with a header: time, x, y and, where it has one, a heading or a quaternion."""
-    table = read_table(file)
+    table = tables.read_table(file)
     found, units = _columns(table)
     missing = [meaning for meaning in ("time", "x", "y") if meaning not in found]
     if missing:
@@ -186,7 +173,7 @@ def _csv(file: Path) -> Rows:
     return _poses(table, found, units, "a column of times in other units is called time_ns, time_us or time_ms")
 
 
-def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, Any]]:
+def _columns(table: tables.CsvTable) -> tuple[dict[str, int], dict[str, Any]]:
     """Columns by their meaning, and the units that their names state. Raises `UnreadableRecording` for others."""
     found: dict[str, int] = {}
     units = dict(DEFAULT_UNITS)
@@ -197,10 +184,10 @@ def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, Any]]:
         bare, _, suffix = plain.rpartition("_")
         for meaning, options in COLUMNS.items():
             known = UNITS.get(meaning, {})
-            short = bare if bare and unit_named(suffix) in known else plain
+            short = bare if bare and tables.unit_named(suffix) in known else plain
             if short not in options or meaning in found:
                 continue
-            written = unit_named(bracketed or (suffix if short == bare else "")) if known else ""
+            written = tables.unit_named(bracketed or (suffix if short == bare else "")) if known else ""
             if written and written not in known:
                 unknown[meaning] = f"column {cut(name)}: {cut(bracketed)} is none of its units, {', '.join(known)}"
                 continue
@@ -213,17 +200,17 @@ def _columns(table: CsvTable) -> tuple[dict[str, int], dict[str, Any]]:
     return found, units
 
 
-def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, Any], cure: str) -> Rows:
+def _poses(table: tables.CsvTable, columns: dict[str, int], units: dict[str, Any], cure: str) -> Rows:
     """The poses in a table. `cure`: advice where times are too large to be in their unit."""
     try:
-        times = table.nanoseconds(Time(columns["time"], units["time"]))
-    except OutOfProportion as error:
+        times = table.nanoseconds(tables.Time(columns["time"], units["time"]))
+    except tables.OutOfProportion as error:
         raise UnreadableRecording(f"{error}; {cure}") from None
-    x, y = (table.numbers(Length(columns[axis], units[axis])) for axis in ("x", "y"))
+    x, y = (table.numbers(tables.Length(columns[axis], units[axis])) for axis in ("x", "y"))
     heading, impossible = np.full(len(x), np.nan), 0
     doubts: list[str] = []
     if "heading" in columns:
-        heading = table.numbers(Angle(columns["heading"], units.get("heading", "rad")))
+        heading = table.numbers(tables.Angle(columns["heading"], units.get("heading", "rad")))
         most = float(np.abs(heading).max(where=np.isfinite(heading), initial=0.0))
         if "heading" not in units and most > 2 * math.pi:
             name = table.names[columns["heading"]]
@@ -231,7 +218,7 @@ def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, Any], cure
                 f"headings of up to {most:.3g} are read as radians; degrees are a column {cut(name + '_deg')}"
             )
     elif all(part in columns for part in QUATERNION):
-        qx, qy, qz, qw = (table.numbers(Length(columns[part], "m")) for part in QUATERNION)
+        qx, qy, qz, qw = (table.numbers(tables.Length(columns[part], "m")) for part in QUATERNION)
         heading = np.arctan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
         squares = qx * qx + qy * qy + qz * qz + qw * qw
         wrong = (squares < 0.25) | (squares > 4.0)  # as of the messages of a topic

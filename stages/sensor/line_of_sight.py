@@ -230,11 +230,12 @@ class LineOfSight(Stage):
             ctx.count("view_without_area", none, "areas: the view hits no occupied cell of the grid")
         places = grid.centres(*np.nonzero(grid.cells == FREE)) if free is None else free.centres
         place, state = covered(areas, places, math.radians(WITHIN_DEG) if len(axes) == 1 else math.pi)
+        cells = np.concatenate([[0.0], np.cumsum(areas.runs[:, 2] - areas.runs[:, 1], dtype=np.float64)])
         figures = {
             "references": len(map),
             "areas": areas.target.size - none,
             "points": len(areas.points),
-            "area_median_m2": float(np.median(_sizes(areas))) * grid.resolution**2,
+            "area_median_m2": float(np.median(np.diff(cells[areas.starts]))) * grid.resolution**2,
             "free_m2": len(places) * grid.resolution**2,
             "covered_rate": place,
             "covered_with_heading_rate": state,
@@ -242,9 +243,3 @@ class LineOfSight(Stage):
             "grid": grid.made_from,
         }
         return self.Out(areas=areas, metrics=Metrics({"visibility": figures}))
-
-
-def _sizes(areas: VisibilityAreas) -> Array:
-    lengths = (areas.runs[:, 2] - areas.runs[:, 1]).astype(np.float64)
-    sizes: Array = np.diff(np.concatenate([[0.0], np.cumsum(lengths)])[areas.starts])
-    return sizes

@@ -63,13 +63,10 @@ class PoseFixes(Stage):
             state.since_fix_m, state.driven_m = state.since_fix_m + moved, state.driven_m + moved
         state.position = (truth.x, truth.y)
         over = self.first_m > 0.0 and state.driven_m > self.first_m
-        if over or state.since_fix_m < self.every_m or not self._in_place(truth):
+        gaps = [math.hypot(truth.x - x, truth.y - y) for x, y in self.places]
+        if over or state.since_fix_m < self.every_m or min(gaps, default=0.0) > self.radius_m:
             return self.Out()
         state.since_fix_m = 0.0
         sigmas = np.array([self.sigma_m, self.sigma_m, self.sigma_rad])
         mean = np.array([[truth.x, truth.y, truth.heading]])
         return self.Out(hypothesis=GaussianMixture(mean, np.diag(sigmas**2)[None], np.array([self.weight])))
-
-    def _in_place(self, truth: Pose) -> bool:
-        gaps = [math.hypot(truth.x - x, truth.y - y) for x, y in self.places]
-        return not gaps or min(gaps) <= self.radius_m

@@ -59,7 +59,7 @@ PRINTED: dict[str, Stages] = {
             {"state_covariance": "every_update", "forgetting": "active", "min_sigma_m": 0.0, "min_sigma_deg": 0.0},
         ),
         "sensor": ("Superposition", {"extent": False, "views": "all"}),
-        "fusion": ("CovarianceIntersection", {"alpha": "det_ratio", "weighted": True}),
+        "fusion": ("CovarianceIntersection", {"weighted": True}),
     },
     # Gross and Koenig: the view expected at a particle's pose, compared by the best segments under a root; the weight
     # is a fixed power of S; each image is evidence, and no particle comes from anywhere else.

@@ -133,12 +133,6 @@ class _State(NamedTuple):
     camera: Array
 
 
-class _Looking(NamedTuple):
-    # Bearings (O, 3), and their derivatives (O, 3, K) with respect to the camera's parameters.
-    bearings: Array
-    derivatives: Array
-
-
 class _Normal(NamedTuple):
     # Factors of the matrix of the poses; the camera's columns beside it, the same solved, and what remains of its own.
     factors: Any
@@ -192,7 +186,9 @@ class _Problem:
             damping *= 10.0
         return None, FIRST_DAMPING
 
-    def steps(self, state: _State, looking: "_Looking", weights: Array, damping: float) -> tuple[Array, Array, Array]:
+    def steps(
+        self, state: _State, looking: tuple[Array, Array], weights: Array, damping: float
+    ) -> tuple[Array, Array, Array]:
         """Steps of the poses (R, F), of the camera (K,) and of the landmarks (L, 3)."""
         system, normal = self.normal(state, looking, weights, damping)
         right = system.right + self.held * (state.poses - self.given)
@@ -205,8 +201,8 @@ class _Problem:
         return steps, camera, landmark_steps(system, self.sightings, steps, camera)
 
     def normal(
-        self, state: _State, looking: "_Looking", weights: Array, damping: float
-    ) -> tuple[Eliminated, "_Normal"]:
+        self, state: _State, looking: tuple[Array, Array], weights: Array, damping: float
+    ) -> tuple[Eliminated, _Normal]:
         """The landmarks eliminated, and the normal equations that remain; `weights` (O,) of the sightings."""
         from scipy import sparse  # slow to import, and seldom needed
         from scipy.sparse.linalg import splu
@@ -287,15 +283,15 @@ class _Problem:
         total += float((self.held_camera * state.camera**2).sum())
         return total if self.motions is None else total + float((self.missed(state) ** 2).sum())
 
-    def looking(self, camera: Array) -> "_Looking":
-        """The bearings, and their derivatives with respect to the camera's parameters."""
+    def looking(self, camera: Array) -> tuple[Array, Array]:
+        """The bearings (O, 3), and their derivatives (O, 3, K) with respect to the camera's parameters."""
         out = np.empty((len(self.used), 3, len(camera)))
         for k in range(len(camera)):
             step = np.zeros(len(camera))
             step[k] = DIFFERENCE
             ahead, back = self.lens.bearings(camera + step), self.lens.bearings(camera - step)
             out[:, :, k] = (ahead - back)[self.used] / (2.0 * DIFFERENCE)
-        return _Looking(self.lens.bearings(camera)[self.used], out)
+        return self.lens.bearings(camera)[self.used], out
 
 
 def _frames(poses: Array) -> Poses:

@@ -6,6 +6,7 @@ from made_beliefs import even
 from made_references import references
 
 from omninav.pipeline import Context
+from omninav.stages.sensor.compared_rows import ComparedRows
 from omninav.stages.sensor.near_references import (
     NearReferences,
     background_similarity,
@@ -167,3 +168,12 @@ def test_an_empty_comparison_weights_all_particles_alike() -> None:
     alike = Similarities(np.zeros((0, 36), np.float32))
     out = stage.step(ctx, alike, even(np.zeros((7, 3))), ReferenceGraph.empty())
     assert np.array_equal(out.likelihood.values, np.ones(7))
+
+
+def test_only_what_was_compared_last_has_a_row() -> None:
+    rows = ComparedRows(6)
+    for compared in ([1, 4], [0, 1, 5], None, [3]):
+        chosen, found = rows.of(None if compared is None else np.array(compared))
+        wanted = range(6) if compared is None else compared
+        assert chosen.tolist() == list(wanted)
+        assert found.tolist() == [list(wanted).index(n) if n in wanted else -1 for n in range(6)]
