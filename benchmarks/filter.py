@@ -5,8 +5,7 @@ import numpy as np
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.geometry.probability.particles import systematic
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
 from omninav.stages.values.belief import Particles

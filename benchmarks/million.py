@@ -31,8 +31,7 @@ from omninav.stages.candidates.reference_index import BuildReferenceIndex, Build
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.match.selective import SelectiveMatch
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.sensor.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals

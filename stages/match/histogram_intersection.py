@@ -9,8 +9,7 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import WordSimilarities
 
-from .last_view import LastView
-from .reference_match import ReferenceMatch
+from .reference_match import LastView, ReferenceMatch
 
 
 class HistogramIntersection(ReferenceMatch, Stage):

@@ -1,12 +1,13 @@
 """Base of all comparisons of a view with the references of a map."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, State
 from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
@@ -16,8 +17,29 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visual_words import WordSimilarities
 
-from .last_view import LastView
 from .map_calibration import MapCalibration
+
+
+class LastView(State):
+    """The features (segments, bins) of the last view and the tick they are of; None before the first.
+
+    `stages/geometry/landmarks/unbroken_view.py` compares two images by their local features.
+    """
+
+    values: Floats | None = None
+    index: int = -1
+
+    def similarity(self, ctx: Context, values: Floats, compare: Callable[[Floats], Floats]) -> float | None:
+        """Gives the similarity of a view to the one before, at the best heading, and keeps the view in its place.
+
+        `compare`: similarities of the view to another one. None where the tick before had no view, or was of another
+        log, and of a view that is not divided around the robot, which changes as the robot turns.
+        """
+        follows = ctx.tick.index == self.index + 1 and not ctx.tick.first_of_log
+        before, self.values, self.index = self.values if follows else None, values, ctx.tick.index
+        if before is None or before.shape != values.shape or len(values) < 2:
+            return None
+        return float(compare(before).max())
 
 
 @dataclass(kw_only=True, eq=False)

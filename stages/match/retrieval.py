@@ -17,9 +17,8 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import RetrievedReferences, Similarities
 
-from .last_view import LastView
 from .map_calibration import MapCalibration
-from .reference_match import check_same_kind
+from .reference_match import LastView, check_same_kind
 
 LANES = 8
 """Turns of the query are padded to a multiple of this, so that the inner loops are whole vector instructions."""

@@ -19,7 +19,6 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 
 from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
-from .compared_rows import ComparedRows
 from .nearest_cells import NearestCells
 
 CELLS_PER_LENGTH_SCALE = 4
@@ -33,6 +32,27 @@ BACKGROUND_DISTANCE = 3.0
 """Distance from the best reference beyond which references are background, length scales."""
 NEIGHBOURS = 4
 """References between which a particle's similarity is interpolated."""
+
+
+class ComparedRows:
+    """Each thing's row among those that were compared, -1 where it was not.
+
+    The array is kept from view to view, and only what was compared is written, since there may be many things.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._rows = np.full(number, -1, np.int64)
+        self._all = np.arange(number)
+        self._written: Ints = self._all[:0]
+
+    def of(self, compared: Ints | None) -> tuple[Ints, Ints]:
+        """Compared references (None: all), and each one's row among them. Valid until the next call."""
+        if compared is None and self._written is self._all:
+            return self._written, self._rows
+        self._rows[self._written] = -1
+        self._written = self._all if compared is None else compared
+        self._rows[self._written] = self._all[: len(self._written)]
+        return self._written, self._rows
 
 
 @compiled(nogil=True, error_model="numpy")

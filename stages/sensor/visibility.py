@@ -18,8 +18,7 @@ from omninav.stages.values.similarity import Similarities, SimilarityField
 from omninav.stages.values.visibility import VisibilityAreas
 
 from .calibrated_similarity import likelihood_ratios, novelty_and_kidnapping
-from .compared_rows import ComparedRows
-from .near_references import similarity_field, weighted_median
+from .near_references import ComparedRows, similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
 from .visibility_similarity import CUTOFF_SIGMAS, mean_seen, sums_by_turn
 

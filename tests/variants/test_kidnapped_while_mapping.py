@@ -17,8 +17,7 @@ from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, Delaye
 from omninav.stages.mapping.fixed_lag_smoother import FixedLagSmoother, FixedLagSmootherState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.match.neighbours import ViewNeighbours
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewMixtures

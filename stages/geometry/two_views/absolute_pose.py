@@ -16,8 +16,7 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import rotated_by
 
-from .ransac import BATCH, AgreedPose, samples_needed, samples_of
-from .refinement import refinement
+from .ransac import BATCH, AgreedPose, refinement, samples_needed, samples_of
 
 
 def three_point_pose(

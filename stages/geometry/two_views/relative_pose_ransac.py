@@ -16,8 +16,7 @@ from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
-from .ransac import BATCH, AgreedPose, samples_needed, samples_of
-from .refinement import refinement
+from .ransac import BATCH, AgreedPose, refinement, samples_needed, samples_of
 
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}

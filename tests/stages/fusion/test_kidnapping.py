@@ -13,8 +13,7 @@ from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
 from omninav.stages.values.belief import Likelihood

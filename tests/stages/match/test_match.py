@@ -6,7 +6,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.histogram_intersection import HistogramIntersection
 from omninav.stages.match.l2 import L2Match
-from omninav.stages.match.last_view import LastView
+from omninav.stages.match.reference_match import LastView
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.candidates import Candidates

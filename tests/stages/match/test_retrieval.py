@@ -7,7 +7,7 @@ from made_references import references
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import turned_views
-from omninav.stages.match.last_view import LastView
+from omninav.stages.match.reference_match import LastView
 from omninav.stages.match.retrieval import Retrieval, best_answers, normalised_intersections, window_turns
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph

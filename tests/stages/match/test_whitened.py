@@ -9,7 +9,7 @@ from made_references import references
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.cosine import CosineMatch
-from omninav.stages.match.last_view import LastView
+from omninav.stages.match.reference_match import LastView
 from omninav.stages.match.whitened import WhitenedMatch, learned_whitening
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentColours, SegmentDescriptors

@@ -10,8 +10,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion, motion_gaussian, move_gaussians
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.gaussian import GaussianMotion
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import Motion
 

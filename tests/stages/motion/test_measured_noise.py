@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.motion.measured_noise import MeasuredNoise
 from omninav.stages.motion.odometry_noise_model import OdometryNoiseModel
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import BridgedMotion, Motion
 

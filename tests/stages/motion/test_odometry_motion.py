@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion, move_poses
 from omninav.stages.geometry.plane.se2 import compose, wrap
-from omninav.stages.motion.measured_noise import MeasuredNoise
-from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Motion
 

@@ -6,8 +6,8 @@ from made_beliefs import even
 from made_references import references
 
 from omninav.pipeline import Context
-from omninav.stages.sensor.compared_rows import ComparedRows
 from omninav.stages.sensor.near_references import (
+    ComparedRows,
     NearReferences,
     background_similarity,
     expected_similarity,
