@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from omninav.pipeline import BadInput, digest_file, read_small, shown, user_path
-from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Undecodable, decode_image, orientation_of
@@ -23,7 +22,7 @@ from .decode_ahead import DecodeAhead
 from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, read_description
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
-from .recording import Format, OpenOptions, UnreadableRecording, checked_image
+from .recording import Format, OpenOptions, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 from .tables import NO_TIME, CsvTable, Delimiter, by_numbers, read_table, table_of
 
@@ -33,7 +32,7 @@ MAX_DIGITS = 10
 """Digits of an image's number."""
 
 
-class ImageFolder(Losses):
+class ImageFolder(Recording):
     """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
     Images are turned as the EXIF orientation of JPEG files says (`turned`).
@@ -41,10 +40,6 @@ class ImageFolder(Losses):
     `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.
     """
-
-    odometry: None = None
-    unmeasured_s: None = None
-    assumed: Sequence[str] = ()
 
     def __init__(self, name: str, folder: Path, description: Description, where: str, options: OpenOptions) -> None:
         super().__init__()
@@ -73,17 +68,14 @@ class ImageFolder(Losses):
         self.turned = sum(map(_is_turned, self._paths_kept))
         """Number of its images that are turned as their EXIF orientation says."""
         self._images = DecodeAhead(lambda frame: partial(self._read, self._paths_kept[frame]))
-        self.stamps: Stamps = times[keep]
-        self.truth: Array | None = None if truth is None else truth[keep]
+        self.stamps = times[keep]
+        self.truth = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         decode = partial(self._images.image, frame, following)
         return checked_image(decode, str(self._paths_kept[frame]), self.camera, self._drop)
-
-    def scan(self, frame: int) -> None:
-        """A folder of images holds no range readings."""
 
     def digest(self) -> str:
         """sha256 over the tables, the description and every image that is used."""

@@ -1,14 +1,13 @@
 """Interface of every recording (frames with stamps, odometry, perhaps truth), and of the formats that open one."""
 
 from abc import ABC, abstractmethod
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from omninav.pipeline import BadInput, user_path
-from omninav.pipeline.mcap.message import BadMessage
+from omninav.pipeline.mcap.message import BadMessage, Losses
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.values.encoded_image import Undecodable
@@ -23,7 +22,7 @@ class UnreadableRecording(BadInput):
     """A recording that cannot be used. The message is one line: which file, topic or record, and what to do."""
 
 
-class Recording(Protocol):
+class Recording(Losses, ABC):
     """One recorded drive, its frames in the order of their header stamps.
 
     `name`: what the user wrote. `camera`: how its images are to be read. `stamps`: (N,) int64 header stamps in
@@ -34,24 +33,15 @@ class Recording(Protocol):
     no odometry is believed, or None where there are none. `assumed`: what nothing in it says and was taken for granted.
     """
 
+    name: str
     camera: Camera
-    assumed: Sequence[str]
+    stamps: Ints
+    odometry: Array | None = None
+    unmeasured_s: Array | None = None
+    truth: Array | None = None
+    assumed: Sequence[str] = ()
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def stamps(self) -> Ints: ...
-    @property
-    def odometry(self) -> Array | None: ...
-    @property
-    def unmeasured_s(self) -> Array | None: ...
-    @property
-    def truth(self) -> Array | None: ...
-    @property
-    def dropped(self) -> Counter[str]: ...
-    @property
-    def details(self) -> dict[str, str]: ...
-
+    @abstractmethod
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.
 
@@ -62,6 +52,7 @@ class Recording(Protocol):
     def scan(self, frame: int) -> Scan | None:
         """The last range readings at or before a frame; None where it has none."""
 
+    @abstractmethod
     def digest(self) -> str:
         """sha256 over all content that the frames are made from."""
 

@@ -18,7 +18,7 @@ from omninav.stages.values.scan import Scan
 
 from .decode_ahead import DecodeAhead
 from .messages import scan_of
-from .recording import UnreadableRecording, checked_image
+from .recording import Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 
 STALE = 1_000_000_000
@@ -79,10 +79,8 @@ def require_stamps(name: str, topic: str, what: str, stamps: Stamps, cure: str =
         )
 
 
-class TopicRecording:
-    """Frames from an image topic with poses from pose topics; a `Recording`. Images are read when asked for."""
-
-    assumed: Sequence[str] = ()
+class TopicRecording(Recording):
+    """Frames from an image topic with poses from pose topics. Images are read when asked for."""
 
     def __init__(
         self,
@@ -105,12 +103,12 @@ class TopicRecording:
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
-    def dropped(self) -> Counter[str]:
+    def dropped(self) -> Counter[str]:  # type: ignore[override]
         """Skipped data, by kind."""
         return self._feed.dropped
 
     @property
-    def details(self) -> dict[str, str]:
+    def details(self) -> dict[str, str]:  # type: ignore[override]
         """The first case of each kind."""
         return self._feed.details
 

@@ -11,14 +11,13 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import digest_file, user_path
-from omninav.pipeline.mcap.message import Losses
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.encoded_image import MAX_PIXELS, Undecodable
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import write_camera
 from .named_camera import assumed_camera, named_camera
-from .recording import Format, OpenOptions, UnreadableRecording, checked_image
+from .recording import Format, OpenOptions, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending
 
 MAX_FRAMES = 2_000_000
@@ -33,7 +32,7 @@ CONTAINERS = re.compile(
 """First bytes of MP4, MOV, AVI, Matroska, WebM, MPEG-TS and -PS, Ogg and FLV: FFmpeg would also follow playlists."""
 
 
-class VideoRecording(Losses):
+class VideoRecording(Recording):
     """The frames of a video as a `Recording`; it has neither odometry nor positions. Stamps count from its beginning.
 
     Images are decoded one after another; one before the last that was asked for is reached from the beginning, so that
@@ -42,14 +41,9 @@ class VideoRecording(Losses):
     `undecodable_image`, `blank_image`. Raises `UnreadableRecording`.
     """
 
-    odometry: None = None
-    unmeasured_s: None = None
-    truth: None = None
-
     def __init__(self, name: str, path: Path, options: OpenOptions) -> None:
         super().__init__()
         self.name, self._path = name, path
-        self.assumed: Sequence[str] = ()
         self._capture = _opened(path)
         width, height = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH + axis)) for axis in (0, 1))
         if not 0 < width * height <= MAX_PIXELS:
@@ -72,9 +66,6 @@ class VideoRecording(Losses):
         """The image of a frame; None (and counted) where it cannot be decoded or is blank."""
         where = f"frame {frame} at {self.stamps[frame] / 1e9:.3f} s"
         return checked_image(partial(self._decoded, frame), where, self.camera, self._drop)
-
-    def scan(self, frame: int) -> None:
-        """A video holds no range readings."""
 
     def digest(self) -> str:
         """sha256 over the file and the camera."""

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +13,7 @@ from omninav.pipeline.engine.code_version import module_version, surroundings
 from omninav.stages import camera, simulator
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane import odometry_noise, se2
-from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.recordings.stamps import ascending
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
@@ -44,32 +43,30 @@ IMAGE_LATENCY_NS = 42_000_000
 """Nanoseconds from an image's stamp to its arrival."""
 
 
-class SimulatedRecording:
+class SimulatedRecording(Recording):
     """One drive along a named route of a world on a day.
 
-    A `Recording`: the same seed, route, day and kidnappings give the same bytes. Images can be asked for in any order.
+    The same seed, route, day and kidnappings give the same bytes. Images can be asked for in any order.
     The day decides the line that is driven, the odometry's errors, the noise and which goods were moved. `collisions`
     counts contacts.
     Raises `UnreadableRecording` for a route that the world does not have.
     """
 
     def __init__(self, world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping] = ()) -> None:
+        super().__init__()
         world = laid_out(world)
         if route not in world.routes:
             raise UnreadableRecording(
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
         self.world, self.route, self.day = world, route, day
+        self.name = f"{world.label}, route {route}, day {day}"
         listed = sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda kidnapping: kidnapping.at)
         self.kidnappings = tuple(map(_other_way, listed) if world.drives_backwards else listed)
         self._later_world: World | None = None
         self._day_duration_s = world.routes[route].day_duration_s
         self._camera = RobotCamera(world, route, day)
         self.camera = self._camera.described
-        self.dropped: Counter[str] = Counter()
-        self.details: dict[str, str] = {}
-        self.unmeasured_s: None = None
-        self.assumed: Sequence[str] = ()
         self._start = DAY_0_NS + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
         self._drive()
         self._schedule_images()
@@ -139,8 +136,8 @@ class SimulatedRecording:
             stamp = self.sent[overtaken[0]][1]
             self.details["backward_stamp"] = f"{self.name}: an image was overtaken by a later one, stamp {stamp} ns"
         self._received: Ints = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
-        self.stamps: Ints = stamps[self._received]
-        self.truth = self._true(self._shots[self._received])
+        self.stamps = stamps[self._received]
+        self.truth: Array = self._true(self._shots[self._received])
         self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._received])
 
     def _schedule_scans(self) -> None:
@@ -162,11 +159,6 @@ class SimulatedRecording:
         found: Array = speed * np.maximum(seconds - times[row], 0.0)[:, None] + poses[row]
         found[:, 2] = se2.wrap(found[:, 2])
         return found
-
-    @property
-    def name(self) -> str:
-        """World, route and day."""
-        return f"{self.world.label}, route {self.route}, day {self.day}"
 
     @cached_property
     def _world(self) -> World:
