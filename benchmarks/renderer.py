@@ -12,7 +12,7 @@ from omninav.pipeline.graph.ports import convert
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.people import Track
+from omninav.stages.simulator.people import RobotTrack
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 
@@ -83,5 +83,5 @@ def _moments(world: World) -> list[tuple[np.ndarray, tuple]]:  # type: ignore[ty
     moments = []
     for point, heading in zip(points, rng.uniform(-np.pi, np.pi, POSES), strict=False):
         pose = np.array([*point, heading])
-        moments.append((pose, world.people_at(39.0, Track(times, np.tile(pose, (len(times), 1))))))
+        moments.append((pose, world.people_at(39.0, RobotTrack(times, np.tile(pose, (len(times), 1))))))
     return moments
