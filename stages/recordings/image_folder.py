@@ -18,11 +18,10 @@ from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Unde
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
-from .decode_ahead import DecodeAhead
 from .description import FAR, MAX_NAME, MAX_PATTERN, Description, Rename, find_layout, read_description
 from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
-from .recording import Format, OpenOptions, Recording, UnreadableRecording, checked_image
+from .recording import DecodeAhead, Format, OpenOptions, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 from .tables import NO_TIME, CsvTable, Delimiter, by_numbers, read_table, table_of
 

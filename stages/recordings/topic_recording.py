@@ -16,9 +16,8 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
-from .decode_ahead import DecodeAhead
 from .messages import scan_of
-from .recording import Recording, UnreadableRecording, checked_image
+from .recording import DecodeAhead, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 
 STALE = 1_000_000_000

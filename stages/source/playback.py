@@ -11,10 +11,9 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Source, Tick, counted, digest_file, user_path
 from omninav.pipeline.engine.code_version import module_version
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.plausibility import MotionLimits
-from omninav.stages.recordings.recording import Recording, UnreadableRecording
+from omninav.stages.recordings.recording import AHEAD, Recording, UnreadableRecording
 from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose

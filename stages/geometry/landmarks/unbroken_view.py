@@ -10,8 +10,7 @@ from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Bytes
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 
-from .map_making import RATIO
-from .pair_check import fit_motion
+from .map_making import RATIO, fit_motion
 
 TOLERANCE = math.radians(1.0)
 """Angle of a bearing to the plane of the motion and the other bearing, above which a match does not fit (rad)."""

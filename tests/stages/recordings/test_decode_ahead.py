@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from omninav.stages.recordings.decode_ahead import AHEAD, DecodeAhead
+from omninav.stages.recordings.recording import AHEAD, DecodeAhead
 from omninav.stages.values.encoded_image import Undecodable
 
 
