@@ -77,8 +77,5 @@ def find_ring(pixels: Pixels) -> Ring:
         raise RingNotFound("no ring stands out")
     # Half a pixel of the small image within the rim, and outside of the camera's reflection.
     return Ring(
-        (centre[0] + 0.5) * scale - 0.5,
-        (centre[1] + 0.5) * scale - 0.5,
-        (inner + 1.5) * scale,
-        (outer - 0.5) * scale,
+        (centre[0] + 0.5) * scale - 0.5, (centre[1] + 0.5) * scale - 0.5, (inner + 1.5) * scale, (outer - 0.5) * scale
     )

@@ -66,12 +66,7 @@ def _count(
 
 
 def hsv_histograms(
-    pixels: Pixels,
-    segments: int,
-    value_bins: int = 4,
-    joint: bool = False,
-    min_saturation: int = 0,
-    min_value: int = 0,
+    pixels: Pixels, segments: int, value_bins: int = 4, joint: bool = False, min_saturation: int = 0, min_value: int = 0
 ) -> Floats:
     """Histograms of hue and value per segment, each segment's summing to 1: (segments, bins) float32.
 

@@ -12,14 +12,7 @@ WEIGHTS_ELSEWHERE = b"\x0a\x08location\x12"
 """Bytes by which an ONNX file (as protobuf writes it) names a file of weights. No hash would cover that one."""
 LOOPS, RANDOM = (
     ("Loop",),
-    (
-        "Bernoulli",
-        "Multinomial",
-        "RandomNormal",
-        "RandomNormalLike",
-        "RandomUniform",
-        "RandomUniformLike",
-    ),
+    ("Bernoulli", "Multinomial", "RandomNormal", "RandomNormalLike", "RandomUniform", "RandomUniformLike"),
 )
 REFUSED = re.compile(b"|".join(b"\x22%c%s" % (len(name), name.encode()) for name in (*LOOPS, *RANDOM)))
 """Operators, as protobuf writes their names: with a loop a network may never end, and not even Ctrl-C stops it."""

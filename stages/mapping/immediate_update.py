@@ -19,13 +19,7 @@ class ImmediateUpdate(Stage):
         updates: MapUpdates
         waiting: MapUpdates | None = None
 
-    def step(
-        self,
-        ctx: Context,
-        view: WholeView,
-        state: GaussianMixture,
-        model: UncertainMotion | None = None,
-    ) -> Out:
+    def step(self, ctx: Context, view: WholeView, state: GaussianMixture, model: UncertainMotion | None = None) -> Out:
         """Make the update."""
         items = (MapUpdate(view, state, ctx.tick.index),) if len(state) else ()
         return self.Out(updates=MapUpdates(items))

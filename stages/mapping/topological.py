@@ -95,10 +95,7 @@ class TopologicalMapping(Stage):
             for view, owner in enumerate(known.owner):
                 names[place[view]] = names[place[view]] or known.names[owner]
         return TopologicalMap(
-            views=stored(
-                [kept[view] for view in used],
-                [views.descriptors[view] for view in used],
-            ),
+            views=stored([kept[view] for view in used], [views.descriptors[view] for view in used]),
             places=row[medoids],
             owner=place[used],
             names=tuple(names),

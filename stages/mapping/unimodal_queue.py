@@ -128,9 +128,5 @@ class UnimodalQueue(Stage):
 
     def _drop_path(self, ctx: Context, pending: UnimodalQueueState) -> None:
         if pending.seen:
-            ctx.count(
-                "view_not_learned",
-                len(pending.seen),
-                detail="the belief had several modes (map_update)",
-            )
+            ctx.count("view_not_learned", len(pending.seen), detail="the belief had several modes (map_update)")
         pending.last, pending.seen, pending.motions = None, [], []

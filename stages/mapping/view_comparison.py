@@ -122,11 +122,7 @@ class ViewComparison(Stage):
         return chosen
 
     def _pose_source(
-        self,
-        ctx: Context,
-        odometry: Sequence[Pose | None],
-        truth: Sequence[Pose | None],
-        known: TopologicalMap | None,
+        self, ctx: Context, odometry: Sequence[Pose | None], truth: Sequence[Pose | None], known: TopologicalMap | None
     ) -> PoseSource:
         there = any(pose is not None for pose in truth)
         if self.supervised == "truth" and not there:
@@ -146,11 +142,7 @@ class ViewComparison(Stage):
 
 
 def compare_all(
-    ctx: Context,
-    views: Sequence[ViewFeatures],
-    close: Bools,
-    known: int,
-    options: ComparisonOptions,
+    ctx: Context, views: Sequence[ViewFeatures], close: Bools, known: int, options: ComparisonOptions
 ) -> tuple[Array, Array]:
     """Visual distances of every two views, inf where they are not `close`, and shares of features that match: (N, N).
 

@@ -46,13 +46,7 @@ class VisualDistance(Stage):
         self._map: TopologicalMap | None = None
         self._places = ManyViews([])
 
-    def step(
-        self,
-        ctx: Context,
-        features: LocalFeatures,
-        descriptor: GlobalDescriptor,
-        map: TopologicalMap,
-    ) -> Out:
+    def step(self, ctx: Context, features: LocalFeatures, descriptor: GlobalDescriptor, map: TopologicalMap) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
             self._places = ManyViews([view_features(map.views.features(int(view))) for view in map.places])

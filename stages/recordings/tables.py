@@ -23,13 +23,7 @@ from .recording import UnreadableRecording
 from .stamps import Stamps
 
 PI = Decimal("3.14159265358979323846264338328")
-LENGTHS = {
-    "m": Decimal(1),
-    "cm": Decimal("0.01"),
-    "mm": Decimal("0.001"),
-    "km": Decimal(1000),
-    "in": Decimal("0.0254"),
-}
+LENGTHS = {"m": Decimal(1), "cm": Decimal("0.01"), "mm": Decimal("0.001"), "km": Decimal(1000), "in": Decimal("0.0254")}
 TIMES = {
     name: Decimal(scale) for name, scale in (("ns", 1), ("us", 10**3), ("ms", 10**6), ("s", 10**9), ("min", 60 * 10**9))
 }

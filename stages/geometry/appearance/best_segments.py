@@ -53,10 +53,7 @@ def _selective_sum(context: Any, similarities: Any, heading: Any, reference: Any
         for i, j in sorting_network(len(values)):
             first, second = values[i], values[j]
             ordered = builder.fcmp_ordered(">", first, second)
-            values[i], values[j] = (
-                builder.select(ordered, first, second),
-                builder.select(ordered, second, first),
-            )
+            values[i], values[j] = builder.select(ordered, first, second), builder.select(ordered, second, first)
         total = best = context.get_constant(types.float32, 0.0)
         for value, factor in zip(values, llvm.unpack_tuple(builder, arguments[3]), strict=True):
             total = builder.fadd(total, value)

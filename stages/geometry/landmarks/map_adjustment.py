@@ -81,10 +81,7 @@ class AdjustedMap(NamedTuple):
 
 
 def found_with_mount(
-    robot: RobotPath,
-    described: Array,
-    adjust: Callable[[Array], AdjustedMap],
-    again: Callable[[Array], AdjustedMap],
+    robot: RobotPath, described: Array, adjust: Callable[[Array], AdjustedMap], again: Callable[[Array], AdjustedMap]
 ) -> tuple[AdjustedMap, Array, float]:
     """Adjusts the poses of a camera on a robot, and finds its mount (3,) and the delay of its images (s).
 

@@ -50,9 +50,7 @@ def move_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Tri
     cos, sin = np.cos(headings), np.sin(headings)
     by_pose = np.broadcast_to(np.eye(3), covariances.shape).copy()
     by_pose[:, 0, 2], by_pose[:, 1, 2] = -motion[1] * sin, motion[1] * cos
-    ends = np.column_stack(
-        [means[:, 0] + motion[1] * cos, means[:, 1] + motion[1] * sin, wrap(headings + motion[2])],
-    )
+    ends = np.column_stack([means[:, 0] + motion[1] * cos, means[:, 1] + motion[1] * sin, wrap(headings + motion[2])])
     spread = by_pose @ covariances @ np.swapaxes(by_pose, 1, 2) + _noise(headings, motion[1], sigmas)
     return ends, 0.5 * (spread + np.swapaxes(spread, 1, 2))
 

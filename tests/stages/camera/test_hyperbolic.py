@@ -13,11 +13,7 @@ from omninav.stages.camera.hyperbolic import HyperbolicMirror
 HOUSE = HyperbolicMirror(640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, 0.4, height=0.9, yaw=0.3)
 MIRRORS = st.tuples(st.floats(5.0, 60.0), st.floats(5.0, 60.0))
 INTRINSICS = st.tuples(
-    st.floats(100.0, 900.0),
-    st.floats(100.0, 900.0),
-    st.floats(0.0, 800.0),
-    st.floats(0.0, 800.0),
-    st.floats(-2.0, 2.0),
+    st.floats(100.0, 900.0), st.floats(100.0, 900.0), st.floats(0.0, 800.0), st.floats(0.0, 800.0), st.floats(-2.0, 2.0)
 )
 DIRECTIONS = st.tuples(st.floats(-1.0, 1.0), st.floats(-math.pi, math.pi))  # sine of elevation, bearing
 

@@ -9,12 +9,7 @@ from omninav.stages.features.colour_histogram import ColourHistogram, colour_his
 PIXELS = np.random.default_rng(0).integers(0, 256, (40, 72, 3), dtype=np.uint8)
 
 
-SPACES = {
-    "rgb": cv2.COLOR_BGR2RGB,
-    "lab": cv2.COLOR_BGR2Lab,
-    "ycrcb": cv2.COLOR_BGR2YCrCb,
-    "hsv": cv2.COLOR_BGR2HSV,
-}
+SPACES = {"rgb": cv2.COLOR_BGR2RGB, "lab": cv2.COLOR_BGR2Lab, "ycrcb": cv2.COLOR_BGR2YCrCb, "hsv": cv2.COLOR_BGR2HSV}
 
 
 @pytest.mark.parametrize("joint", [False, True])

@@ -10,12 +10,7 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
 from omninav.stages.features.global_colours import GlobalColours
-from omninav.stages.features.vertical_segments import (
-    FindVerticalSegments,
-    ImageSegments,
-    prototypes,
-    segments_of,
-)
+from omninav.stages.features.vertical_segments import FindVerticalSegments, ImageSegments, prototypes, segments_of
 from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import VerticalSegments

@@ -68,10 +68,7 @@ DAMAGES: dict[str, tuple[Callable[[Made, int], Made], dict[str, int]]] = {
     "1e30 m away": (away([82], lambda *_: (1e30, 0.0, 0.0)), {"impossible_pose": 1}),
     "1e308 m away": (away([82], lambda *_: (1e308, 0.0, 0.0)), {"impossible_pose": 1}),
     "turned": (away([82], lambda _, x, y, heading: (x, y, heading + 2.0)), {"impossible_motion": 1}),
-    "every other": (
-        away(range(61, 100, 2), lambda n, *_: (1e4 * math.sin(n), 0.0, 0.0)),
-        {"impossible_motion": 20},
-    ),
+    "every other": (away(range(61, 100, 2), lambda n, *_: (1e4 * math.sin(n), 0.0, 0.0)), {"impossible_motion": 20}),
     "the first": (away([0], lambda *_: (-7e3, 0.0, 0.0)), {"impossible_motion": 1}),
     "half a second": (away(range(80, 90), lambda _, x, y, heading: (x + 30.0, y, heading)), {"impossible_motion": 10}),
     "quaternion of no length": (away([82], lambda _, *pose: pose, {"w": 0.0}), {"impossible_pose": 1}),

@@ -2,13 +2,7 @@ import numpy as np
 import pytest
 from landmark_world import driven, misplaced, seen_in
 
-from omninav.stages.geometry.landmarks.closures import (
-    FAR_M,
-    TURN_SIGMA,
-    VerifiedPairs,
-    candidate_pairs,
-    verified_pairs,
-)
+from omninav.stages.geometry.landmarks.closures import FAR_M, TURN_SIGMA, VerifiedPairs, candidate_pairs, verified_pairs
 from omninav.stages.geometry.landmarks.map_adjustment import adjusted_drive
 from omninav.stages.geometry.landmarks.pair_lengths import driven_steps, pair_lengths
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
