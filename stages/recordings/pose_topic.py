@@ -49,7 +49,8 @@ class PoseTopic:
     def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> PoseTrack | None:
         """The believed part of a message; None where nothing is. Skipped data is counted with `feed`.
 
-        `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
+        `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does,
+        and `UnreadableRecording` is raised where most of it is not believed.
         """
         poses, stamps = np.array(self._poses).reshape(-1, 3), np.array(self._stamps, np.int64)
         if not jumps:
@@ -59,7 +60,9 @@ class PoseTopic:
         stamps, poses = stamps[kept], poses[kept]
         rows, begun, gaps = believed(stamps, poses, limits)
         unlikely = np.setdiff1d(np.flatnonzero(np.isfinite(poses).all(axis=1)), rows)
-        self._drop(feed, name, "impossible_motion", stamps, poses, unlikely, limits)
+        said = self._drop(feed, name, "impossible_motion", stamps, poses, unlikely, limits)
+        if not jumps and 2 * len(unlikely) > len(poses):
+            raise UnreadableRecording(f"{said}; or type topics.odometry=null to do without")
         if not len(rows):
             return None
         stamps, poses = stamps[rows], poses[rows]
@@ -70,10 +73,10 @@ class PoseTopic:
 
     def _drop(
         self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Ints, limits: MotionLimits
-    ) -> None:
+    ) -> str:
         """Count some rows of a track, and say of the first what it would need of the robot, by its neighbour."""
         if not len(rows):
-            return
+            return ""
         row = int(rows[0])
         other = row - 1 if row else min(1, len(poses) - 1)
         metres = math.hypot(*(poses[row, :2] - poses[other, :2]).tolist())
@@ -87,6 +90,7 @@ class PoseTopic:
             detail += "; most are like this: check the unit (m, rad)"
         for _ in rows:
             feed.drop(kind, detail)
+        return detail
 
 
 class TransformTopic(PoseTopic):

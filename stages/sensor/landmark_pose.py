@@ -160,7 +160,7 @@ class LandmarkPose(Stage):
         state.told = True
         ctx.warn(
             f"images are some {1e3 * sigma:.0f} ms off odometry, each by itself, for which covariances allow: their "
-            "time stamps jitter, or poses are less accurate than they say; stamp images when they are taken"
+            "time stamps jitter, or odometry comes too seldom; stamp images when they are taken"
         )
 
     def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:

@@ -17,8 +17,8 @@ FORGOTTEN = 0.99
 """Factor of the log likelihood of the past at each image."""
 MAX_SIGMA_S, MAX_OFF_S = 0.03, 0.5
 """Largest standard deviation of the time that a motion tells, and largest such time, s."""
-MAX_TURN = 1.0
-"""Turn between two images above which no velocity is that of both (rad)."""
+MAX_TURN, MAX_APART_S = 1.0, 2.0
+"""Turn (rad) and time (s) between two images above which no velocity is that of both."""
 MIN_SHARE = 0.5
 """Smallest ratio of two consecutive velocities at which a stamp's error changes both motions by as much."""
 MAX_SQUARE = 16.0
@@ -58,7 +58,7 @@ class StampJitter(NamedTuple):
         odometry. Their likelihood is that of a Gaussian sequence in which neighbours are correlated.
         """
         new = self._replace(pose=pose, covariance=covariance, along=np.full(3, np.nan))
-        if np.isnan(self.pose[0]) or abs(moved[2]) > MAX_TURN:
+        if np.isnan(self.pose[0]) or abs(moved[2]) > MAX_TURN or seconds > MAX_APART_S:
             return new
         missed = pose - compose(self.pose, moved)
         missed[2] = wrap(missed[2])

@@ -20,7 +20,7 @@ from conflicting_logs import (
 from conftest import DATA, DRIVE, TOUR, needs_data
 
 import omninav
-from omninav.pipeline import Context, Tick
+from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.mcap.message import Message
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.recordings.opening import open_recording
@@ -131,7 +131,8 @@ def test_images_that_fit_no_place_are_said_and_a_quarter_that_fits_is_enough(fit
 
 def test_odometry_that_is_not_believed_says_to_check_its_unit(tmp_path: Path) -> None:
     log = changed_log(DRIVE, tmp_path / "drive.mcap", odometry(lambda pose: pose * (1e3, 1e3, 1.0)))
-    assert open_recording(str(log)).details["impossible_motion"].endswith("most are like this: check the unit (m, rad)")
+    with pytest.raises(BadInput, match=r"0\.1 s away; .* most are like this: check the unit \(m, rad\); or type"):
+        open_recording(str(log))
 
 
 def test_a_pause_and_another_log_are_no_leaps_of_the_clock() -> None:
