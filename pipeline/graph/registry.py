@@ -26,15 +26,16 @@ import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeGuard
 
 from omninav.pipeline.files import digest_text, user_path
 
-from .parameters import first_line
+from .parameters import BadStage, first_line
 from .problems import BadInput, cut
+from .signature import signature
 from .stage import Source, Stage
 from .value import Value
 
@@ -194,10 +195,20 @@ def _load_file(path: Path) -> ModuleType:
 @functools.cache
 def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
     """Stages of installed distributions; looking through them takes as long as everything else, so once will do."""
-    points = importlib.metadata.entry_points(group=ENTRY_POINTS)
-    return tuple(
-        _plugin(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name)
-    )
+    points = sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
+    targets = {point.name: sorted({each.value for each in points if each.name == point.name}) for point in points}
+    found = []
+    for name, several in targets.items():
+        entry = _plugin(name, several[0], "installed")
+        if "." not in name:
+            entry = replace(
+                entry, problem=f"entry point '{name}': its package must name it role.name, as in match.{name}"
+            )
+        elif len(several) > 1:
+            both = " and ".join(several)
+            entry = replace(entry, problem=f"'{name}' is offered by several packages ({both}); uninstall all but one")
+        found.append(entry)
+    return tuple(found)
 
 
 def plugins() -> list[Entry]:
@@ -241,9 +252,9 @@ def _imported(entry: Entry) -> Entry:
     try:
         thing = _thing(entry.target)
         is_value = inspect.isclass(thing) and issubclass(thing, Value)  # as a folder may hold in place of stages
-        summary = first_line(thing if is_value else resolve(entry.target))
+        summary = first_line(thing) if is_value else signature(resolve(entry.target)).summary
         return Entry(entry.name, entry.target, entry.origin, summary)
-    except UnknownStage as error:
+    except (UnknownStage, BadStage) as error:
         return Entry(entry.name, entry.target, entry.origin, problem=str(error))
 
 

@@ -108,6 +108,10 @@ def _sound_parameters(cls: type[Stage], where: str) -> dict[str, Parameter]:
     for name, parameter in parameters.items():
         if parameter.default is not dataclasses.MISSING:
             problems = convert(parameter.default, parameter.type, name)[1]
+            kind = parameter.type if inspect.isclass(parameter.type) else None
+            if problems and kind not in (None, bool, int, float, str) and isinstance(parameter.default, kind):
+                allowed = "numbers, words, Literal, tuples, or a Value of such"
+                raise BadStage(f"{where}: '{name}' cannot be a {kind.__name__}; parameters are {allowed}")
             if problems:
                 raise BadStage(f"{where}: the default of '{name}': {problems[0].what}; write another")
     return parameters

@@ -47,14 +47,27 @@ def test_the_environment_offers_a_stage_by_name(stage_file: Path, monkeypatch: p
 
 
 def test_an_installed_package_offers_a_stage_by_entry_point(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
-    folder = stage_file.parent / "twice-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: twice\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text("[omninav.stages]\nmatch.twice = twice:Twice\n")
-    monkeypatch.syspath_prepend(str(stage_file.parent))
-    importlib.invalidate_caches()
+    install(stage_file.parent, "twice", "match.twice = twice:Twice", monkeypatch)
     assert ("match.twice", "installed") in [(e.name, e.origin) for e in plugins()]
     assert resolve("match.twice").__name__ == "Twice"
+
+
+def install(folder: Path, package: str, points: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put a distribution with these entry points on the path."""
+    info = folder / f"{package}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[omninav.stages]\n{points}\n")
+    monkeypatch.syspath_prepend(str(folder))
+    importlib.invalidate_caches()
+
+
+def test_entry_points_of_one_name_or_without_a_role_are_problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for package, points in (("one", "match.twice = toys:Scale\nlone = toys:Scale"), ("two", "match.twice = toys:Add")):
+        install(tmp_path, package, points, monkeypatch)
+    said = {entry.name: entry.problem for entry in plugins() if entry.origin == "installed"}
+    assert "offered by several packages (toys:Add and toys:Scale)" in said["match.twice"]
+    assert "must name it role.name, as in match.lone" in said["lone"]
 
 
 @pytest.mark.parametrize(
@@ -63,6 +76,7 @@ def test_an_installed_package_offers_a_stage_by_entry_point(stage_file: Path, mo
         ("import not_there_at_all\n", "ModuleNotFoundError: No module named 'not_there_at_all'"),
         ("raise SystemExit(3)\n", "SystemExit: 3"),
         ("class Twice: pass\n", "is not a Stage"),
+        ("from toys import Scale\nclass Twice(Scale):\n    def step(self, ctx, a): pass\n", "'a' has no type"),
         ("", "has no 'Twice'; its stages: none"),
     ],
 )

@@ -79,6 +79,13 @@ class OutOfBounds(Stage):
     def step(self, ctx: Context) -> None: ...
 
 
+class OfNoKind(Stage):
+    gain: complex = 2j
+    """Of something."""
+
+    def step(self, ctx: Context) -> None: ...
+
+
 class Silent(toys.Constant):
     def step(self, ctx: Context): ...
 
@@ -90,6 +97,7 @@ class Silent(toys.Constant):
         (UntypedParameter, "'gain' has no type, and so sets no parameter; write `gain: int = 3`"),
         (OtherDefault, "'offset' has no type, and so sets no parameter; write `offset: float = 2.0`"),
         (OutOfBounds, "the default of 'gain': -1.0 is out of bounds, expected float > 0; write another"),
+        (OfNoKind, "'gain' cannot be a complex; parameters are numbers, words, Literal"),
         (Silent, "step does not say that it gives its Out; write `-> Out`"),
         (NoStep, "has no step method; write `def step"),
         (Untyped, "argument 'number' has no type; write `number: SomeValue`"),
