@@ -74,7 +74,10 @@ def executor_of(settings: ExecutorSettings) -> Executor:
         factory: Factory = getattr(import_module(module), name)
     except ImportError as error:
         raise BadInput(f"executor={settings.name}: {error}; {_to_install(settings.name)}") from None
-    return factory(settings)
+    executor = factory(settings)
+    if not hasattr(executor, "submit"):
+        raise BadInput(f"executor={settings.name}: {target} gives a {type(executor).__name__}, expected an Executor")
+    return executor
 
 
 def _to_install(name: str) -> str:

@@ -44,6 +44,8 @@ def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "executor.workers=-1"]) == 2
     assert "executor.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
+    assert main(["check", "-m", "variant=omniview_mcl", "match=selective,l2"]) == 2
+    assert "check: it checks one run; type it without -m" in capsys.readouterr().err
 
 
 def test_an_objective_that_no_stage_measures_is_refused_before_the_run(tmp_path: Path, monkeypatch, capsys) -> None:

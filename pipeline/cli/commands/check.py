@@ -33,6 +33,8 @@ HYDRA_FOLDERS = ("hydra.run.dir", "hydra.sweep.dir")
 def command(arguments: list[str]) -> int:
     """Compose and check a configuration, open its inputs, and print what would run."""
     words, _ = read_words(arguments)
+    if {"-m", "--multirun"} & {*arguments}:
+        raise BadInput("check: it checks one run; type it without -m, with one value of each setting")
     of_conditions = condition_arguments(words)
     with composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:

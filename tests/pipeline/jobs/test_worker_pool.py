@@ -15,7 +15,7 @@ import pytest
 
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.jobs import perform, worker_pool
-from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
+from omninav.pipeline.jobs.executors import BUILT_IN, ExecutorSettings, executor_of, read_executor
 from omninav.pipeline.jobs.job import Job
 from omninav.pipeline.jobs.worker_pool import WorkerPool
 
@@ -169,6 +169,12 @@ def test_what_crosses_to_a_cluster_is_text(tmp_path: Path):
 def test_settings_of_an_engine_that_make_no_sense_are_refused(given: object, message: str):
     with pytest.raises(ProblemsFound, match=message):
         read_executor(given)
+
+
+def test_what_is_no_executor_is_named(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(BUILT_IN, "mine", "builtins:id")
+    with pytest.raises(BadInput, match="executor=mine: builtins:id gives a int, expected an Executor"):
+        executor_of(ExecutorSettings("mine"))
 
 
 def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
