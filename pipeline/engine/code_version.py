@@ -4,12 +4,14 @@ import ast
 import dataclasses
 import functools
 import importlib.metadata
+import importlib.util
 import inspect
 import json
 import platform
 import re
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -88,8 +90,9 @@ def module_version(module: str, without: str = "") -> str:
     """A hash over the source of a loaded module and of all that it imports of its own package, directly or not.
 
     A change there makes a stage's cached results stale, one elsewhere in the package does not. Imports are read off the
-    source, so that those count as well which run at need only. What other packages hold counts by its version, where
-    it is one of `LIBRARIES`. Modules of the package `without` are left out.
+    source, so that those count as well which run at need only. A user's stage may also import modules that are not
+    installed, as from files beside its own: they count too. What other packages hold counts by its version, where it is
+    one of `LIBRARIES`. Modules of the package `without` are left out.
     """
     file = Path(inspect.getfile(sys.modules[module])).resolve()
     root = file.parent
@@ -99,22 +102,35 @@ def module_version(module: str, without: str = "") -> str:
     names = module.split(".")
     outer = ".".join([*names[: -len(inside)], inside[0]])  # the package's full name; or the module's, without one
     found: dict[str, str] = {}
-    to_read = [module] if ".".join(names[-len(inside) :]) == ".".join(inside) else []
+    to_read = [module]
+    if ".".join(names[-len(inside) :]) != ".".join(inside):  # a file that was given by its path: it has no package
+        found[inside[-1]], imported = _read(file, inside[-1])
+        to_read = list(imported)
     while to_read:
         name = to_read.pop()
-        if (
-            name in found
-            or not f"{name}.".startswith(f"{outer}.")
-            or (without and f"{name}.".startswith(f"{without}."))
-        ):
+        if name in found or (without and f"{name}.".startswith(f"{without}.")):
             continue
-        place = _file_of(root / inside[0], name[len(outer) + 1 :])
+        own = f"{name}.".startswith(f"{outer}.")
+        place = _file_of(root / inside[0], name[len(outer) + 1 :]) if own else _not_installed(name)
         if place is not None:
             found[name], imported = _read(place, name)
             to_read += [name.rpartition(".")[0], *imported]  # a package's own file runs before its modules
-    if not found:  # a file that was given by its path: it has no package, and no name of its own
-        found[inside[-1]] = digest_text(file.read_text(encoding="utf-8"))
-    return digest_text(*(text for name in sorted(found) for text in (name[len(outer) :], found[name])))
+    return digest_text(*(text for name in sorted(found) for text in (name.removeprefix(outer), found[name])))
+
+
+@functools.cache
+def _not_installed(name: str) -> Path | None:
+    """The file of a module that is neither installed nor of Python or omninav, and so has no version."""
+    top, _, rest = name.partition(".")
+    try:
+        spec = None if top in ("omninav", *sys.stdlib_module_names) else importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        spec = None
+    file = Path(spec.origin if spec is not None and spec.origin else "").resolve()
+    installed = (Path(sysconfig.get_path(kind)).resolve() for kind in ("purelib", "platlib"))
+    if file.suffix != ".py" or any(file.is_relative_to(folder) for folder in installed):
+        return None
+    return _file_of(file.parent if file.name == "__init__.py" else file.with_suffix(""), rest)
 
 
 @functools.cache

@@ -12,6 +12,7 @@ from unittest.mock import patch
 import pytest
 
 from omninav.pipeline.engine import code_version
+from omninav.pipeline.graph import registry
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -21,6 +22,8 @@ import toys
 from . import near
 from pack.deep.far import FAR
 import pack.whole
+import beside
+import numpy
 
 class Twice(Stage):
     class Out(Outputs):
@@ -40,6 +43,8 @@ FILES = {
     "pack/whole/part.py": "z = 1",
     "pack/at_need.py": "NEED = 1",
     "pack/other.py": "w = 1",
+    "beside.py": "from beside_that import b",
+    "beside_that.py": "b = 1",
 }
 
 
@@ -53,6 +58,7 @@ def written(place: Path) -> Path:
 def version(place: Path) -> str:
     """The version of the stage in a folder, read anew."""
     code_version._read.cache_clear()
+    code_version._not_installed.cache_clear()
     with patch.dict(sys.modules), patch.object(sys, "path", [str(place), *sys.path]):
         module = importlib.import_module("pack.stage")
         assert Path(str(module.__file__)).is_relative_to(place)
@@ -67,6 +73,24 @@ def test_a_change_in_what_a_stage_imports_is_another_version_and_one_elsewhere_i
     changed = written(tmp_path / "changed")
     (changed / name).write_text(FILES[name] + "\nchanged = True\n")
     assert (version(changed) == before) is (name == "pack/other.py")
+
+
+def test_a_stage_in_a_file_follows_what_lies_beside_it_and_nothing_that_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.py").write_text("import beside\nimport numpy\nimport json\nimport omninav\n")
+    (tmp_path / "beside.py").write_text("b = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    module = registry._load(str(tmp_path / "mine.py"))
+    found = []
+    for text in ("b = 1\n", "b = 2\n"):
+        (tmp_path / "beside.py").write_text(text)
+        code_version._read.cache_clear()
+        code_version._not_installed.cache_clear()
+        found.append(code_version.module_version.__wrapped__(module.__name__))
+    assert found[0] != found[1]
+    assert code_version._not_installed("beside") == tmp_path / "beside.py"
+    assert not any(map(code_version._not_installed, ("numpy", "json", "omninav", "omninav.stages", "nowhere_at_all")))
 
 
 @pytest.mark.parametrize(
