@@ -36,7 +36,7 @@ from .repetition import finished
 from .result import ConditionRow, ExperimentResult, summary_of
 from .shared_inputs import Recording, artifacts_of, recordings_of
 from .specification import FULL, Experiment, read_experiment
-from .verdicts import Verdict, judge
+from .verdicts import Verdict, judge, unmeasured
 
 STATE = "experiment.json"
 """File in an experiment's folder that says with what it was started, and how far it is."""
@@ -144,6 +144,9 @@ class ExperimentRun:
                 if "seed" in message:
                     run = jobs[job.name][1]
                     run.results |= finished(run.folder, run.key, [message["seed"]])
+                    if done() == 1:
+                        for problem in unmeasured(self.experiment, results_by_condition(self.conditions)):
+                            print(f"so far: {problem.where}: {problem.what}; {problem.hint}", flush=True)
                     progress.update(self.experiment.name, done(), total)
 
             def on_end(job: Job, outcome: Outcome) -> None:

@@ -328,11 +328,14 @@ def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
 
 def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place: Path):
     file = place / "mine/experiment/dice.yaml"
-    file.write_text(EXPERIMENT.replace("loaded: nodes.table.bias=2.0", "loaded: nodes.noisy.raises=true"))
+    text = EXPERIMENT.replace("loaded: nodes.table.bias=2.0", "loaded: nodes.noisy.raises=true")
+    file.write_text(text.replace("measures:", "measures:\n  gone: {title: Gone, path: [eror_m]}", 1))
     ended = omninav(*MINE, "profile=quick")
     assert ended.returncode == 1
     said = "stage 'noisy' (my_stages.Noisy) failed at tick 3 (log 0, frame 0): ValueError: the third is too many"
     assert f"method loaded, tour TT1: {said}" in ended.stdout
+    early = "so far: experiment.measures.gone.path: no run has eror_m; did you mean 'error_m'"
+    assert early in ended.stdout  # before all have run
     folder = place / "runs/dice_quick"
     for page in ("dice.md", "dice.html"):
         assert "the third is too many" in (folder / page).read_text()
