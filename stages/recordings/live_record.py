@@ -195,12 +195,16 @@ def _camera(name: str, feed: Feed) -> Camera:
     return parse_camera(feed.attachments[CAMERA], f"{name}: attachment {CAMERA}")
 
 
+MAX_START_SIGMA = 1e4
+"""Largest standard deviation of a first pose (m, rad): a pose of more says nothing."""
+
+
 def _start_of(message: Any) -> tuple[float, float, float, float, float]:
     """x, y, heading and their standard deviations of a PoseWithCovarianceStamped."""
     x, y, heading = pose_of(message)
     covariance = np.asarray(message.pose.covariance, dtype=np.float64)
     variances = np.array([(covariance[0] + covariance[7]) / 2, covariance[35]])
-    if not (np.isfinite(variances).all() and (variances >= 0).all()):
-        raise ValueError("its covariance is none")
+    if not ((variances >= 0).all() and (variances <= MAX_START_SIGMA**2).all()):
+        raise ValueError(f"its covariance is none, or of standard deviations above {MAX_START_SIGMA:g}")
     metres, radians = np.sqrt(variances).tolist()
     return x, y, heading, metres, radians

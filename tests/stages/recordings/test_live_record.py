@@ -62,9 +62,10 @@ def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:
         say(drive, "odometry", at, {"pose": {"pose": pose_fields(at - 102.1, 0.0, 0.0)}})
     tick, _ = drive.frame(2_600_000_000)
     assert (tick.odometry[0], tick.reported_odometry[0], tick.unmeasured_s) == pytest.approx((2.6, -99.5, 0.1))
-    covariance[35] = -0.04
-    with pytest.raises(ValueError, match="covariance"):
-        say(drive, "initial_pose", 0.3, {"pose": {"pose": pose_fields(0.0, 0.0, 0.0), "covariance": covariance}})
+    for variance in (-0.04, np.nan, np.inf, 1e300):
+        covariance[35] = variance
+        with pytest.raises(ValueError, match="covariance"):
+            say(drive, "initial_pose", 0.3, {"pose": {"pose": pose_fields(0.0, 0.0, 0.0), "covariance": covariance}})
 
 
 @pytest.mark.parametrize(("frame", "taken"), [("", True), ("map", True), ("wheels", False), ("base_link", False)])
