@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
-"""Errors of a full or read-only disk: no fault of whoever writes."""
+"""Errors of a full or read-only disk: no fault of the code that writes."""
 SUM = "sha256"
 """The key of a JSON file's own checksum."""
 PART = f"@{re.sub(r'[^A-Za-z0-9-]', '_', os.uname().nodename)}.part"
@@ -81,7 +81,7 @@ def _lives(process: int) -> bool:
 
 
 def user_path(text: str | Path) -> Path:
-    """A path as a user writes it, `~` and all; as it stands where `~name` is nobody."""
+    """A path as a user writes it, `~` and all; unchanged where `~name` is nobody."""
     try:
         return Path(text).expanduser()
     except RuntimeError:

@@ -1,4 +1,4 @@
-"""Tables as files: CSV for whoever reads or types, Parquet for programs."""
+"""Tables as files: CSV for people, Parquet for programs."""
 
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
@@ -35,7 +35,7 @@ def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
 
 
 def _column(values: "npt.NDArray[Any]") -> Any:
-    """A column whose NaN or masked cells are empty, of numbers and texts as they lie: `pa.array` imports pandas."""
+    """A column whose NaN or masked cells are empty, of numbers and texts as they are: `pa.array` imports pandas."""
     import numpy as np
     import pyarrow as pa
 

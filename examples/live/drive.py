@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         time.sleep(given.kill_after)
         node.send_signal(signal.SIGKILL)
         node.wait()
-        print("killed; it goes on with its map and its belief", flush=True)
+        print("killed; it continues with its map and its belief", flush=True)
         subprocess.run(omninav("resume", str(run)), check=True)
     finally:
         robot.terminate()

@@ -1,4 +1,4 @@
-"""Read-only views of a run's values: a run that goes on must not change because a program wrote to them."""
+"""Read-only views of a run's values: a run that continues must not change because a program wrote to them."""
 
 import dataclasses
 from typing import Any

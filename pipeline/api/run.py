@@ -97,13 +97,13 @@ class Run:
     def frames(self) -> Any:
         """A row for every frame: a `pandas.DataFrame` where pandas is installed, else a `pyarrow.Table`.
 
-        `runs/README.md` says what the columns are.
+        `runs/README.md` describes the columns.
         """
         return read_table(self._file("frames.parquet"))
 
     @property
     def trajectory(self) -> Any:
-        """The rows and columns of `frames` that say where the estimate was: `stamp_ns` and `estimate_…`."""
+        """The rows and columns of `frames` with the estimate: `stamp_ns` and `estimate_…`."""
         return read_table(self._file("frames.parquet"), lambda name: name == "stamp_ns" or name.startswith("estimate_"))
 
     @property
@@ -141,7 +141,7 @@ class Run:
     def _file(self, name: str) -> Path:
         file = self.folder / name
         if not file.is_file():
-            hint = f"`omninav resume {shlex.quote(str(self.folder))}` goes on with a run that did not end"
+            hint = f"`omninav resume {shlex.quote(str(self.folder))}` continues a run that did not end"
             raise BadInput(f"{self.folder}: no {name} in it; {hint}")
         return file
 
@@ -182,7 +182,7 @@ def run(
     """Run a configuration to its end: `run("some_variant", log="drive.mcap", seed=3)`.
 
     Words and settings are those of `compose`, or a configuration comes first. `folder`: where its files are left; None:
-    a new one in `runs`. `progress`: whether it says on the standard error how far it is. Raises `ProblemsFound`,
+    a new one in `runs`. `progress`: whether it shows its progress on standard error. Raises `ProblemsFound`,
     `BadInput`, or `StageFailed` where a stage raised.
     """
     made = configured(words, settings)

@@ -30,14 +30,14 @@ NOT_PUSHED = {
     "log": "a session has the frames that step() is given; omninav.run reads a log",
     "objective": "a session has all metrics in close().metrics; omninav.run and sweeps return one",
 }
-"""Settings that say nothing to a session, and what to use."""
+"""Settings that mean nothing to a session, and what to use."""
 
 
 class Step(Mapping[str, Any]):
     """Outputs of the stages for a frame; None where one gave nothing.
 
     `out["match.similarities"]` is the output of a node, and `out.estimate` the one of that name, whichever node has it.
-    Arrays are read-only, since the session goes on with them: `np.array(…)` copies one.
+    Arrays are read-only, since the session keeps using them: `np.array(…)` copies one.
     """
 
     def __init__(self, values: Mapping[str, Any], names: Mapping[str, str]) -> None:
@@ -77,7 +77,7 @@ class Step(Mapping[str, Any]):
 class Session(AbstractContextManager["Session"]):
     """A run whose frames come one at a time. It is a run like any other: folder, checkpoints, metrics and report.
 
-    `with` closes it at the end of its block; without `with`, call `close`. Where its block raises, `resume` goes on
+    `with` closes it at the end of its block; without `with`, call `close`. Where its block raises, `resume` continues
     with the next frame; where a stage failed or the process died, from the last `save`, or from the last of the
     checkpoints that are written every few seconds. It belongs to the process that opened it, and is used by one thread
     at a time.
@@ -107,7 +107,7 @@ class Session(AbstractContextManager["Session"]):
         return self._engine.ticks
 
     def step(self, **frame: Any) -> Step:
-        """Push a frame and run every stage once. What a frame may bring, its source says (`omninav stages source`).
+        """Push a frame and run every stage once. Its source states what a frame may bring (`omninav stages source`).
 
         Raises `BadInput` where the source refuses the frame, which is then discarded. Raises `StageFailed`
         where a stage raised; after that the session can only be resumed.
@@ -121,7 +121,7 @@ class Session(AbstractContextManager["Session"]):
             except BaseException as error:
                 # Some stages have run and others not, unless the source has refused the frame.
                 if len(self._given) > given or not isinstance(error, BadInput):
-                    self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
+                    self._over = "a stage failed; omninav.resume continues from the last checkpoint"
                 raise
             self._say_warnings()
             return Step(self._engine.values, self._names)
@@ -156,7 +156,7 @@ class Session(AbstractContextManager["Session"]):
                     warnings.warn(f"{self.folder.name}: {sentence}", stacklevel=3)
 
     def save(self) -> Path:
-        """Write a checkpoint, from which `resume` goes on; gives the run's folder."""
+        """Write a checkpoint, from which `resume` continues; gives the run's folder."""
         with self._alone():
             self._refuse_over()
             self._engine.save()
@@ -178,15 +178,15 @@ class Session(AbstractContextManager["Session"]):
             if error is not None:
                 self._run.manifest[STEPS] = self.steps
                 if self._over is None:
-                    with suppress(Exception):  # what has ended the block is raised; resume says what is missing
+                    with suppress(Exception):  # what has ended the block is raised; resume reports what is missing
                         self._engine.save()
-            self._over = "the session is closed; omninav.resume goes on with one that was interrupted"
+            self._over = "the session is closed; omninav.resume continues one that was interrupted"
             self._stack.__exit__(type(error) if error is not None else None, error, trace)
             self._stack = ExitStack()
 
 
 def outputs_by_name(graph: Graph) -> dict[str, str]:
-    """Which output each name stands for, and every output under its own (`node.port`).
+    """The output that each name denotes, and every output under its own (`node.port`).
 
     Of several of one name it is the one that is read again at the next tick, else the last in running order.
     """
@@ -240,4 +240,4 @@ def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] 
             execute(run, prepared)
             return Run(given)
     finally:
-        os.chdir(here)  # a run goes on where it was started
+        os.chdir(here)  # a run continues where it was started

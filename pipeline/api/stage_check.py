@@ -23,10 +23,10 @@ def check_stage(
 ) -> list[dict[str, Any]]:
     """Check that a stage keeps what the framework relies on, and give its outputs for some frames.
 
-    The class: its ports and parameters can be read, its docstring begins with one line that says what it does, every
-    parameter says what it means, ports carry `Value`s, and its State can be saved. With `frames` (inputs of `step` by
+    The class: its ports and parameters can be read, its docstring begins with one line on what it does, every
+    parameter is explained, ports carry `Value`s, and its State can be saved. With `frames` (inputs of `step` by
     name, one mapping a frame): outputs are what their types state, inputs are left as they were, the same seed gives
-    the same outputs, and the stage goes on from a saved State to the same outputs. Raises `AssertionError` with
+    the same outputs, and the stage continues from a saved State to the same outputs. Raises `AssertionError` with
     everything that is wrong.
     """
     cls = stage if inspect.isclass(stage) else type(stage)
@@ -55,7 +55,7 @@ def broken_promises(cls: type[Stage]) -> Iterator[str]:
             yield f"port '{port.name}' is {port.type}, expected a class derived from Value"
     for parameter in read.parameters.values():
         if not parameter.meaning:
-            yield f"parameter '{parameter.name}' does not say what it means; write a docstring below it"
+            yield f"parameter '{parameter.name}' is not explained; write a docstring below it"
     if read.state is not None:
         try:
             state = read.state[1]()

@@ -65,9 +65,10 @@ class Sweep:
 def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: bool = True, **settings: Any) -> Sweep:
     """Run all combinations: `sweep("some_variant", "match=selective,l2", seed=range(5))`.
 
-    A word with commas, and a keyword that is a list, tuple or range, stand for several values; everything else is as in
-    `compose`. `folder`: where its jobs are left; None: a new one in `runs`. `progress`: whether it says how far it is.
-    A job that fails stands in the table as failed, and the others go on. Raises `BadInput` where none could begin.
+    A word with commas, and a keyword that is a list, tuple or range, mean several values; everything else is as in
+    `compose`. `folder`: where its jobs are left; None: a new one in `runs`. `progress`: whether it shows its progress.
+    A job that fails is marked as failed in the table, and the others continue. Raises `BadInput` where none could
+    begin.
     """
     fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
     swept = [f"{name}={_values(name, values)}" for name, values in settings.items() if name not in fixed]
@@ -81,7 +82,7 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
                 quiet.enter_context(redirect_stderr(io.StringIO()))
             command(["-m", *arguments_of(words, fixed), *swept, *place], on_sweep=made.append)
     finally:
-        sys.argv = before  # it is what the manifests of jobs say
+        sys.argv = before  # the manifests of jobs record it
     if not made:
         raise BadInput(f"{' '.join(words):.80}: a flag that shows something runs no sweep; leave it out")
     return Sweep(made[0])

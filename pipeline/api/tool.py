@@ -15,7 +15,7 @@ def tool(name: str, *words: str, **arguments: Any) -> None:
     """Run a command that writes files, as `tool("simulate", log="drive.mcap")`.
 
     Words and arguments are those of the command line, which `omninav simulate --help` explains. Raises
-    `ProblemsFound`, `BadInput`, or `StageFailed` where it could not go on.
+    `ProblemsFound`, `BadInput`, or `StageFailed` where it could not continue.
     """
     if name not in tools():
         raise BadInput(f"'{name}': there is no such tool; {suggest(name, tools(), 'tools')}")

@@ -30,7 +30,7 @@ def read_flags(arguments: Sequence[str]) -> Namespace:
     parser = flags_parser()
     known = [flag for action in parser._actions for flag in action.option_strings]
     parser.error = partial(_refuse, known)  # type: ignore[method-assign]
-    read = parser.parse_intermixed_args(list(arguments))  # flags may stand between words
+    read = parser.parse_intermixed_args(list(arguments))  # flags may occur between words
     for name in NOT_TAKEN:
         if getattr(read, name, None):
             raise BadInput(f"--{name.replace('_', '-')}: omninav does not take this flag; `omninav --help` lists them")
@@ -83,7 +83,7 @@ def _refuse(known: Sequence[str], message: str) -> NoReturn:
         hint = f"did you mean {near}?" if near else f"settings have no dashes: type {name}={value or '…'}"
         raise BadInput(f"{flag.split()[0]:.60}: there is no such flag; {hint}")
     if "ignored explicit argument" in message:  # -help is -h with something behind it
-        raise BadInput("a short flag stands alone; did you mean --help? `omninav --help` shows what to type")
+        raise BadInput("a short flag is a single letter; did you mean --help? `omninav --help` shows what to type")
     raise BadInput(f"{message}; `omninav --help` shows what to type")
 
 
@@ -125,9 +125,9 @@ def _depth(word: str) -> int:
 
 
 def value_text(value: Any, depth: int = 0) -> str:
-    """A value as it stands behind `name=`, quoted where it is a text with odd characters.
+    """A value as it is typed behind `name=`, quoted where it is a text with odd characters.
 
-    `depth`: how many lists it lies within. Raises `BadInput` for what no word can hold, before it is written out.
+    `depth`: how many lists it is within. Raises `BadInput` for what no word can hold, before it is written out.
     """
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()

@@ -1,7 +1,7 @@
 """The graph that makes an artifact of a variant: chosen by the variant, composed by Hydra as every configuration is.
 
-A variant's block `artifacts` says how each is made. With `learn=NAME` that graph is a configuration of its own, run
-over a log of its own; where the artifact is made on the way, `composition` composes it in the same words.
+A variant's block `artifacts` describes how each is made. With `learn=NAME` that graph is a configuration of its own,
+run over a log of its own; where the artifact is made on the way, `composition` composes it in the same words.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ def learned(words: Sequence[str]) -> str | None:
 
 
 def words_of_variant(words: Sequence[str], groups: Collection[str]) -> list[str]:
-    """Those of the words that choose one option, but for `learn`: what they give says how the artifact is made."""
+    """Those of the words that choose one option, but for `learn`: what they give describes how the artifact is made."""
     one = [word for word in parsed(words) if word.key_or_group in groups and not word.is_sweep_override()]
     return [str(word.input_line) for word in one if word.key_or_group != LEARN]
 
@@ -79,7 +79,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
 
 
 def _makes_artifact(group: str, word: str) -> bool:
-    """Tells whether an option belongs to the variant alone, since it says how an artifact is made."""
+    """Tells whether an option belongs to the variant alone, since it describes how an artifact is made."""
     specs = (option_content(group, word.partition("=")[2]).get("artifacts") or {}).values()
     return any({*MAKING} & {*spec} for spec in specs)
 
@@ -109,7 +109,7 @@ def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any
 
 
 def is_repeatable(node: Any) -> bool:
-    """Tells whether a node may stand in an artifact's graph too: all may but sources that give their ticks once."""
+    """Tells whether a node may be in an artifact's graph too: all may but sources that give their ticks once."""
     try:
         return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
     except UnknownStage:  # reported by `build`

@@ -46,7 +46,7 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
         show(verdict_table(run.experiment, verdicts))
         left_open = [case for verdict in verdicts.values() if verdict.holds is None for case in verdict.cases]
         if any(case.scenarios == 1 for case in left_open):
-            print("undecided: one scenario says nothing of the next; a verdict needs several")
+            print("undecided: one scenario says nothing about the next; a verdict needs several")
         if left_open and run.profile == FULL and MORE_SCENARIOS in run.experiment.profiles:
             print(f"undecided: profile={MORE_SCENARIOS} judges by more scenarios as well, once")
     best = best_condition(run.experiment, results_by_condition(run.conditions, bool(run.experiment.development)))

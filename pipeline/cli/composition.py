@@ -45,7 +45,7 @@ LINK = re.compile(r"\$\{(\w+)\}")
 
 
 def _unless(given: str, wanted: str, *, _root_: Any) -> Any:
-    """`${unless:a,b}`: the setting `b`, or, where `a` is given, the default of whoever reads it."""
+    """`${unless:a,b}`: the setting `b`, or, where `a` is given, the default of its reader."""
     return UNSET if _root_[given] is not None else _root_[wanted]
 
 
@@ -132,7 +132,7 @@ def _refuse_no_mappings(config: Any) -> None:
     """Raise `ProblemsFound` where a part of the graph is no mapping of names, or a variant has none of them."""
     if isinstance(config.get("variant"), DictConfig):
         hint = "begin the variant's file with the line `# @package _global_`"
-        raise ProblemsFound([Problem("variant", "what its file says stands below `variant`", hint)])
+        raise ProblemsFound([Problem("variant", "its file's content is below `variant`", hint)])
     parts = {part: config.get(part) for part in ("nodes", "wires", "artifacts")}
     wrong = [part for part, given in parts.items() if not isinstance(given, DictConfig | None)]
     if wrong:
@@ -164,7 +164,7 @@ def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
 def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:
     for name in settings_left_open():
         if isinstance(plain.get(name), str) and not plain[name].strip():
-            yield Problem(name, "nothing stands behind the =", f"name it, as {name}=FILE, or leave {name}= out")
+            yield Problem(name, "nothing follows the =", f"name it, as {name}=FILE, or leave {name}= out")
 
 
 @dataclass(frozen=True)

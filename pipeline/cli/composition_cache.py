@@ -19,7 +19,7 @@ from omninav.pipeline.graph.problems import BadInput
 CONFIG = "config"
 """The file that every configuration is composed from."""
 TYPED = "typed"
-"""The key of a configuration under which all that was typed stands."""
+"""The key of a configuration that holds all that was typed."""
 RUN_ALONE = "hydra.mode=RUN"
 """The word that tells Hydra that a job belongs to no sweep."""
 
@@ -112,7 +112,7 @@ def _of_options(session: Any, options: tuple[str, ...]) -> bytes:
 
 
 def _is_setting(word: Override) -> bool:
-    """Tells if Hydra sets a word in what it has composed. Sweeps and what stands under `hydra.` it refuses before."""
+    """Tells if Hydra sets a word in what it has composed. Sweeps and keys under `hydra.` are refused before."""
     key = word.key_or_group
     if word.is_sweep_override() or key.replace("/", ".").partition(".")[0] == "hydra":
         return False

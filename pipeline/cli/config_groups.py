@@ -53,7 +53,7 @@ def replaced() -> dict[str, str]:
 
 @functools.cache
 def stand_ins() -> tuple[tuple[str, str, dict[str, Any]], ...]:
-    """Reads which option of a group another stands in for: group, option, and the rule (see `take_stand_ins`)."""
+    """Reads which option of a group another replaces: group, option, and the rule (see `take_stand_ins`)."""
     listed = ((name.partition("="), rule) for name, rule in _read("stand_ins.yaml").items())
     return tuple((group, option, rule) for (group, _, option), rule in listed)
 

@@ -110,7 +110,7 @@ class _SearchPath(SearchPathPlugin):
 
 
 class CheckedLoader:
-    """Hydra's loader, which refuses whatever stands under `hydra.` beyond folders of jobs, launcher and sweeper."""
+    """Hydra's loader, which refuses every key under `hydra.` beyond folders of jobs, launcher and sweeper."""
 
     def __init__(self, hydras: ConfigLoader) -> None:
         self._hydras = hydras

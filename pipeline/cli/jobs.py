@@ -61,10 +61,10 @@ class JobEnd:
 
 
 def run_job(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run) -> float | None:
-    """Run what a configuration describes, say how it ended, and return its objective, if one is named (see `_run`).
+    """Run what a configuration describes, report how it ended, and return its objective, if one is named (see `_run`).
 
-    In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
-    as a failed trial (NaN would end the whole sweep).
+    In a sweep the other jobs continue; the exit code is left in a file. A job that fails returns None, which Optuna
+    counts as a failed trial (NaN would end the whole sweep).
     """
     end = ended(config, arguments, prepare)
     report_end(end)
@@ -73,7 +73,7 @@ def run_job(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_ru
 
 
 def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run) -> JobEnd:
-    """Run what a configuration describes. How that ended stands in the manifest of a sweep's job by then."""
+    """Run what a configuration describes. By then the manifest of a sweep's job records how that ended."""
     sweep, folder = _sweep_job(), _folder()
     of_experiment = config.get("experiment") is not None
     code, error, objective = 0, "", None
@@ -92,11 +92,11 @@ def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run)
         of_a_file = as_bad_input(failed.__cause__) if failed.__cause__ is not None else None
         code, error = (1, str(failed)) if of_a_file is None else (2, f"{of_a_file} ({failed})")
     except Interrupted as stopped:
-        code, error = 130, f"stopped; `omninav resume {shlex.quote(shown(stopped.folder))}` goes on"
+        code, error = 130, f"stopped; `omninav resume {shlex.quote(shown(stopped.folder))}` continues it"
     except KeyboardInterrupt:
-        code, error = 130, "stopped; the same command goes on" if of_experiment else "stopped before it had begun"
+        code, error = 130, "stopped; the same command continues it" if of_experiment else "stopped before it had begun"
     except BrokenPipeError:
-        pass  # whoever read what is printed has gone
+        pass  # the reader of what is printed has gone
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
         known = as_bad_input(unknown)
         code, error = (2, str(known)) if known else (1, f"{type(unknown).__name__}: {unknown}")
@@ -156,9 +156,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prep
 def no_run_in(folder: Path) -> Path:
     """The folder itself. Raises `BadInput` where there is a run in it, or a file, which a run might overwrite."""
     if (folder / "manifest.json").exists():
-        raise BadInput(
-            f"{folder}: there is a run in it; `omninav resume` goes on with it, hydra.run.dir=… names another"
-        )
+        raise BadInput(f"{folder}: there is a run in it; `omninav resume` continues it, hydra.run.dir=… names another")
     files = sorted(file.name for file in folder.glob("[!.]*") if file.is_file()) if folder.is_dir() else []
     if files:
         raise BadInput(f"{folder}: it holds {', '.join(files[:3])}, which a run might overwrite; name an empty folder")
@@ -201,7 +199,7 @@ def note_end(job: SweepJob, end: JobEnd) -> None:
 
 
 def write_page(sweep: Path) -> Path:
-    """Write a sweep's page as things stand. Jobs in other processes wait for each other here."""
+    """Write a sweep's page as far as it has run. Jobs in other processes wait for each other here."""
     from omninav.pipeline.report.sweep_page import write_sweep_page
 
     with locked(sweep / ".page.lock"):

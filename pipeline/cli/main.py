@@ -64,7 +64,7 @@ def _run(arguments: list[str]) -> int:
     if mistyped:
         print(mistyped, file=sys.stderr)
         return 2
-    os.environ["PYTHONSAFEPATH"] = "1"  # processes of ours do not import what lies in the working directory
+    os.environ["PYTHONSAFEPATH"] = "1"  # processes of ours do not import from the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
     elif {*arguments[:1], " ".join(arguments[:2])} & {*tools()}:
@@ -89,11 +89,11 @@ def _run(arguments: list[str]) -> int:
             arguments = without_flags(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
-    except KeyboardInterrupt as stopped:  # it may come before anything is imported, so it stands first
+    except KeyboardInterrupt as stopped:  # it may come before anything is imported, so it is first
         on = "the same command" if hasattr(stopped, "folder") else ""  # of a run that was resumed
         if "-m" in arguments or "--multirun" in arguments:
             on = "the same command with hydra.sweep.dir=FOLDER of this sweep"
-        print(f"stopped; {on} goes on" if on else "stopped", file=sys.stderr)
+        print(f"stopped; {on} continues it" if on else "stopped", file=sys.stderr)
         return 130
     except (ProblemsFound, BadInput) as error:
         print(error, file=sys.stderr)
@@ -137,7 +137,7 @@ def _unknown_command(name: str, second: str = "") -> int:
             else f"did you mean 'omninav {name.split()[0]} {near}'? there are: {listing}"
         )
     elif os.path.exists(name):
-        hint = f"a file or folder stands behind the setting that reads it: omninav log={name}"
+        hint = f"a file or folder is typed behind the setting that reads it: omninav log={name}"
     else:
         hint = suggest(name, {*COMMANDS, *(tool.partition(" ")[0] for tool in tools())}, "commands", prefix="omninav ")
     print(f"'{name}' is no command. {hint}", file=sys.stderr)

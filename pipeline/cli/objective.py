@@ -15,7 +15,7 @@ FRAMEWORK = __name__.partition(".pipeline.")[0] + ".pipeline."
 def check_objective(path: str | None, graph: Graph) -> None:
     """Raise `BadInput` where no stage of the graph can give a metric of this name: before the run, not at its end.
 
-    Stages name their metrics when they have run. Until then the first part of the path has to stand in the source of a
+    Stages name their metrics when they have run. Until then the first part of the path has to occur in the source of a
     stage that measures, or of a module that it takes something from; of a name that is put together, one piece has to.
     """
     if not path:

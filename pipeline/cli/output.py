@@ -1,4 +1,4 @@
-"""Output that cannot be written: the work goes on, and the end of the run reports it."""
+"""Output that cannot be written: the work continues, and the end of the run reports it."""
 
 import io
 import os
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class _Output(io.RawIOBase):
-    """Standard output that keeps the first error of a full disk instead of stopping whoever prints."""
+    """Standard output that keeps the first error of a full disk instead of stopping the program that prints."""
 
     def __init__(self, stream: io.TextIOWrapper, raw: io.FileIO) -> None:
         self._stream, self._raw = stream, raw  # a stream that nobody holds closes its file

@@ -113,11 +113,11 @@ def parsed_words(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
 
 def _how_to_write(word: str) -> str:
     if "=" not in word and Path(word).exists():
-        return f"a file or folder stands behind the setting that reads it: log={word}"
+        return f"a file or folder is typed behind the setting that reads it: log={word}"
     if re.search(r"\s[\w.+~/]+=", word):
         return (
             "quotes hold several words together: type each by itself, name=value name=value; one value with = in it "
-            f"stands in quotes within quotes: '{word.partition('=')[0]}=\"…\"'"
+            f"is typed in quotes within quotes:  '{word.partition('=')[0]}=\"…\"'"
         )
     name, _, value = word.partition("=")
     if re.fullmatch(r"\+{0,2}[\w./@]+", name) and re.fullmatch(r"[^'\"\\$[{][^'\"\\$]*", value):
@@ -137,7 +137,7 @@ def _parse(word: str) -> list[Override]:
 
 
 def _number_of_values(word: Override) -> int:
-    """Number of values that a word stands for, without listing them. Raises `BadInput` where they are too many."""
+    """Number of values that a word means, without listing them. Raises `BadInput` where they are too many."""
     value, number = word.value(), 1.0
     if isinstance(value, RangeSweep):
         start, stop, step = (float(edge or 0) for edge in (value.start, value.stop, value.step))
@@ -150,7 +150,7 @@ def _number_of_values(word: Override) -> int:
 
 
 def _refuse_no_values(word: Override, folders: Sequence[str]) -> None:
-    """Raise `BadInput` where a word stands for no value, so that its sweep has no job."""
+    """Raise `BadInput` where a word means no value, so that its sweep has no job."""
     value, name = word.value(), word.key_or_group
     if isinstance(value, Glob):
         options = _options(name, folders)
@@ -160,7 +160,7 @@ def _refuse_no_values(word: Override, folders: Sequence[str]) -> None:
         empty = isinstance(value, RangeSweep) and next(word.sweep_iterator(), None) is None
         hint = "write range(first, beyond the last, step)"
     if empty:
-        raise BadInput(f"{name}: {shown(word.input_line)} stands for no value; {hint}")
+        raise BadInput(f"{name}: {shown(word.input_line)} means no value; {hint}")
 
 
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
@@ -201,7 +201,7 @@ def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[s
 
 
 def _texts(word: Override) -> list[str]:
-    """A word as it stands in each job of a sweep; itself where it is not swept."""
+    """A word as each job of a sweep gets it; itself where it is not swept."""
     if word.is_delete() or not word.is_sweep_override():
         return [str(word.input_line)]
     if word.value_type == ValueType.GLOB_CHOICE_SWEEP or not word.is_discrete_sweep():

@@ -1,4 +1,4 @@
-"""Options that another option stands in for where a setting is null, as `conf/stand_ins.yaml` says.
+"""Options that another option replaces where a setting is null, as `conf/stand_ins.yaml` states.
 
 Which one it is follows from settings, and Hydra composes options before it sets any. So the node is exchanged in the
 composed configuration; what was changed of it stays changed.
@@ -21,7 +21,7 @@ def take_stand_ins(config: Any) -> None:
 
 
 def exchanged(config: Any) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The nodes in whose place others stand, and those, with all that was changed."""
+    """The nodes that others replace, and those, with all that was changed."""
     for group, option, rule in stand_ins():
         listed, given = node_option(group, option) or {}, _node(config, group)
         is_option = given.get("_target_") == listed["_target_"] and listed.keys() <= given.keys()

@@ -1,4 +1,4 @@
-"""The jobs of a sweep that run where `executor=…` says: how they are given to it, and how one of them runs there."""
+"""The jobs of a sweep that `executor=…` runs: how they are given to it, and how one of them runs there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -59,7 +59,7 @@ def run_sweep(
 
 
 def is_of_executor(word: str) -> bool:
-    """Tells whether a word says where jobs run, and nothing of what they do."""
+    """Tells whether a word decides where jobs run, and not what they do."""
     return word.lstrip("+").startswith(("executor=", "executor.", "engine=", "engine."))  # engine: of older sweeps
 
 
@@ -75,7 +75,7 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
 
 
 def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
-    """Run one job of a sweep, as a job of an executor: Hydra composes it anew from its words. Returns a `JobEnd`."""
+    """Run one job of a sweep, as a job of an executor: Hydra composes it again from its words. Returns a `JobEnd`."""
     from .composition import offer_plugins
 
     offer_plugins()

@@ -49,7 +49,7 @@ def show_report(folder: Path) -> None:
 
 
 def shown(path: Path) -> str:
-    """A path relative to where one is, where it lies below."""
+    """A path relative to the working directory, where it is below it."""
     try:
         return str(path.resolve().relative_to(Path.cwd()))
     except ValueError:

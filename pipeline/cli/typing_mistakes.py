@@ -16,7 +16,7 @@ SPACES = "\u00a0\u2007\u202f"
 
 
 def command_first(arguments: Sequence[str]) -> list[str]:
-    """The words, with flags that stand before a command behind it."""
+    """The words, with flags typed before a command behind it."""
     flags = 0
     while flags < len(arguments) and arguments[flags].startswith("-"):
         flags += 2 if arguments[flags] in WITH_VALUE else 1
@@ -35,7 +35,7 @@ def _with_home(word: str) -> str:
 
 
 def mistyped_word(arguments: Sequence[str]) -> str:
-    """Advice on the first word that cannot be meant as it stands; '' where there is none."""
+    """Advice on the first word that cannot be meant as typed; '' where there is none."""
     for number, word in enumerate(arguments):
         before = arguments[number - 1] if number else ""
         after = arguments[number + 1] if number + 1 < len(arguments) else ""

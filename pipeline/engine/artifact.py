@@ -40,7 +40,7 @@ def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None
     Arrays go to the file piece by piece, so that a large value needs no memory twice. `numpy.load` opens it. The header
     names the value's type, each field's array with its own sha256, and `facts` about how it was made. Top-level array
     fields are arrays of the file; everything else is encoded in one more. Arrays are deflated. Those of a value of
-    which a field may be `StoredRows` are not: they lie in the front of the file, summed in chunks (see `chunks`).
+    which a field may be `StoredRows` are not: they are at the front of the file, summed in chunks (see `chunks`).
     """
     with whole_file(path) as part, part.open("w+b") as file:
         _write(file, value, facts)
@@ -97,7 +97,7 @@ def read_header(path: Path) -> dict[str, Any]:
 
 
 def artifact_digest(path: Path) -> str:
-    """The sha256 that stands for an artifact file's content: its last 64 characters, checked.
+    """The sha256 of an artifact file's content: its last 64 characters, checked.
 
     It is that of the whole file before it, or where the file has a front, of the sums of its chunks and what follows.
     """
@@ -158,7 +158,7 @@ def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
         raise Unfit(f"written in format {found!r:.20}, this version reads up to {FORMAT}")
     for key, kind in (("type", str), ("arrays", dict), ("facts", dict)):
         if not isinstance(header.get(key), kind):
-            raise Unfit(f"its header says no {key}")
+            raise Unfit(f"its header states no {key}")
     for key, fits, expected in _FACTS:
         if key in header["facts"] and not fits(header["facts"][key]):
             raise Unfit(f"its header's {key} is {shown(header['facts'][key])}, expected {expected}")
@@ -213,7 +213,7 @@ def _type(header: Mapping[str, Any]) -> type[Value]:
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> tuple[npt.NDArray[Any], str]:
-    """An array and the sha256 of its bytes. Its content is in memory once, and is as long as its header says."""
+    """An array and the sha256 of its bytes. Its content is in memory once, and is as long as its header states."""
     content = memoryview(bytearray(archive.getinfo(name).file_size))
     with archive.open(name) as file:
         read = 0
@@ -249,7 +249,7 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
             raise BadInput(f"{path}: {unfit}; make it again") from None
         except BadInput:
             raise
-        except Exception as error:  # a sum that is right says nothing of what the content makes readers raise
+        except Exception as error:  # a right sum does not exclude that the content makes readers raise
             said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
             raise BadInput(f"{path}: not a valid artifact ({said:.160}); make it again") from None
 

@@ -14,7 +14,7 @@ from .damage import report_damage
 class Cache:
     """Results by content: a folder of files named by the hash of everything that made them.
 
-    Beside each file lies its entry: the whole key, the file's sha256 and notes, sealed. So a file that is damaged, or
+    Beside each file is its entry: the whole key, the file's sha256 and notes, sealed. So a file that is damaged, or
     another key's under this name, is no result: it is thrown away and made again.
 
     One process at a time makes a result (`lock`), so parallel jobs make each once; a lock dies with its process.
@@ -66,7 +66,7 @@ class Cache:
             report_damage(f"{where}; results are not kept there: free some space, or type cache=FOLDER")
 
     def discard(self, key: str, suffix: str, why: str) -> None:
-        """Throw a result away, and say why."""
+        """Throw a result away, and report why."""
         report_damage(f"{why}; it is thrown away and made again")
         for file in (self._entry(key, suffix), self.path(key, suffix)):
             with suppress(FileNotFoundError):

@@ -1,4 +1,4 @@
-"""Delayed and held values, which lie among a tick's values beside the outputs."""
+"""Delayed and held values, which are among a tick's values beside the outputs."""
 
 from collections import deque
 from typing import Any
@@ -19,10 +19,10 @@ class Channel:
 
 
 def channel_key(wire: Wire) -> str:
-    """The name under which a delayed wire's present value lies among `values`."""
+    """The name under which a delayed wire's present value is among `values`."""
     return f"{wire.origin}@{wire.delay}{'h' if wire.hold else ''}<{wire.initial}"
 
 
 def held_key(origin: str) -> str:
-    """The name under which the last present value of an output lies among `values`."""
+    """The name under which the last present value of an output is among `values`."""
     return f"{origin}#held"

@@ -18,13 +18,13 @@ class OtherVersion(BadEncoding):
 
 @dataclass
 class Checkpoint:
-    """Everything that decides how a run goes on.
+    """Everything that decides how a run continues.
 
     `identity`: hash of graph, inputs and seed, so that it is never used for another run. `ticks`: how many are done.
     `ended`: the logs have ended, only "after" stages are left. `replayed`: the prefix came from the cache. `channels`:
     delayed values, oldest first. `held`: last present values. `states`: fields of the stages' States. `generators`: bit
     generators' states. `notes`: what contexts counted. `sequences`: length in bytes of every growing sequence. A value
-    that stands in several places (one that is read delayed and kept for the end) is written once and is one object
+    that occurs in several places (one that is read delayed and kept for the end) is written once and is one object
     again when loaded.
     """
 

@@ -27,7 +27,7 @@ SUM = 32
 """Bytes of a chunk's sum (sha256)."""
 _NPY_HEAD, _PAD, _STEP = 1 << 16, 0xD935, 1 << 20
 _EMPTY_ROWS = 1 << 24
-"""Rows that an array without any bytes may have: whoever goes through them row by row comes to an end."""
+"""Rows that an array without any bytes may have: a loop over its rows ends."""
 
 
 Ints = npt.NDArray[np.int64]
@@ -44,7 +44,7 @@ def parse_npy_head(head: io.BytesIO, length: int) -> tuple[tuple[int, ...], np.d
     shape, by_column, dtype = np.lib.format.read_array_header_1_0(head)
     left = length - head.tell()
     if dtype.hasobject or by_column or min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != left:
-        raise Unfit("an array is not as long as it says")
+        raise Unfit("an array is not as long as it states")
     if not left and max(shape, default=0) > _EMPTY_ROWS:
         raise Unfit(f"an array of nothing has {max(shape)} rows")
     return shape, dtype
@@ -104,7 +104,7 @@ class Front:
         local = self._read(entry.header_offset, 30, name)
         begin = entry.header_offset + 30 + sum(int.from_bytes(local[at : at + 2], "little") for at in (26, 28))
         if entry.compress_type != zipfile.ZIP_STORED or len(local) < 30 or begin + size > self._end:
-            raise Unfit(f"the array '{name:.40}' does not lie in its front")
+            raise Unfit(f"the array '{name:.40}' is not at its front")
         head = io.BytesIO(self._read(begin, min(size, _NPY_HEAD), name))
         shape, dtype = parse_npy_head(head, size)
         begin, size = begin + head.tell(), size - head.tell()

@@ -61,7 +61,7 @@ def decode(content: bytes | memoryview) -> Any:
 
 
 def decode_all(content: bytes | memoryview, number: int) -> list[Any]:
-    """Decodes so many things that `encode_all` wrote. Raises `BadEncoding` as `decode` does."""
+    """Decodes this many things that `encode_all` wrote. Raises `BadEncoding` as `decode` does."""
     found: list[Any] = _decoded(content, lambda header, data: _restore_all(header, data, number))
     return found
 

@@ -16,7 +16,7 @@ FunctionCache: Any = caching.FunctionCache
 Index: Any = caching.IndexDataCacheFile
 Function = TypeVar("Function", bound=Callable[..., Any])
 FRAMEWORK = __name__.rpartition(".engine.")[0]
-"""No compiled function calls what lies there."""
+"""No compiled function calls what is there."""
 CACHE_SETTINGS = ("CACHE_DIR", "CACHE_LOCATOR_CLASSES")
 """numba's settings of where it keeps machine code, which it unpickles."""
 
@@ -39,7 +39,7 @@ def compiled(**options: Any) -> Callable[[Function], Function]:
 
 
 class CompiledCache(FunctionCache):  # type: ignore[misc]
-    """The machine code of one function, in the folder that numba chooses, whatever the working directory says of it."""
+    """The machine code of one function, in the folder that numba chooses, whatever the working directory."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         with _settings_of_the_environment():

@@ -20,7 +20,7 @@ _MOST_VALUES = 64
 _MOST_BYTES = 1 << 20
 """Bytes of a record, about; a larger value is a record by itself."""
 _BLOCK = 1 << 18
-"""Bytes that are read at once, and kept: whoever goes through a sequence reads every block once."""
+"""Bytes that are read at once, and kept: a loop over a sequence reads every block once."""
 
 
 class DiskSequence(Sequence[Any]):
@@ -28,8 +28,8 @@ class DiskSequence(Sequence[Any]):
 
     `append` adds one; it is encoded with those after it, at the latest when somebody asks for `size` or a value.
     Reading decodes on demand, and holds a block of the file, the values of one record, and 16 bytes for each record.
-    `cut(size)` drops everything behind a byte length that a checkpoint remembers, so that a resumed run goes on exactly
-    where the checkpoint stood. `verify` reads all of it.
+    `cut(size)` drops everything behind a byte length that a checkpoint remembers, so that a resumed run continues
+    exactly where the checkpoint was. `verify` reads all of it.
 
     The checksum is CRC-32 over the record's place, its length and its bytes: it finds every flipped bit and every burst
     of up to 32 bits with certainty, and costs less than a cryptographic hash, which would protect from no one here.
@@ -63,7 +63,7 @@ class DiskSequence(Sequence[Any]):
         return self._size
 
     def append(self, value: Any) -> None:
-        """Add a value (None stands for an absent one)."""
+        """Add a value (None for an absent one)."""
         self._coming.append(value)
         if len(self._coming) >= self._together:
             self._write()
@@ -84,7 +84,7 @@ class DiskSequence(Sequence[Any]):
     def cut(self, size: int) -> None:
         """Drop all records behind `size` bytes. Raises `BadEncoding` where the file is shorter than that."""
         if self.size < size:
-            raise BadEncoding(f"{self.path} is shorter than its checkpoint says ({self.size} < {size} bytes)")
+            raise BadEncoding(f"{self.path} is shorter than its checkpoint states ({self.size} < {size} bytes)")
         self._file.truncate(size)
         self._size = size
         self._records = None

@@ -1,7 +1,7 @@
 """The engine: what runs before the loop, every tick, and after it.
 
 `Engine.run` is the whole story: `begin`, `tick` until the source has ended, `finish`; who has the frames one at a time
-calls these three. Everything a stage gave this tick lies in `values` under `node.port`;
+calls these three. Everything a stage gave this tick is in `values` under `node.port`;
 delayed values wait in `channels`; what "after" stages collect goes to sequences on disk.
 """
 
@@ -39,7 +39,7 @@ class EngineOptions:
     memory: Path | None = None
     """Folder of checkpoints and sequences; None: nothing is kept, and nothing can be collected."""
     identity: str = ""
-    """Identity of the run, so that no other run goes on from its checkpoint."""
+    """Identity of the run, so that no other run continues from its checkpoint."""
     checkpoint_s: float = 5.0
     """Seconds between checkpoints."""
     on_tick: Callable[[int, int | None], None] = lambda done, total: None
@@ -68,7 +68,7 @@ class Engine:
     """Runs a graph once, from the start or from a checkpoint.
 
     `artifacts` are the static values that wires name `artifacts.x`. `wanted` are outputs whose last value is returned
-    by `run`. `replay` stands for the first part of the graph. `recorded`: name -> outputs that are written together,
+    by `run`. `replay` replaces the first part of the graph. `recorded`: name -> outputs that are written together,
     tick by tick, to the sequence of that name.
     """
 
@@ -168,7 +168,7 @@ class Engine:
             source.stage.check(self.calls[source.name].ctx)
 
     def set_up_source(self) -> None:
-        """Set up the source alone: what it says of its inputs and of who reads them, it says now. Raises `BadInput`."""
+        """Set up the source alone, which now reports on its inputs and their readers. Raises `BadInput`."""
         source = self.source
         if source is not None and isinstance(source.stage, Source) and source.stage.repeatable:
             self.calls[source.name].set_up()

@@ -90,7 +90,7 @@ def lineage(graph: Graph, nodes: frozenset[str]) -> frozenset[str]:
 def following(graph: Graph, names: Collection[str]) -> frozenset[str]:
     """These nodes and all that follows from them without delays."""
     found = set(names)
-    for name in graph.nodes:  # in running order: what a node reads undelayed stands before it
+    for name in graph.nodes:  # in running order: what a node reads undelayed comes before it
         if any(wire.from_node in found for wire in graph.inputs_of(name)):
             found.add(name)
     return frozenset(found)

@@ -10,7 +10,7 @@ Array = npt.NDArray[np.float64]
 RESAMPLES = 4999
 CONFIDENCE = 0.95
 MIN_GROUPS = 6
-"""Groups from which on they are resampled: of fewer no resample lies outside the values, which enclose the mean less
+"""Groups from which on they are resampled: of fewer no resample is outside the values, which enclose the mean less
 often than 95 % of the times (of five, 94 %; of two, half)."""
 
 

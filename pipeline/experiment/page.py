@@ -23,7 +23,7 @@ STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 def write_page(experiment: Experiment, result: ExperimentResult, folder: Path) -> Path:
     """Write `<name>.md`, `<name>.html`, its plots and `<name>.result.json` into the experiment's folder.
 
-    All of it follows from the result as it stands; conditions that failed or are still to run are named.
+    All of it follows from the result alone; conditions that failed or are still to run are named.
     """
     write_whole(folder / f"{experiment.name}{SUFFIX}", result_text(result))
     for file, written in markdown_page(experiment, result).items():

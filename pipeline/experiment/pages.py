@@ -12,7 +12,7 @@ from .verdicts import Verdict, headline
 INDEX, CLAIMS = "results.md", "claims.md"
 """Files with the index and with the papers' claims."""
 TAIL = (1.0 - CONFIDENCE) / 2.0
-"""Share of 95 % intervals that lie wholly above what they are of, and as many below."""
+"""Share of 95 % intervals that are wholly above the true value, and as many below."""
 Judged = Sequence[tuple[Experiment, ExperimentResult]]
 """Experiments, each with its result."""
 

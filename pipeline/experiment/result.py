@@ -72,7 +72,7 @@ class ConditionRow:
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """Content of a result file. Titles and sentences stand in the experiment's file and are joined to it by keys."""
+    """Content of a result file. Titles and sentences are in the experiment's file and are joined to it by keys."""
 
     name: str
     """The experiment's name."""
@@ -116,7 +116,7 @@ def rows_of(experiment: Experiment) -> list[Labels]:
 def summary_of(
     experiment: Experiment, results: Results, development: Results
 ) -> tuple[dict[str, tuple[Case, ...]], dict[str, tuple[Cell, ...]], tuple[tuple[Line, ...], ...]]:
-    """Verdicts, cells and curves of what has run. Those of `development` stand in the cells only."""
+    """Verdicts, cells and curves of what has run. Those of `development` are in the cells only."""
     verdicts = {key: verdict.cases for key, verdict in judge(experiment, results).items()}
     cells = {name: tuple(_cells(experiment, results, development, name)) for name in experiment.measures}
     return verdicts, cells, tuple(tuple(_lines(experiment, results, curve)) for curve in experiment.curves)
@@ -194,7 +194,7 @@ def series_of(runs: Sequence[Mapping[str, Any]], path: str, at_path: str = "") -
 
 
 def result_text(result: ExperimentResult) -> str:
-    """A result as JSON: an entry that stands by itself on each line, nothing that has its default."""
+    """A result as JSON: one self-contained entry on each line, nothing that has its default."""
     parts = []
     for name, value in _stated(result).items():
         if isinstance(value, dict | list) and value:

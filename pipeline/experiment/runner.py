@@ -39,12 +39,12 @@ from .specification import FULL, Experiment, read_experiment
 from .verdicts import Verdict, judge, unmeasured
 
 STATE = "experiment.json"
-"""File in an experiment's folder that says with what it was started, and how far it is."""
+"""File in an experiment's folder that states how it was started, and how far it is."""
 
 
 @dataclass
 class ExperimentRun:
-    """An experiment on its way: `folder` is the same for every attempt, so that one goes on where another stopped."""
+    """An experiment on its way: `folder` is the same for every attempt, so that one continues where another stopped."""
 
     experiment: Experiment
     profile: str
@@ -82,11 +82,11 @@ class ExperimentRun:
         return judge(self.experiment, results_by_condition(self.conditions))
 
     def write_page(self) -> Path:
-        """The page as things stand."""
+        """The page so far."""
         return write_page(self.experiment, self.result(), self.folder)
 
     def result(self) -> ExperimentResult:
-        """The results as things stand. Those of development stand in the tables, and nothing else is made of them."""
+        """The results so far. Those of development are in the tables, and nothing else is made of them."""
         experiment, conditions = self.experiment, self.conditions
         results, beside = results_by_condition(conditions), results_by_condition(conditions, development=True)
         verdicts, cells, curves = summary_of(experiment, results, beside)

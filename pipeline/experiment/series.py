@@ -13,7 +13,7 @@ line that fits best (per entry), `largest_rise` the largest step upwards from on
 def at(result: Any, path: str) -> Any:
     """Value at a path of names joined by points, None where there is nothing.
 
-    In a list a number counts its entries (`logs.0`, `laps.-1`), and `*` stands for each of them
+    In a list a number counts its entries (`logs.0`, `laps.-1`), and `*` means each of them
     (`laps.*.position_error_m.mean`): the result is a list then, with None where an entry has nothing there.
     """
     head, _, rest = path.partition(".")

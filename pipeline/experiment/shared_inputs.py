@@ -26,7 +26,7 @@ from .conditions import ConditionRun
 from .repetition import BASE_SEED, artifact_key
 
 FACTS = "facts.json"
-"""File in a recording's folder that says of what it is, what its source stated of it, and the hashes of its files."""
+"""File in a recording's folder with what it is of, what its source stated of it, and the hashes of its files."""
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Recording:
         return dict(_stated(self.folder).get("facts", {}))
 
     def job(self, folder: Path) -> Job:
-        """The job that records it; its log lies in `folder`."""
+        """The job that records it; its log is in `folder`."""
         given = {
             "config": self.readers[0][0].config,
             "artifact": self.artifact,
@@ -77,7 +77,7 @@ class Recording:
 
 
 def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]:
-    """Records what the runs' sources would compute, each once; recordings lie in `folder` without a cache."""
+    """Records what the runs' sources would compute, each once; recordings are in `folder` without a cache."""
     found: dict[str, Recording] = {}
     for run in runs:
         assert run.prepared is not None

@@ -40,7 +40,7 @@ class Measure:
 
     title: str
     path: tuple[str, ...]
-    """Paths to look at, of which the first that is there counts; paths joined by + are added. With `stages` it is
+    """Paths to look at; the first that exists counts; paths joined by + are added. With `stages` it is
     `p50_ms`, `p95_ms` or `max_ms`."""
     scale: float = 1.0
     """The value is multiplied by it, for another unit."""
@@ -76,7 +76,7 @@ class Claim:
 
     It has one case for each condition with the labels of `of`, and makes one comparison, by the whole 95 % interval:
     `at_most`, `at_least`, `below`, `above`, or `not_above` (better, or worse by no more than the measure's margin);
-    with all other conditions `lowest`. It is false where the whole interval lies on the other side, else undecided.
+    with all other conditions `lowest`. It is false where the whole interval is on the other side, else undecided.
     """
 
     statement: str
@@ -131,7 +131,7 @@ class Curve:
     path: str
     """The path of a series (`laps.*.error_m.mean`)."""
     x_path: str = ""
-    """The path of where its entries lie; by default 1, 2, 3 …"""
+    """The path of its entries; by default 1, 2, 3 …"""
     scale: float = 1.0
     panels: str | None = None
     """The factor that has a panel for each label."""
@@ -249,7 +249,7 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     """The experiment that a file describes, at the scale of a profile. Raises `ProblemsFound` with all problems.
 
     A profile changes entries of the file: mappings key by key; claims, the labels of a factor and all else as a whole.
-    A file that stands on another (its `defaults`) takes a label or a measure of that one out by setting it to null.
+    A file that extends another (its `defaults`) takes a label or a measure of that one out by setting it to null.
     """
     profiles, problems = convert(plain.get("profiles") or {}, dict[str, dict | None], "profiles")  # type: ignore[type-arg]
     if problems:
@@ -336,7 +336,7 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
         if claim.where and not (experiment.source and claim.paper):
             what = "a place in a paper, expected `paper` beside it, and `source` of the experiment"
             problems.append(
-                Problem(f"experiment.{where}.where", what, "paper: what it says; source: Porta & Kröse 2004")
+                Problem(f"experiment.{where}.where", what, "paper: what it states; source: Porta & Kröse 2004")
             )
         measured.append((f"{where}.measure", claim.measure))
         problems += [Problem(f"experiment.{where}", fault) for fault in _faults(experiment, claim)]

@@ -114,7 +114,7 @@ def unmeasured(experiment: Experiment, results: Results) -> Iterator[Problem]:
 
 
 def over_runs(measure: Measure, values: Iterable[float]) -> float:
-    """One value of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
+    """One value of those of the repetitions: their mean, or the largest or smallest where the measure asks for it."""
     name = {"mean": "mean", "largest": "max", "smallest": "min"}[measure.over_runs]
     return float(getattr(np, name)(np.fromiter(values, dtype=np.float64)))
 
@@ -200,7 +200,7 @@ def _against_samples(
 def decided(side: Side, interval: tuple[float, float], margin: float, scenarios: int) -> bool | None:
     """Judges a comparison by the whole interval of the difference: true, false, or None where that leaves it open.
 
-    One scenario says nothing of the next one, and nor do equal values of fewer than six.
+    One scenario says nothing about the next one, nor do equal values of fewer than six.
     """
     low, high = interval
     if scenarios < 2 or (scenarios < MIN_GROUPS and low == high):
@@ -217,7 +217,7 @@ def decided_by_share(kept: int, ran: int) -> bool | None:
 
 
 def _keeps(side: Side, difference: float, margin: float) -> bool:
-    """Tells whether a difference lies on the side that is claimed; equal is not better."""
+    """Tells whether a difference is on the side that is claimed; equal is not better."""
     match side:
         case "below":
             return difference < 0.0

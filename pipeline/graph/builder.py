@@ -25,7 +25,7 @@ def build(
     """The graph that a configuration describes.
 
     `config` holds `nodes` (name -> `_target_` and parameters) and `wires` (node -> port -> wire). `artifact_types`
-    says which artifacts there are and of which type. `prefix` goes before all config paths of problems, except
+    states which artifacts there are and of which type. `prefix` goes before all config paths of problems, except
     those of `shared` nodes. Raises `ProblemsFound` with all problems; nothing has been run or read by then.
     """
     builder = _Builder(config, dict(artifact_types or {}), prefix, frozenset(shared))
@@ -112,7 +112,7 @@ class _Builder:
             return None if needed else Node(name, target, cls(), read, {})
         try:
             stage = cls(**parameters)
-        except (ValueError, TypeError) as error:  # what __post_init__ says of parameters that do not go together
+        except (ValueError, TypeError) as error:  # what __post_init__ reports of parameters that do not go together
             self.problems.append(Problem(path, str(error)))
             return None
         except Exception as error:

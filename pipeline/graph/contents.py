@@ -30,8 +30,8 @@ MAX_LENGTH_ERROR = 1e-3
 class Shape:
     """The sizes of an array, or the length of a sequence or value: `Annotated[Array, Shape("rows", 3)]`.
 
-    A name is one size wherever it stands among the fields of a value; "rows+1" is one more. The numbers of an array
-    with a shape are finite, unless it says `finite=False`.
+    A name is one size wherever it occurs among the fields of a value; "rows+1" is one more. The numbers of an array
+    with a shape are finite, unless it states `finite=False`.
     """
 
     def __init__(self, *sizes: int | str, finite: bool = True) -> None:

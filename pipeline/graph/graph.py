@@ -69,7 +69,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Graph:
-    """A checked graph. `nodes` stand in the order in which they run within their lifetime."""
+    """A checked graph. `nodes` are in the order in which they run within their lifetime."""
 
     nodes: dict[str, Node]
     wires: list[Wire]

@@ -64,7 +64,7 @@ class _Unfit(Exception):
 
 
 def convert(value: Any, expected: Any, where: str) -> tuple[Any, list[Problem]]:
-    """A plain configuration value as the type a parameter asks for, or the problems that stand against it.
+    """A plain configuration value as the type a parameter asks for, or the problems that prevent it.
 
     Whole numbers pass as floats, lists as tuples, mappings as dataclasses and texts as paths; nothing else is guessed.
     """
@@ -119,7 +119,7 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
             raise _Unfit(problems)
         try:
             return expected(**arguments_found)
-        except ValueError as error:  # what __post_init__ says of them
+        except ValueError as error:  # what __post_init__ reports of them
             raise _Unfit([Problem(where, str(error))]) from None
     return _convert_plain(value, expected, where)
 

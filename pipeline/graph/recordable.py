@@ -1,4 +1,4 @@
-"""Protocol of a source that computes its values: it is recorded once and replayed by whoever needs the same again."""
+"""Protocol of a source that computes its values: it is recorded once and replayed where the same is needed again."""
 
 from collections.abc import Mapping
 from pathlib import Path

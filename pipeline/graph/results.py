@@ -24,7 +24,7 @@ class MetricSpec(Value):
     """Text in place of a value that is None. A word (`never`) is shown and marked as bad; with a dash the metric is
     left out."""
     zero: str | None = None
-    """Shown where it stands by itself and is 0 (`at once`); None: the number."""
+    """Shown where it is by itself and is 0 (`at once`); None: the number."""
     before: str = ""
     """Word before the number (`after` 12 frames)."""
     least: float | None = None
@@ -58,7 +58,7 @@ class Metrics(Value):
     """Nested mappings of numbers, texts, None and lists."""
     specs: dict[str, MetricSpec] = field(default_factory=dict)
     """Specs by path (`success.at_end`), or by name for all metrics of that name (`position_error_m`). The title of
-    a path is shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep
+    a path is shown as it is, that of a name with its groups (`Position error, after convergence`). Tables keep
     this order."""
     headlines: tuple[str, ...] = ()
     """Paths of what one looks for first, with the statistic of a distribution: what a run prints, tiles of a report,
@@ -66,7 +66,7 @@ class Metrics(Value):
     details: tuple[str, ...] = ()
     """Paths of metrics or whole groups that only the run's own page shows, no comparison and no terminal."""
     foremost: bool = False
-    """Whether they say if the run did what it was for: their headlines stand before those of other stages."""
+    """Whether they tell if the run did what it was for: their headlines come before those of other stages."""
 
 
 def merged(parts: Iterable[Metrics]) -> Metrics:
@@ -103,7 +103,7 @@ def by_path(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, 
 
 
 def _as_json(value: Any) -> Any:
-    """A value as JSON holds it: a number of numpy's as one of Python's, and None for what is not a number."""
+    """A value as JSON holds it: a number of numpy's as one of Python's, and None for NaN and infinity."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):

@@ -121,7 +121,7 @@ def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port
     returned, _ = split_optional(returned)
     if returned is None or returned is type(None):
         if inspect.isclass(getattr(cls, "Out", None)):
-            raise BadStage(f"{where}.step does not say that it gives its Out; write `-> Out`")
+            raise BadStage(f"{where}.step does not state that it gives its Out; write `-> Out`")
         return {}
     if not (inspect.isclass(returned) and issubclass(returned, Outputs)):
         raise BadStage(f"{where}.step returns {returned!r}; write a nested `class Out(Outputs)` and `-> Out`")

@@ -121,7 +121,7 @@ class _Reader:
 
     def _alias(self, event: Any) -> Any:
         if event.anchor not in self.anchors:
-            self._refuse(event, f"*{shown(event.anchor)} repeats what is not there yet")
+            self._refuse(event, f"*{shown(event.anchor)} refers to an anchor that is not defined yet")
         value, size = self.anchors[event.anchor]
         self._count(event, size)
         return copy.deepcopy(value)  # who changes one of them changes no other
@@ -145,7 +145,7 @@ class _Reader:
                         self._refuse(event, "'<<' takes a mapping")
                     merged |= part
             elif key in own:
-                self._refuse(event, f"the key {shown(key)} stands there twice")
+                self._refuse(event, f"the key {shown(key)} occurs twice")
             else:
                 own[key] = value
         return merged | own

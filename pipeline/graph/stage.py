@@ -38,7 +38,8 @@ class Truth:
     """Marks an output that cannot be measured in the field: `state: Annotated[Reading, Truth]`.
 
     Metrics and views may read it, and so may a graph over a recorded log; in a closed loop nothing that leads to a
-    command may. A source's output named `truth` is marked by its name, and so is every output whose value type says so.
+    command may. A source's output named `truth` is marked by its name, and so is every output whose value type is
+    marked.
     """
 
 
@@ -110,7 +111,7 @@ class Context:
     def fact(self, name: str, value: Any, of_run: bool = False) -> None:
         """Put a fact about the run into the manifest (`noise: synthetic`), and into the files that the run makes.
 
-        `of_run`: not into those, as it says nothing of them (its pace).
+        `of_run`: not into those, as it does not describe them (its pace).
         """
         (self.run_facts if of_run else self.facts)[name] = value
 

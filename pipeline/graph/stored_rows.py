@@ -1,4 +1,4 @@
-"""Rows of an array that lie in a file, for arrays that are larger than memory."""
+"""Rows of an array that are in a file, for arrays that are larger than memory."""
 
 import math
 from abc import abstractmethod
@@ -18,7 +18,7 @@ _STEP = 1 << 22
 class StoredRows(Generic[T]):
     """An array of which `rows[…]` gives the part that is named, and no other part is read.
 
-    Whatever numpy takes as an index may stand there; the first index picks rows. What is given is an array of its own.
+    It takes any index that numpy takes; the first index picks rows. What is given is an array of its own.
     `np.asarray(rows)` reads everything.
     """
 

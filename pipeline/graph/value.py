@@ -61,7 +61,7 @@ def value_name(cls: type) -> str:
 
 
 class Tick(Value):
-    """One turn of the loop: its number, the time it stands for, and its log.
+    """One turn of the loop: its number, the time it is of, and its log.
 
     `stamp` is in nanoseconds (that of the tick's data); `log` counts the logs of the run from 0;
     `frame` is the record's number within its log; `first_of_log` is true where a new log begins.

@@ -19,7 +19,7 @@ START_S = 60.0
 WORKER_MEMORY = 1_000_000_000
 """Memory of a worker beside its job, bytes."""
 JOB_MEMORY = 4_000_000_000
-"""Memory asked of a batch system where nobody says how much a job takes, bytes."""
+"""Memory asked of a batch system where nobody states how much a job takes, bytes."""
 T = TypeVar("T")
 WORD = re.compile(r"[\w.,:@/+-]{1,200}")
 """Pattern of what may be written into a batch script."""

@@ -29,7 +29,7 @@ class Job:
     given: Mapping[str, Any]
     """Its first argument."""
     log: Path
-    """Log file of what it prints; a message file lies next to it while the job runs."""
+    """Log file of what it prints; a message file is next to it while the job runs."""
 
     @property
     def messages(self) -> Path:
@@ -37,7 +37,7 @@ class Job:
         return self.log.with_name(f"{self.log.name}.messages")
 
     def text(self, attempt: int, lease: Path, token: str, memory: int | None) -> str:
-        """All that whoever runs it must know. It may run for as long as the file `lease` holds the `token`.
+        """All that is needed to run it. It may run for as long as the file `lease` holds the `token`.
 
         `memory`: bytes that it may take.
         """

@@ -43,7 +43,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **ONE_THREAD},
-            start_new_session=True,  # Ctrl-C is for whoever waits for the jobs
+            start_new_session=True,  # Ctrl-C is for the process that waits for the jobs
         )
         self._answers = b""
 
@@ -74,7 +74,7 @@ class _Worker:
             if limit and peak > limit:
                 return self._ended(f"it took {_size(peak)} of memory, more than executor.memory={_size(limit)} allows")
             if lease.over():
-                return self._ended("stopped, because whoever started it has ended")
+                return self._ended("stopped, because the process that started it has ended")
         if not line:
             taken = f"; it had taken {_size(peak)} of memory" if peak else ""
             return {"error": _cause(self._process.wait()) + taken, "died": True, "memory": peak}
@@ -88,7 +88,7 @@ class _Worker:
         return {"error": why}
 
     def _answer(self) -> bytes | None:
-        """Its next line; None where it says nothing for a while, nothing where it has died."""
+        """Its next line; None where it writes nothing for a while, nothing where it has died."""
         assert self._process.stdout is not None
         while b"\n" not in self._answers:
             if not select.select([self._process.stdout], [], [], LOOK_S)[0]:
@@ -102,7 +102,7 @@ class _Worker:
 
 
 class _Lease:
-    """Whether whoever started a job still waits for it: its file holds the token, and is renewed."""
+    """Whether the process that started a job still waits for it: its file holds the token, and is renewed."""
 
     def __init__(self, job: dict[str, Any]) -> None:
         self._file, self._token = Path(job["lease"]), job["token"]

@@ -109,7 +109,7 @@ class WorkerPool:
         try:
             future = self._executor.submit(perform, job.text(attempt, self._lease, self._token, self.settings.memory))
         except Exception as error:
-            message = f"executor={self.settings.name}: it takes no more jobs ({error}); the same command goes on"
+            message = f"executor={self.settings.name}: it takes no more jobs ({error}); the same command continues"
             raise BadInput(message) from error
         future.add_done_callback(lambda done: ends.put((job, attempt, done)))
 

@@ -22,7 +22,7 @@ MAX_RATIO = 256
 
 
 MAX_BYTES_IN_ALL, MAX_RATIO_IN_ALL = 1 << 26, 128
-"""All that is unpacked of a file has at most so many bytes, and so many times its own."""
+"""Bounds of what is unpacked of a file: in bytes, and as a multiple of the file's own."""
 MAX_MESSAGES, BYTES_PER_MESSAGE = 100_000, 8
 """A file holds at most so many messages, and one more for each so many of its bytes: packed as well as can be, a real
 message takes more."""
@@ -90,12 +90,12 @@ def unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
     packed = memoryview(content)[at + _LENGTH.size :]
     limit = min(MAX_BYTES, max(MAX_BYTES // 32, MAX_RATIO * len(content)))
     if whole and size > limit:
-        raise ValueError(f"it says that its {len(packed)} bytes unpack to {size}")
+        raise ValueError(f"it states that its {len(packed)} bytes unpack to {size}")
     if whole and len(packed) < _LENGTH.unpack_from(content, at)[0]:
-        raise ValueError("it is shorter than it says")
+        raise ValueError("it is shorter than it states")
     data = _UNPACK[compression](packed[: _LENGTH.unpack_from(content, at)[0]], min(size, limit))
     if whole and len(data) != size:
-        raise ValueError("it is not as long as it says")
+        raise ValueError("it is not as long as it states")
     if whole and check and checksum and zlib.crc32(data) != checksum:
         raise ValueError("checksum is wrong")
     return data

@@ -1,4 +1,4 @@
-"""Messages as they lie in a log and as they are decoded, and the errors of those that are unsound."""
+"""Messages as they are stored in a log and as they are decoded, and the errors of those that are unsound."""
 
 from collections import Counter
 from dataclasses import dataclass

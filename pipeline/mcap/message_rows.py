@@ -35,8 +35,8 @@ class MessageRows:
     def rows(self, number: int) -> npt.NDArray[np.void]:
         """So many copies of the example, whose numbers can be assigned by field: `rows["header"]["stamp"]["sec"]`.
 
-        The items of a sequence are an axis of the array; where the first of them lies otherwise than the others (as
-        alignment has it), they are the fields `first` and `rest`.
+        The items of a sequence are an axis of the array; where the first of them is laid out otherwise than the others
+        (as alignment has it), they are the fields `first` and `rest`.
         """
         rows: npt.NDArray[np.void] = np.tile(self._bytes, number).view(self._dtype)["body"]
         return rows

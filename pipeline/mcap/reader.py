@@ -37,12 +37,12 @@ class LogReader(Losses):
     `dropped` counts what was lost, by kind, and `details` tells the first case of each:
 
     * `cut_file`: the file ends before its end record;
-    * `bad_summary`: what the file says of itself at its end is damaged, so that nothing says what is missing;
+    * `bad_summary`: the file's summary at its end is damaged, so that nothing shows what is missing;
     * `bad_chunk`: a chunk with a wrong checksum, or one that cannot be unpacked or found;
-    * `bad_checksum`: the file's bytes were changed, and nothing says where;
-    * `missing_message`: how many messages fewer there are than the file says it has;
+    * `bad_checksum`: the file's bytes were changed, and nothing shows where;
+    * `missing_message`: how many messages fewer there are than the file states;
     * `bad_attachment`: an attachment with a wrong checksum;
-    * `bad_message`: a message that its type's definition cannot decode (counted by whoever decodes).
+    * `bad_message`: a message that its type's definition cannot decode (counted by the code that decodes).
 
     Raises `LogError` where the file does not exist or is no MCAP file.
     """
@@ -169,7 +169,7 @@ class LogReader(Losses):
                 file, self._size, sorted(self._summary.chunks + self._summary.attachments)
             ):
                 if opcode == Opcode.DATA_END:
-                    if self._summary.damage:  # bytes that are missing moved it away from where the file's end says
+                    if self._summary.damage:  # bytes that are missing moved it away from where the file's end states
                         expected = Counter(read_summary(file, self._size, place.end).counts) or expected
                     break
                 unbroken = unbroken and follows
@@ -196,7 +196,7 @@ class LogReader(Losses):
         self._compare(opcode == Opcode.DATA_END, unbroken, checksum, expected, before)
 
     def _compare(self, ended: bool, unbroken: bool, checksum: int, expected: Counter[int], before: int) -> None:
-        """Count what the file says it has and what was not found in it."""
+        """Count what the file states to have and what was not found in it."""
         missing = {number: count - self._found[number] for number, count in expected.items()}
         missing = {number: count for number, count in missing.items() if count > 0}
         if missing:

@@ -21,8 +21,8 @@ class Summary:
     """The end of a file, as far as it is there and sound.
 
     `damage`: why it cannot be used, "" where it can. `descriptions`: opcode and content of every schema and channel.
-    `chunks` and `attachments`: where these records lie, in the file's order. `counts`: how many messages each channel
-    has; None: it does not say. `checksum`: of all that lies before; 0: it does not say.
+    `chunks` and `attachments`: where these records are, in the file's order. `counts`: how many messages each channel
+    has; None: not stated. `checksum`: of all before it; 0: not stated.
     """
 
     damage: str = ""
@@ -79,7 +79,7 @@ def _contents(summary: bytes) -> Summary:
 def walk(file: Any, size: int, known: list[Place]) -> Iterator[tuple[int, Place, bool]]:
     """The records of a file's data section: opcode, place (with its head), and whether it follows the one before.
 
-    `known`: places that the summary names, in order. Where a record cannot be what it says, the walk goes on at the
+    `known`: places that the summary names, in order. Where a record cannot be what it states, the walk continues at the
     next of them where a record of that length is. Ends with the end of the data, opcode DATA_END, or, where that was
     not found, with opcode 0.
     """
@@ -100,7 +100,7 @@ def walk(file: Any, size: int, known: list[Place]) -> Iterator[tuple[int, Place,
 
 
 def _next_known(file: Any, known: list[Place], start: int, end: int) -> Place | None:
-    """The first record between two bytes that is there and as long as the summary says."""
+    """The first record between two bytes that is there and as long as the summary states."""
     for place in known[bisect_right(known, start, key=lambda place: place.start) :]:
         if place.start >= end:
             return None

@@ -123,7 +123,7 @@ class Layer:
                 self.marks.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" style="{look}"/>')
 
     def ring(self, point: Array, colour: Colour, radius: float = 6.0) -> None:
-        """A circle of so many pixels around a point."""
+        """A circle of a radius in pixels around a point."""
         ((x, y),) = self._pixels(point[None, :2]).tolist()
         if np.isfinite((x, y)).all():
             look = f"fill:none;stroke:{ink(colour)};stroke-width:2.2"
@@ -151,7 +151,7 @@ class Layer:
         self.marks.append(_text(x + 5, y - 4, words, "start"))
 
     def dart(self, place: Array, colour: Colour, size: float = 9.0) -> None:
-        """A dart of so many pixels at x, y that points along an angle (rad, counter-clockwise from x): (3,)."""
+        """A dart of a length in pixels at x, y that points along an angle (rad, counter-clockwise from x): (3,)."""
         ((x, y),) = self._pixels(place[None, :2]).tolist()
         if not np.isfinite((x, y, place[2])).all():
             return

@@ -1,6 +1,6 @@
 """Positions of the boxes and wires of a drawn graph.
 
-Wires go from left to right: layers by the longest path, ordered by barycentres. What runs before the loop stands left
+Wires go from left to right: layers by the longest path, ordered by barycentres. What runs before the loop is drawn left
 of what runs every tick. A wire that is longer than a layer passes between the boxes of those that it crosses.
 """
 
@@ -30,7 +30,7 @@ class Row:
 
 @dataclass
 class Box:
-    """A node as it is drawn: its title, its ports, and where it stands."""
+    """A node as it is drawn: its title, its ports, and its position."""
 
     name: str
     subtitle: str
@@ -84,7 +84,7 @@ class Layout:
 
 
 def layout(graph: Graph) -> Layout:
-    """Boxes with their widths, layers in order, and the heights at which the items of each layer stand."""
+    """Boxes with their widths, layers in order, and the heights at which the items of each layer are."""
     boxes = _boxes(graph)
     layers, links = _layers(graph, boxes, [box for box in boxes.values() if box.lifetime != "after"])
     _order(layers, links)
@@ -183,7 +183,7 @@ def _layers(graph: Graph, boxes: dict[str, Box], flow: list[Box]) -> tuple[list[
         if wanted == depth:
             break
         depth = wanted
-    # a box without inputs stands just before its first reader, not far left of it
+    # a box without inputs is just before its first reader, not far left of it
     for box in flow:
         readers = [depth[to] for origin, to, _, _ in edges if node_of(origin) == box.name]
         entered = any(to == box.name for _, to, _, _ in edges)

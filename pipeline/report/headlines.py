@@ -11,7 +11,7 @@ from .metrics import MetricValue, digits, headline_paths, is_detail, metric_valu
 MAX_ROWS = 10
 """Lines that a run prints at most, its speed among them."""
 STANDS_FOR_ALL = ("median", "mean", "rmse")
-"""Statistics of which the first that there is stands for a distribution, where no stage says what comes first."""
+"""Statistics; the first that exists represents a distribution, where no stage states what comes first."""
 
 
 @dataclass(frozen=True)

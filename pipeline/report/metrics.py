@@ -1,4 +1,4 @@
-"""Metrics as people read them: titles and units as their stages state them or as their names say."""
+"""Metrics as people read them: titles and units as their stages state them or as their names imply."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ UNITS = {
     "_m": "m",
     "_s": "s",
 }
-"""The unit that the end of a name stands for."""
+"""The unit that the end of a name means."""
 SCALES = {"%": 100.0, "kB": 1e-3}
 """Factor by which a value is multiplied to be shown in a unit."""
 
@@ -76,7 +76,7 @@ class Metric:
         return digits(value if scale is None else scale * value)
 
     def in_words(self, value: Any) -> tuple[str, str]:
-        """The value as it stands by itself, and its unit: (`0.19`, `m`), (`after 1`, `frame`), (`at once`, '')."""
+        """The value by itself, and its unit: (`0.19`, `m`), (`after 1`, `frame`), (`at once`, '')."""
         if value == 0 and self.spec.zero is not None:
             return self.spec.zero, ""
         if value is None or isinstance(value, str):
@@ -190,7 +190,7 @@ def headline_paths(runs: Sequence[Metrics]) -> list[str]:
 
 
 def is_detail(path: str, metrics: Metrics) -> bool:
-    """Tells whether only the run's own page shows what stands at a path."""
+    """Tells whether only the run's own page shows what is at a path."""
     return any(f"{path}.".startswith(f"{detail}.") for detail in metrics.details)
 
 
@@ -206,12 +206,12 @@ def best_of(path: str, runs: Sequence[Mapping[str, MetricValue]]) -> set[int]:
 
 
 def head_of(path: str, runs: Sequence[Mapping[str, MetricValue]]) -> str:
-    """Name and unit of what stands at a path of any of several runs."""
+    """Name and unit of what is at a path of any of several runs."""
     return next(run[path] for run in runs if path in run).head
 
 
 def unit(name: str) -> str:
-    """The unit that the end of a name stands for, '' where there is none."""
+    """The unit that the end of a name means, '' where there is none."""
     return next((shown_as for end, shown_as in UNITS.items() if name.endswith(end)), "")
 
 

@@ -11,7 +11,7 @@ from typing import TextIO
 from .terminal_text import Uncleaned, plain
 
 SAID_S = 2.5
-"""Longest time for which words of a stage stand beside the frames, seconds."""
+"""Longest time for which words of a stage are shown beside the frames, seconds."""
 RATED_S = 0.05
 """Shortest time over which frames per second are stated, seconds."""
 
@@ -68,14 +68,14 @@ class Progress:
         if now >= self._due:
             self._due = now + self._every
             self._show(now)
-        if done == total:  # what is printed from now on stands below
+        if done == total:  # what is printed from now on comes below
             self._ended = (name, done)
             self._close()
 
     def say(self, words: str) -> None:
         """Show what a stage does or waits for: beside the frames once there are any.
 
-        In a terminal it stands until something else is shown. Elsewhere it is a line, where only its numbers have
+        In a terminal it stays until something else is shown. Elsewhere it is a line, where only its numbers have
         changed every two seconds at most.
         """
         now, new = self._clock(), re.sub(r"[\d.]+", "", words) != re.sub(r"[\d.]+", "", self._doing)

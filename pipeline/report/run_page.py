@@ -37,7 +37,7 @@ def write_report(
 ) -> Path:
     """Write `report.html` into a run's folder: warnings, headlines and plots, then all else, folded.
 
-    Nothing on the page is fetched from anywhere. Plots and tables stand in their order. The parameters are those of
+    Nothing on the page is fetched from anywhere. Plots and tables are in their order. The parameters are those of
     `graph`. The page names the folder `shown_as`, where that is another one.
     """
     from markupsafe import Markup
@@ -74,7 +74,7 @@ def write_report(
 
 
 def _shown(plot: Plot) -> dict[str, Any]:
-    """A plot as the page shows it: a chart of ours stands in it as it is, everything else as a picture."""
+    """A plot as the page shows it: a chart of ours is embedded as it is, everything else as a picture."""
     from markupsafe import Markup
 
     shown: dict[str, Any] = {"name": plot.name, "title": plot.title, "caption": plot.caption, "kind": "picture"}
@@ -88,7 +88,7 @@ def _shown(plot: Plot) -> dict[str, Any]:
 
 
 def _stand_side_by_side(plots: Sequence[dict[str, Any]]) -> None:
-    """Put charts that follow each other in pairs; one that is left over stands beside its caption."""
+    """Put charts that follow each other in pairs; one that is left over is beside its caption."""
     charts = 0
     for plot, following in zip_longest(plots, plots[1:]):
         charts = charts + 1 if plot["kind"] == "chart" else 0
@@ -191,7 +191,7 @@ def _text(value: object) -> str:
 
 
 def _seen_from(folder: Path, cwd: Any) -> str:
-    """A folder as one types it in `cwd`: relative where it lies below it."""
+    """A folder as one types it in `cwd`: relative where it is below it."""
     try:
         return str(folder.resolve().relative_to(Path(str(cwd)).resolve()))
     except ValueError:

@@ -17,7 +17,7 @@ from .sweep_table import overview_of, settings_of, write_sweep_tables
 def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write `sweep.html`: a line per job with what it changed, how it ended, its headlines or its error, and means.
 
-    Beside it lie the same numbers as tables (see `write_sweep_tables`).
+    Beside it are the same numbers as tables (see `write_sweep_tables`).
 
     A row holds `job`, `folder` (the job's run folder), `manifest` (with `overrides`, `status`, `error`) and `metrics`
     (`Metrics`, None where the job has none).

@@ -88,7 +88,7 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
     heads, below = [str(run["name"]) for run in runs], ["* the best of its line"]
     if len({str(run["config"].get("log")) for run in runs}) > 1:
         below.append("these are runs of different logs")
-    if max(map(len, heads)) > MAX_HEAD_LENGTH:  # folded names are hard to tell apart: letters, and what they stand for
+    if max(map(len, heads)) > MAX_HEAD_LENGTH:  # folded names are hard to read: letters, and what they mean
         letters = [ascii_uppercase[n % 26] * (n // 26 + 1) for n in range(len(runs))]
         below = [*(f"{letter}: {name}" for letter, name in zip(letters, heads, strict=True)), *below]
         heads = letters

@@ -14,7 +14,7 @@ def plain(text: str) -> str:
 
 
 class Uncleaned:
-    """A stream for whoever writes control characters of omninav's own, around texts that are `plain`."""
+    """A stream for code that writes control characters of omninav's own, around texts that are `plain`."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream

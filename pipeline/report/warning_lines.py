@@ -9,7 +9,7 @@ from omninav.pipeline.graph.problems import counted
 from .metrics import humanise
 
 PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
-"""Parts of a sentence that say where something was found: the names in front, numbers, files."""
+"""Parts of a sentence that tell where something was found: the names in front, numbers, files."""
 
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -29,7 +29,7 @@ def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
 
 
 def grouped(lines: Sequence[str]) -> list[str]:
-    """One line for those that say the same of different files, places or numbers: the first, and how many there are."""
+    """One line for warnings that differ in files, places or numbers alone: the first, and how many there are."""
     found: dict[str, list[str]] = {}
     for line in lines:
         found.setdefault(" ".join(PARTICULARS.sub("", line).split()), []).append(line)

@@ -31,8 +31,8 @@ class ArtifactSpecification:
     must_match: tuple[str, ...] = ()
     """Nodes that must be in this graph what they were in the one that made the file."""
     together_with: str | None = None
-    """The artifact whose graph gives this one too, in the same run: it says how that graph is made, and this one what
-    else stands in it (`inherit`, `nodes`, `wires`)."""
+    """The artifact whose graph gives this one too, in the same run: that one describes the graph, and this one what
+    else is in it (`inherit`, `nodes`, `wires`)."""
     required: bool = True
     """Whether nothing can run without it; else the wires from it are left out where it is neither given nor made."""
     for_plots: bool = False

@@ -71,7 +71,7 @@ def companions(artifact: PreparedArtifact, artifacts: Sequence[PreparedArtifact]
 def obtain(
     execution: Execution, artifact: PreparedArtifact, together: Sequence[PreparedArtifact] = ()
 ) -> tuple[Value, dict[str, Any]]:
-    """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it.
+    """The artifact's value, from its file, the cache or its graph's run, with what the manifest records of it.
 
     Where its graph has to run, what else that gives (`together`) is put into the cache too.
     """

@@ -38,7 +38,7 @@ LOG = "run.log"
 def execute(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | None = None) -> Metrics:
     """Run a prepared configuration in its folder, from its start or from where it was left, and return its metrics.
 
-    Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
+    Raises `StageFailed` or `BadInput`; by then the manifest records it and the traceback is in `run.log`.
     """
     with running(run, prepared, display) as engine:
         while engine.tick():
@@ -48,10 +48,10 @@ def execute(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | No
 
 @contextmanager
 def running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | None = None) -> Iterator[Engine]:
-    """The engine of a prepared configuration, ready for its next tick; whoever has it calls `tick`.
+    """The engine of a prepared configuration, ready for its next tick; its owner calls `tick`.
 
     When the block ends well, what comes after the loop has run and the folder is complete. When it raises, the manifest
-    says so, and the run can go on from its last checkpoint.
+    records it, and the run can continue from its last checkpoint.
     """
     with run.owned(), _logged(run):
         try:
@@ -98,7 +98,7 @@ def _running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | N
             yield engine
             last = engine.finish()
         except BaseException:
-            engine.close()  # what goes on with the run, perhaps in this process, writes to the same files
+            engine.close()  # what continues the run, perhaps in this process, writes to the same files
             raise
         keep_prefix(engine, prefix, cache)
     for name, origin in prepared.saves.items():
@@ -116,7 +116,7 @@ def _running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | N
 
 
 def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
-    """Say how many frames of an interrupted session came after the checkpoint that it goes on from."""
+    """Report how many frames of an interrupted session came after the checkpoint that it continues from."""
     steps = run.manifest.pop(STEPS, 0)
     if steps > ticks:
         what = f"{steps - ticks:,} of {counted(steps, 'frame')}"
@@ -179,7 +179,7 @@ def _digests(folder: Path) -> dict[str, str]:
 
 def _fail(run: RunFolder, status: str, what: str) -> None:
     run.manifest |= {"status": status, "error": what, "ended": datetime.now().isoformat(timespec="seconds")}
-    with suppress(OSError):  # a full disk; what stopped the run is raised, and the run can go on without this
+    with suppress(OSError):  # a full disk; what stopped the run is raised, and the run can continue without this
         run.save()
     log.error("%s\n%s", what, traceback.format_exc())
 
@@ -193,7 +193,7 @@ class _LogFile(logging.FileHandler):
         )
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
-        """Say nothing: what cannot be written here is told elsewhere."""
+        """Say nothing: what cannot be written here is reported elsewhere."""
 
 
 @contextmanager

@@ -6,11 +6,11 @@ from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.results import Plot
 
 PLOTS = ("auto", "few", "all", "none")
-"""Values of `plots`: `auto` draws few, and a sweep takes it for `none`."""
+"""Values of `plots`: `auto` draws few, and none in a sweep."""
 
 
 def with_plots(graph: Graph, plots: str, keep: Iterable[str]) -> Graph:
-    """A graph without the nodes that only draw what is not asked for, and without those that only they read.
+    """A graph without the nodes that only draw plots that were not requested, and without those that only they read.
 
     `keep`: nodes that stay in any case, because something of them is saved.
     """

@@ -197,7 +197,7 @@ def _how_to_get(name: str, spec: ArtifactSpecification) -> str:
 
 
 def stages_of(graph: Graph) -> dict[str, Any]:
-    """Class and parameters of every node but the source, as plain data: what a file says of the graph that made it."""
+    """Class and parameters of every node but the source, as plain data: how a file describes the graph that made it."""
     found = {}
     for node in graph.nodes.values():
         if not node.signature.is_source:

@@ -23,11 +23,11 @@ from .prepared_run import PreparedRun, input_digests
 
 CONFIG = "config.yaml"
 STEPS = "steps"
-"""Key of the manifest that says how many frames a session had when it was interrupted."""
+"""Key of the manifest for how many frames a session had when it was interrupted."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run that its user stopped. `folder`: where it can go on."""
+    """A run that its user stopped. `folder`: where it can continue."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
@@ -44,13 +44,13 @@ class RunFolder:
     folder: Path
     manifest: dict[str, Any] = field(default_factory=dict)
     complete: bool = False
-    """Whether it was complete when it was to go on: then nothing was done."""
+    """Whether it was complete when it was resumed: then nothing was done."""
     shown_as: Path | None = None
     """The folder that its report names, where that is another one."""
     _owned: bool = False
 
     def save(self) -> None:
-        """Write the manifest as it stands."""
+        """Write the manifest as it is."""
         write_json(self.folder / MANIFEST, self.manifest)
 
     @property
@@ -79,7 +79,7 @@ class RunFolder:
             self._owned = False
 
     def seal_beginning(self, config: str) -> None:
-        """Keep the manifest as it stands, and the text of the configuration, where damage to their files is found."""
+        """Keep the manifest as it is, and the text of the configuration, where damage to their files is found."""
         write_whole(self.beginning, seal(encode({"manifest": self.manifest, "config": config})))
 
     def describe(self, prepared: PreparedRun, config: str) -> None:
@@ -147,7 +147,7 @@ def start(
 
 
 def was_started(folder: Path, prepared: PreparedRun) -> bool:
-    """Tells if a run of the same configuration, stages and inputs was started in a folder: then it can go on there."""
+    """Tells if a run of the same configuration, stages and inputs was started in a folder, and can continue there."""
     try:
         manifest = read_json(folder / MANIFEST)
     except (OSError, Damaged):

@@ -1,4 +1,4 @@
-"""Views as vectors whose distance says how similar they are, and the few dimensions in which a map's views differ."""
+"""Views as vectors whose distance measures their similarity, and the few dimensions in which a map's views differ."""
 
 from collections.abc import Iterator
 

@@ -22,7 +22,7 @@ class AroundBelief:
     """Selects the references within a radius of any particle, beside those that a stage finds anywhere in the map.
 
     A mixin, beside `Stage`. A belief may be wrong, so it never chooses alone. Around recovery particles only the
-    nearest references are taken: they lie all over the map, and only the nearest matter to them. Radii are in
+    nearest references are taken: they are all over the map, and only the nearest matter to them. Radii are in
     appearance length scales (port `length_scale`).
     """
 
@@ -63,8 +63,8 @@ class AroundBelief:
 
         Each of the others represents as many as are left out, so that sums by sampling weight are estimates for the
         whole map: the chosen ones, which look most like the view, count for themselves alone. What is read of a map
-        that lies in its file is read again and again, and not all of it little by little. All references where none is
-        chosen, or no others would be left out.
+        that is kept in its file is read again and again, and not all of it little by little. All references where none
+        is chosen, or no others would be left out.
         """
         others = len(map) - len(chosen)
         if not len(chosen) or others <= BACKGROUND_REFERENCES:

@@ -1,7 +1,7 @@
 """Builds and searches an index of a map's references, with faiss.
 
 faiss reads files without checking them, so none of its files is ever read: an index is kept as plain arrays, and is put
-together anew from them.
+together again from them.
 """
 
 import math

@@ -10,7 +10,7 @@ from .inverted_file import build, faiss_or_none
 MIN_REFERENCES = 1000
 """Smallest map that gets an index, references."""
 REBUILD_GROWTH = 2.0
-"""Growth of a map, as a factor, at which its index is built anew."""
+"""Growth of a map, as a factor, at which its index is rebuilt."""
 DIMENSIONS = 128
 """Numbers that are kept of each reference."""
 EXACT_UP_TO = 30_000
@@ -27,9 +27,9 @@ class BuildReferenceIndex(Stage):
     """Builds an index that finds the references similar to a view, at any heading, without comparing them all.
 
     Views become short vectors: the square roots of their histograms, on the principal axes of the map. All are compared
-    with the view's; in a map of more than `EXACT_UP_TO` they lie in an inverted file, with four bits for each two
+    with the view's; in a map of more than `EXACT_UP_TO` they are in an inverted file, with four bits for each two
     dimensions (faiss; Jégou, Douze & Schmid 2011; `pip install 'omninav[index]'`, without which it takes longer). The
-    index of a finished map is kept in the cache. That of a map that grows is built anew when the map has grown by
+    index of a finished map is kept in the cache. That of a map that grows is rebuilt when the map has grown by
     `REBUILD_GROWTH`; until then references are appended to it.
     """
 

@@ -28,7 +28,7 @@ TURN_IN_PLACE_DEG = 35.0
 STOP_DISTANCE_M = 0.15
 """Free distance straight ahead at which the robot stops, metres."""
 BLOCKED_AFTER_S = 2.0
-"""Time for which the robot waits for a free direction, or goes on towards a lost target, seconds."""
+"""Time for which the robot waits for a free direction, or continues towards a lost target, seconds."""
 WANDER_AFTER_S = 5.0
 """Time after which a robot whose target is lost wanders, seconds."""
 DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
@@ -53,11 +53,11 @@ class FollowHoming(Stage):
     """Turns towards the homing vector and drives around obstacles; docks at the last view.
 
     Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way; a robot that has had one
-    stands until there is another. A lost target is approached for a while where its distance in metres is known, and a
+    stops until there is another. A lost target is approached for a while where its distance in metres is known, and a
     doubtful one slowly, since more of it is seen from closer by. Then the robot is `lost` until it is sure of its
-    target: it stands, or searches, if `wander` is wired: it drives by that command, and again for a while towards what
-    may be its target. After `search_s` without a break it stands. It is `blocked` where no direction is free, or where
-    `stalled` says so. `status` gives the reason.
+    target: it stops, or searches, if `wander` is wired: it drives by that command, and again for a while towards what
+    may be its target. After `search_s` without a break it stops. It is `blocked` where no direction is free, or where
+    `stalled` is set. `status` gives the reason.
     """
 
     max_speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -69,7 +69,7 @@ class FollowHoming(Stage):
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
     """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
     search_s: Annotated[float, Bounds(gt=0)] = 60.0
-    """Time without a break for which a target may be lost or doubtful; then the robot stands, until it is sure of it
+    """Time without a break for which a target may be lost or doubtful; then the robot stops, until it is sure of it
     again or has another."""
 
     class Out(Outputs):
@@ -170,7 +170,7 @@ def _metres_left(vector: HomingVector, scan: Scan | None) -> float:
         return vector.metres
     if scan is None:
         return math.inf
-    # A typical feature is taken to be as far away as what stands around the robot.
+    # A typical feature is taken to be as far away as what is around the robot.
     return vector.depth_ratio * float(np.median(np.minimum(scan.ranges, scan.farthest)))
 
 

@@ -45,7 +45,7 @@ class Ways(NamedTuple):
 def marked(evidence: Array, pose: Array, ranges: Array, azimuths: Array, farthest: float) -> Array:
     """Log odds of an obstacle (CELLS, CELLS) after a ring of ranges (N,), inf without an echo, from a pose (3,).
 
-    Each cell is told by the beam nearest to its direction, if there is one (Moravec & Elfes 1985, with one beam to a
+    Each cell takes the beam nearest to its direction, if there is one (Moravec & Elfes 1985, with one beam to a
     sector). An echo counts less, the wider its beam is there.
     """
     x, y = _MIDDLES[None, :] - pose[0], _MIDDLES[:, None] - pose[1]
@@ -66,7 +66,7 @@ def marked(evidence: Array, pose: Array, ranges: Array, azimuths: Array, farthes
 
 
 def shifted(evidence: Array, rows: int, columns: int) -> Array:
-    """The grid with what was `rows`, `columns` farther on in each cell, and nothing where that lay outside."""
+    """The grid with what was `rows`, `columns` farther on in each cell, and nothing where that was outside."""
     moved = np.zeros_like(evidence)
     to = tuple(slice(max(0, -n), max(0, CELLS - max(0, n))) for n in (rows, columns))
     of = tuple(slice(max(0, n), max(0, CELLS - max(0, -n))) for n in (rows, columns))
@@ -86,13 +86,13 @@ def prices(evidence: Array, radius: float) -> Array:
 
 
 def cell_at(point: Array) -> int:
-    """The flat cell in which a point (2,) lies, or the nearest one to it."""
+    """The flat cell in which a point (2,) is, or the nearest one to it."""
     column, row = np.clip(np.floor(point / CELL_M + CELLS / 2), 0, CELLS - 1).astype(np.int64)
     return int(row * CELLS + column)
 
 
 def on_grid(points: Array) -> Bools:
-    """Tells which of some points (N, 2) lie on the grid: (N,)."""
+    """Tells which of some points (N, 2) are on the grid: (N,)."""
     inside: Bools = np.all(np.abs(points) < CELL_M * CELLS / 2, axis=1)
     return inside
 

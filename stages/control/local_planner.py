@@ -1,4 +1,4 @@
-"""Finds the way through what stands around a robot, to its target or, where it is lost, to where it has not been."""
+"""Finds the way through what is around a robot, to its target or, where it is lost, to where it has not been."""
 
 import math
 from dataclasses import field, replace
@@ -54,7 +54,7 @@ class LocalPlanner(Stage):
     A grid around the robot keeps what ranges have shown, carried along by odometry. Where the straight way to the
     target is not free, the vector points along the cheapest way there. While the target is lost, `search` drives
     slowly along free space to the nearest place beside which nothing is known (Yamauchi 1997); it is absent where
-    there is none. The grid begins anew when the target is lost: the robot may have been carried elsewhere.
+    there is none. The grid is cleared when the target is lost: the robot may have been carried elsewhere.
     """
 
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25

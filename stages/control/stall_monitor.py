@@ -24,7 +24,7 @@ STALLED_AFTER_S = 30.0
 class StallMonitorState(State):
     """The target, the smallest ratio of the way to it that was left, and times (ns) since then.
 
-    `stalled`: in all; `detour`: in which something stood in the direct way; `blocked`: in which it was said to be
+    `stalled`: in all; `detour`: in which something was in the direct way; `blocked`: in which it was reported as
     blocked. `stamp`: of the tick before.
     """
 
@@ -39,7 +39,7 @@ class StallMonitorState(State):
 class StallMonitor(Stage):
     """Reports a blocked way when the robot has driven for some time without getting closer to its target.
 
-    What stands in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
+    What is in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
     soon as it has another target, or after `DETOUR_S`, so that it tries again if nobody plans again. The time in which
     the target is lost does not count.
     """
@@ -76,7 +76,7 @@ class StallMonitor(Stage):
             state.detour += elapsed if self._obstructed(vector, scan) else 0
         why = ""
         if state.detour > DETOUR_S * 1e9:
-            why = f"something stands in the way, and going around it for {DETOUR_S:g} s led no closer"
+            why = f"something is in the way, and going around it for {DETOUR_S:g} s led no closer"
         elif state.stalled > STALLED_AFTER_S * 1e9:
             why = f"{STALLED_AFTER_S:g} s have led no closer"
         if not why:

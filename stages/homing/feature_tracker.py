@@ -24,7 +24,7 @@ MAX_PIXELS = 76800
 class FeatureTrackerState(State):
     """The grey `image` before, and in it the tracked points of the local map `number`, one for each of its N features.
 
-    `points` (N, 2) are tracked where `alive` (N,), lie at `places` (N, 3) in the map, and have these `histograms`
+    `points` (N, 2) are tracked where `alive` (N,), are at `places` (N, 3) in the map, and have these `histograms`
     (N, 16) of intensities.
     """
 

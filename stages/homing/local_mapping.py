@@ -45,7 +45,7 @@ those of four drives that stopped elsewhere 0.5 to 0.68 (docs/experiments/atlas.
 SECTORS, MIN_IN_SECTOR, SHOWN_OF_SECTOR, SHOWN_SECTORS = 12, 4, 0.2, 0.6
 """Sectors of azimuth at the target, features of the target in one that count, and the share of them that must have the
 target's bearings in this share of the sectors: in development drives at least 0.67 of the sectors show that at the
-target, and at most 0.5 where a piece of furniture was taken for another like it (docs/experiments/atlas.md)."""
+target, and at most 0.5 where a piece of furniture was mistaken for a similar one (docs/experiments/atlas.md)."""
 MIN_INLIERS = 6
 """Features that must agree with a pose."""
 MIN_REBUILD_DISTANCE = 0.1
@@ -53,7 +53,7 @@ MIN_REBUILD_DISTANCE = 0.1
 
 MIN_VERIFIED_INLIERS = 14
 """Features that must agree in each of two images before the robot relies on a target: none of 3,980 pairs hidden
-behind walls has so many, but 13 of 2,420 of places with the same walls do (docs/experiments/
+behind walls has this many, but 13 of 2,420 of places with the same walls do (docs/experiments/
 topological_nav_homing_vectors.md)."""
 MIN_BASELINE_M = 0.2
 """Distance between the two images by odometry, metres: the same image twice would bear out the same false matches."""
@@ -61,7 +61,7 @@ MAX_DOUBTFUL_M = 0.6
 """Way after which a doubtful map that no image has shown again, and a witness, are forgotten, metres."""
 MAX_JUMP_M = 0.2
 """Largest distance of the robot's place from where odometry leads, from one image to the next, metres: in development
-drives 98 % of the right places lie within 0.07, and all beyond 0.2 are wrong (docs/experiments/atlas.md)."""
+drives 98 % of the right places are within 0.07, and all beyond 0.2 are wrong (docs/experiments/atlas.md)."""
 MAX_REFUTED_M = 3.0
 """Way after which features that led to another place may make a map again, metres."""
 MAX_HEADING_DIFFERENCE_DEG = 5.0
@@ -149,7 +149,7 @@ class LocalMapping(Stage):
     Where far more matches agree with a pose of a camera that leans, in two images, the planar solver works upright.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
-    metres is not known, and any two images bear each other out, those of a robot that stands too: the camera is the
+    metres is not known, and any two images bear each other out, those of a stationary robot too: the camera is the
     only sensor. The map has the places of the `camera`, which may sit beside the robot's axis. Raises BadInput for
     correspondences of other features.
     """
@@ -169,7 +169,7 @@ class LocalMapping(Stage):
     """Asks a second image to bear out a new map, and the target's look an arrival; the paper asks for neither."""
 
     class Out(Outputs):
-        """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
+        """Absent where there is no target; `tracks` are those of the tracker, with what the map knows of them."""
 
         map: LocalMap | None = None
         tracks: TrackedFeatures | None = None
@@ -245,7 +245,7 @@ class LocalMapping(Stage):
     def _begun(
         self, ctx: Context, state: LocalMappingState, lost: LocalMap, matches: Matches, motion: Motion | None
     ) -> tuple[LocalMap, LocalMap]:
-        """The map to go on with, and the one to show: a new one is both; a doubtful one is shown for a short way."""
+        """The map to continue with, and the one to show: a new one is both; a doubtful one is shown for a short way."""
         new, reason = self._made(ctx, state, lost, matches, MIN_INLIERS)
         if new is not None and (not self.verify or self._verified(state, new, motion is not None)):
             state.doubtful = None
@@ -274,7 +274,7 @@ class LocalMapping(Stage):
             kinds = tracks.kinds.copy()
             tracked = np.flatnonzero(kinds != LOST)
             bearings, places = tracks.bearings[tracked], tracks.places[tracked]
-        # A matched feature stands beside its track, at its own position.
+        # A matched feature is kept beside its track, at its own position.
         row_of = {int(row): n for n, row in enumerate(local_map.rows)}
         known = np.array([row_of.get(int(row), -1) for row in matches.rows], np.int64)
         matched = np.flatnonzero(known >= 0)
@@ -393,7 +393,7 @@ class LocalMapping(Stage):
     def _pose(
         self, ctx: Context, state: LocalMappingState, first: Array, second: Array, threshold: float
     ) -> AgreedPose | None:
-        # The pose of the target view, and what the matches say of the camera's vertical.
+        # The pose of the target view, and what the matches show of the camera's vertical.
         level = levelling(state.vertical)
         found = relative_pose(first @ level.T, second @ level.T, ctx.rng, self.solver, threshold, refine=self.refine)
         if found is None:

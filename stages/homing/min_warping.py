@@ -21,7 +21,7 @@ LOG_STEP = 0.112
 MAX_SHIFT = 8
 """Planes for magnification, and as many for its inverse: up to 2.4 times."""
 DEPTH_RATIOS = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.52, 0.64, 0.78, 0.95, 1.2])
-"""The way to the target over a column's distance: what is tried. Each stands for what is closest to it."""
+"""The way to the target over a column's distance: what is tried. Each represents what is closest to it."""
 PRIOR = np.gradient(DEPTH_RATIOS) / np.gradient(DEPTH_RATIOS).sum()
 """All alike up to the largest."""
 HALF_WINDOW = 1

@@ -13,7 +13,7 @@ ARRIVAL_DISTANCE_M = 0.04
 ARRIVAL_DEPTH_RATIO = 0.007
 """Depth ratio of the last view at which the robot has arrived."""
 PASSED_DEPTH_RATIO = 0.03
-"""Depth ratio of a view that hardly differs from the present one, reached at once; of the last where it lies behind."""
+"""Depth ratio of a view that hardly differs from the present one, reached at once; of the last where it is behind."""
 DOCKING_DEPTH_RATIO = 0.05
 """Depth ratio of the last view beyond which a robot that turns there is not there after all."""
 MAX_HEADING_ERROR_DEG = 3.0
@@ -36,9 +36,9 @@ class WaypointImagesState(State):
 class WaypointImages(Stage):
     """Goes on to the next view of a path as soon as one is close enough, and stops at the last with its heading.
 
-    Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it lies behind and less than half of the
+    Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it is behind and less than half of the
     way to it is left. At the last view the robot only turns, until it has the view's heading. A lost target's vector
-    does not count; a doubtful one says that the robot is not there yet. `vector` is the one of the tick before, by a
+    does not count; a doubtful one means that the robot is not there yet. `vector` is the one of the tick before, by a
     delayed wire. A path with another number starts again at its first view. The depth ratio is the distance over that
     of a typical feature.
     """

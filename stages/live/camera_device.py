@@ -19,7 +19,7 @@ WAIT_S = 5.0
 
 
 class CameraDevice:
-    """An open camera: its number, or its file as /dev/video0; a video stands for a camera too.
+    """An open camera: its number, or its file as /dev/video0; a video serves as a camera too.
 
     Raises `BadInput` where there is no such camera.
     """
@@ -73,7 +73,7 @@ def image_message(pixels: Pixels, stamp: int, quality: int) -> bytes:
 def _opened(device: str) -> Any:
     if not device.isdecimal() and not Path(device).exists():
         raise BadInput(f"there is no camera {device:.100}; type its number (0), or its file as /dev/video0")
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what OpenCV says of it is said below
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what OpenCV reports is reported below
     capture = cv2.VideoCapture(int(device) if device.isdecimal() else str(Path(device).absolute()))
     if not capture.isOpened():
         raise BadInput(f"camera {device:.100} cannot be opened; is it plugged in, and free?")

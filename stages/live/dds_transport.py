@@ -119,7 +119,7 @@ class DdsTransport(Transport):
         package, _, name = msgtype.split("/")
 
         class Opaque(IdlStruct, typename=f"{package}::msg::dds_::{name}_"):  # a keyword: as an attribute it is ignored
-            first: uint8  # DDS checks what the type says, and lets pass what follows
+            first: uint8  # DDS checks what the type states, and lets pass what follows
 
         return Topic(self._participant, f"rt{topic}", Opaque)
 

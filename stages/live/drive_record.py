@@ -18,7 +18,7 @@ class DriveRecord:
     """An MCAP file that grows as `live.mcap.unfinished` and is `live.mcap` at its end.
 
     Every message is a chunk of its own, with a checksum, and on disk after each `write`: a run that is killed has all
-    of it. A record that is there already is copied first, without what its end may lack, and goes on.
+    of it. A record that is there already is copied first, without an incomplete end, and continues.
     """
 
     def __init__(self, path: Path, header: LiveHeader, camera: Camera) -> None:

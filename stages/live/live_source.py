@@ -75,9 +75,9 @@ class LiveSourceState(DeadReckoning):
 
 
 class LiveSource(Source):
-    """A robot that runs now, over ROS 2: one tick for the newest image whose stamp lies between two odometry messages.
+    """A robot that runs now, over ROS 2: one tick for the newest image whose stamp is between two odometry messages.
 
-    Or a camera that is plugged into this computer: it says images alone. Without odometry, turns are those that a
+    Or a camera that is plugged into this computer: it gives images alone. Without odometry, turns are those that a
     visual compass sees, and the speed is a guess (`speed_m_s`), as of a video.
 
     Images that were overtaken meanwhile are counted and never queued. Whatever a tick was made of is written to
@@ -85,7 +85,7 @@ class LiveSource(Source):
     A run that was killed and is resumed first makes the ticks again that its record holds, then joins the robot.
 
     It ends with Ctrl-C or SIGTERM, as a log does at its last image. A topic that is missing, silent or of another type,
-    a QoS that does not fit and clocks that jump are said on the terminal and in diagnostics, and waited out. Raises
+    a QoS that does not fit and clocks that jump are reported on the terminal and in diagnostics, and waited out. Raises
     `TransportError` where the transport's library is missing, `BadInput` where the camera cannot be its images'.
     """
 
@@ -103,9 +103,9 @@ class LiveSource(Source):
     topics: Topics = Topics()
     """Which topics are read. An image topic whose name ends with `compressed` carries compressed images."""
     initial_pose: str | None = "/initialpose"
-    """Topic on which somebody says where the robot is (PoseWithCovarianceStamped): the belief starts again there."""
+    """Topic for the robot's pose, given from outside (PoseWithCovarianceStamped): the belief starts again there."""
     goal: str | None = "/goal_pose"
-    """Topic on which somebody says where it is to go (PoseStamped)."""
+    """Topic for its goal (PoseStamped)."""
     restart: str | None = "/reinitialize_global_localization"
     """Topic (Empty), and service of that name where the transport has services: the belief starts again, uniform."""
     amcl: str | None = None
@@ -117,13 +117,13 @@ class LiveSource(Source):
     diagnostics: str | None = "/diagnostics"
     """Topic on which the state of the run is published every second (DiagnosticArray)."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
-    """Ends after this time by the images' stamps; null: only when it is told to."""
+    """Ends after this time by the images' stamps; null: only when it is stopped."""
     rest_s: Annotated[float, Bounds(ge=0)] | None = None
     """Ends this long after the planned route has: the robot has arrived, or given up; null: it waits for a new goal."""
 
     class Out(DriveOutputs):
         """Inputs known at an image. `reported_odometry`: in the frame that the robot's odometry has now, which begins
-        anew where it is reset; None where motion is guessed."""
+        again where it is reset; None where motion is guessed."""
 
         reported_odometry: Pose | None = None
 
@@ -268,7 +268,7 @@ class LiveSource(Source):
         self._record.write(messages)
 
     def _watch(self, ctx: Context, synchronizer: TimeSynchronizer) -> None:
-        """Every second, say how it goes."""
+        """Every second, report how it goes."""
         now = time.monotonic()
         if now - self._watched < WATCH_S:
             return

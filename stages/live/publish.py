@@ -1,4 +1,4 @@
-"""Messages of a live run to the robot and to whoever watches, every tick."""
+"""Messages of a live run to the robot and to all who watch, every tick."""
 
 import time
 from dataclasses import dataclass
@@ -205,7 +205,7 @@ def register_nav2() -> None:
 
 
 def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-    """Publish a message; where that cannot be, say why and leave the topic out from then on."""
+    """Publish a message; where that cannot be, report why and leave the topic out from then on."""
     if topic in transport.status.left_out:
         return
     try:

@@ -225,7 +225,7 @@ class RobotDriver(Stage):
         send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
 
     def _note(self, ctx: Context, seconds: float) -> None:
-        """Every few seconds, say how fast time passes and whether anybody commands."""
+        """Every few seconds, report how fast time passes and whether anybody commands."""
         now, (before, then) = time.monotonic(), self._noted
         if now - then > NOTE_S:
             speed = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""

@@ -45,7 +45,7 @@ WITHOUT = {
 SHARED = (TRANSFORMS_TYPE, "diagnostic_msgs/msg/DiagnosticArray")
 """Types of topics that many nodes publish together."""
 SILENT_S = 1.0
-"""A topic that has been heard and says nothing for so long is a trouble."""
+"""Silence after which a topic that was heard is reported, seconds."""
 UNUSED_S = 2.0
 """Images of which none becomes a tick for so long are a trouble."""
 
@@ -67,14 +67,14 @@ class SyncedFrame(NamedTuple):
 
 @dataclass
 class TimeSynchronizer:
-    """Joins a transport's images with odometry, scans and truth of their times, and says what is missing."""
+    """Joins a transport's images with odometry, scans and truth of their times, and reports what is missing."""
 
     transport: Transport
     status: LiveStatus
     header: LiveHeader
     drive: OdometryBuffer
     camera: Camera | str | None
-    """A projection's name says enough with the first image; None: the robot's CameraInfo does."""
+    """A projection's name is enough with the first image; None: the robot's CameraInfo does."""
     camera_info: str | None
     patience_s: float
     last_stamp: int | None = None
@@ -90,7 +90,7 @@ class TimeSynchronizer:
         self._earlier: int | None = None
         self._without_scan = False
         self.mounted: Mounted | None = None
-        """The camera of the first tick, with what static transforms say of it."""
+        """The camera of the first tick, with what static transforms state of it."""
         self._fixed, self._base, self._info_frame = StaticTransforms(), "", ""
         self._by_info = self.camera is None
         self._since = time.monotonic()
@@ -256,7 +256,7 @@ class TimeSynchronizer:
         for one in self._images:
             if now - one.since > self.patience_s:
                 where = "nothing" if track is None or track.last is None else f"up to {track.last / 1e9:.3f} s"
-                self._drop("outside_odometry", f"image of {one.stamp / 1e9:.3f} s: odometry says {where}")
+                self._drop("outside_odometry", f"image of {one.stamp / 1e9:.3f} s: odometry has {where}")
         self._images = [one for one in self._images if now - one.since <= self.patience_s]
         return None
 
@@ -269,7 +269,7 @@ class TimeSynchronizer:
         return speaks and truth.last is not None and truth.last < image.stamp
 
     def _wants_transforms(self) -> bool:
-        """True until the first tick, if no file says where the camera sits: static transforms may."""
+        """True until the first tick, if no file states where the camera sits: static transforms may."""
         told = isinstance(self.camera, Camera) and self.camera.placed
         return not self._used_any and not told
 

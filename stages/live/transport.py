@@ -89,7 +89,7 @@ class Transport(ABC):
 
     @abstractmethod
     def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-        """Send a message in CDR. `latched`: whoever comes later gets the last one too (transient local).
+        """Send a message in CDR. `latched`: later subscribers get the last one too (transient local).
 
         Reliable. The first message of a topic announces it; peers match only then.
         """
@@ -116,7 +116,7 @@ class Transport(ABC):
 
     @property
     def ended(self) -> bool:
-        """Tells whether nothing will come any more. A robot may always say something."""
+        """Tells whether nothing will come any more. A robot may always send more."""
         return False
 
     @abstractmethod

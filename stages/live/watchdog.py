@@ -25,7 +25,7 @@ class Watchdog:
             self._changed.notify()
 
     def rest(self) -> None:
-        """The robot stands: there is nothing to watch."""
+        """The robot has stopped: there is nothing to watch."""
         with self._changed:
             self._until = None
 

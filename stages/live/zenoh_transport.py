@@ -144,6 +144,6 @@ def _directly(callback: Callable[[Any], None]) -> Any:
 
 
 def _typed(msgtype: str) -> str:
-    """A type in a key: its name on DDS, and the hash of its definition by which versions are told apart."""
+    """A type in a key: its name on DDS, and the hash of its definition that distinguishes versions."""
     package, _, name = msgtype.split("/")
     return f"{package}::msg::dds_::{name}_/{standard_types().hash_rihs01(msgtype)}"

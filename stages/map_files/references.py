@@ -48,7 +48,7 @@ def thinned_references(map: ReferenceGraph, spacing_m: float) -> ReferenceGraph:
     """A map in which references are at least `spacing_m` apart: each, in their order, takes the place of those around.
 
     Edges go over to the reference that has taken a place. Of views in one direction (one segment), only those that look
-    the same way stand for each other.
+    the same way represent each other.
     """
     keeper = keepers(map.poses, spacing_m, OTHER_VIEW if map.features.shape[1] == 1 else math.pi)
     kept = np.flatnonzero(keeper == np.arange(len(map)))
@@ -58,7 +58,7 @@ def thinned_references(map: ReferenceGraph, spacing_m: float) -> ReferenceGraph:
 
 
 def keepers(poses: Array, spacing_m: float, turn: float) -> Ints:
-    """For each pose (R, 3) the first kept one within `spacing_m` and `turn` (rad) that stands for it: (R,) rows."""
+    """For each pose (R, 3) the first kept one within `spacing_m` and `turn` (rad) that represents it: (R,) rows."""
     from scipy.spatial import KDTree  # slow to import, and seldom needed
 
     keeper = np.full(len(poses), -1)

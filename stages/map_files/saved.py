@@ -1,4 +1,4 @@
-"""Maps as they are saved, with what their files say of how they were made."""
+"""Maps as they are saved, with what their files state of how they were made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ def target(out: str, sources: Sequence[SavedMap]) -> Path:
 
 
 def write_saved(path: Path, map: MapOfPlaces, sources: Sequence[SavedMap], how: str) -> None:
-    """Write a map that was made of others: what all their files say alike, and which they were."""
+    """Write a map that was made of others: what all their files state equally, and which they were."""
     first = sources[0].facts
     same = {key: value for key, value in first.items() if all(other.facts.get(key) == value for other in sources)}
     stages = first.get("stages")
@@ -67,7 +67,7 @@ def write_saved(path: Path, map: MapOfPlaces, sources: Sequence[SavedMap], how: 
 
 
 def refuse_other_views(sources: Sequence[SavedMap]) -> None:
-    """Raise BadInput where the views of two maps were made in different ways, as far as their files say."""
+    """Raise BadInput where the views of two maps were made in different ways, as far as their files state."""
     for one, other in ((sources[0], other) for other in sources[1:]):
         for node in SEEN_BY:
             before, after = _stage(one, node), _stage(other, node)

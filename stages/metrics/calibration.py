@@ -40,9 +40,9 @@ class Calibration(Stage):
     between stated probability and observed share over ten bins (expected calibration error, ECE); `wrong_auroc`, the
     probability that a frame outside the tolerance has a lower confidence than one within; `lost_auroc`, that a lost one
     has a lower one than the others; None where there are no such frames. Where estimates have a covariance:
-    `ellipse_50`, `ellipse_95`, the share of true positions within the ellipse that should hold so many, and `nees`, the
-    mean normalised estimation error squared e' C^-1 e of the position, 2 where covariances are right (Bar-Shalom, Li &
-    Kirubarajan 2001, section 5.4), larger where they are too small.
+    `ellipse_50`, `ellipse_95`, the share of true positions within the ellipse that should hold 50 and 95 %, and `nees`,
+    the mean normalised estimation error squared e' C^-1 e of the position, 2 where covariances are right (Bar-Shalom,
+    Li & Kirubarajan 2001, section 5.4), larger where they are too small.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5

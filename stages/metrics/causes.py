@@ -1,4 +1,4 @@
-"""Causes for which a stretch of a drive was not tracked, by fixed rules over what each image says."""
+"""Causes for which a stretch of a drive was not tracked, by fixed rules over the evidence of each image."""
 
 import math
 from collections.abc import Callable
@@ -17,13 +17,13 @@ from .stretches import GAP_M, GAP_SHARE, MIN_PART, NEAR_M, NEAR_SCALES, Columns,
 DARK, LIGHT_RATIO = 0.1, 2.0
 """Brightness of dark images; factor between two lights: a stop of exposure, which a camera makes up for by itself."""
 STILL, CHANGING = 1e-3, 0.97
-"""Odometry stands still that moves and turns by less (m, rad) between images that correlate less with the ones before
+"""Motion (m, rad) below which odometry stands still, between images that correlate less than this with the ones before
 (`InputConflicts`)."""
 CONFLICT_IMAGES = 128
 """Images before a finding on which it rests (`InputConflicts`)."""
 SPEED_FACTOR, FIRST_SEEN = 1.5, 3
-"""A robot was carried that is seen farther off than it can have driven, at so many times its largest speed, in the
-first images that clearly show it elsewhere (the median of so many: a single one may mislead)."""
+"""A robot was carried that is seen farther off than it can have driven at this multiple of its largest speed, in the
+median of this many first images that clearly show it elsewhere (a single one may mislead)."""
 PAUSES = 5.0
 """Usual intervals after which an image is missing."""
 DISTINCT_LEAD = 0.7
@@ -40,7 +40,7 @@ FIRST_IMAGES = 10
 
 
 class Verdict(NamedTuple):
-    """A cause in a few words, with the numbers that say so, and with what to do."""
+    """A cause in a few words, with the numbers that show it, and with what to do."""
 
     cause: str
     evidence: str
@@ -156,18 +156,18 @@ def not_recorded(part: Part) -> Verdict | None:
 
 
 def off_the_map(part: Part) -> Verdict | None:
-    """The estimate lies beside all that the map shows."""
+    """The estimate is beside all that the map shows."""
     if part.state != "unsure" or part.log.off_map[part.first : part.last + 1].mean() < 0.5:
         return None
     words = (
-        f"the estimate lies {part.median('nearest_m'):.1f} m from the nearest image of the map (median), "
+        f"the estimate is {part.median('nearest_m'):.1f} m from the nearest image of the map (median), "
         f"{part.median('nearest_scales'):.1f} of its length scales"
     )
     return Verdict("off the map", words + landmarks_of(part), "add a tour that passes here: omninav map join MAP MAP")
 
 
 def only_begun(part: Part) -> Verdict | None:
-    """The first images of a drive, of which one alone says too little."""
+    """The first images of a drive, of which one alone shows too little."""
     if part.state != "searching" or part.last + 1 == len(part.log) or len(part) > FIRST_IMAGES:
         return None
     return Verdict("first images", f"the robot may start anywhere; {counted(len(part), 'image')} told where")
@@ -184,7 +184,7 @@ def other_light(part: Part) -> Verdict | None:
 
 
 def contradicted(part: Part) -> Verdict | None:
-    """Images say that the robot is elsewhere; of an estimate that never was sure this says nothing."""
+    """Images show the robot elsewhere; where the estimate never was sure, this is no cause."""
     if part.state == "searching":
         return None
     away = part["landmarks_away_m"] >= NEAR_M
@@ -197,7 +197,7 @@ def contradicted(part: Part) -> Verdict | None:
     against = part["lead_against"] > DISTINCT_LEAD
     if against.mean() >= 0.25:
         words = (
-            f"the best match of {100 * against.mean():.0f} % of the images lies elsewhere, by a clear lead "
+            f"the best match of {100 * against.mean():.0f} % of the images is elsewhere, by a clear lead "
             f"({median(part['match_away_m'][against]):.1f} m from the estimate, median)"
         )
         return Verdict("images against the estimate", words)
@@ -212,7 +212,7 @@ def unlike_map(part: Part) -> Verdict | None:
         return None
     words = (
         f"no image fits a place of the map: the best match leads those elsewhere by {part.median('match_lead'):.2f} "
-        f"standard deviations (median), and {100 * part.at_estimate:.0f} % lie at the estimate"
+        f"standard deviations (median), and {100 * part.at_estimate:.0f} % are at the estimate"
     )
     advice = "check that map= is of this place and made with this camera: omninav map show MAP"
     return Verdict("another place", words + landmarks_of(part), advice)
@@ -224,7 +224,7 @@ def few_landmarks(part: Part) -> Verdict | None:
     if not number < FEW_LANDMARKS or (part.at_estimate <= 0.5 and agree <= FOUND_ELSEWHERE):
         return None
     words = (
-        f"{100 * part.at_estimate:.0f} % of best matches lie at the estimate, and {100 * agree:.0f} % of the images "
+        f"{100 * part.at_estimate:.0f} % of best matches are at the estimate, and {100 * agree:.0f} % of the images "
         f"have landmarks there, but few: {number:.0f} (median)"
     )
     advice = "the place has changed, or camera.yaml is not this camera's: omninav camera look log=LOG"
@@ -253,7 +253,7 @@ RULES: tuple[Callable[[Part], Verdict | None], ...] = (
     says_nothing, inputs_conflict, only_begun, not_recorded, moved_unmeasured, unlike_map, off_the_map, other_light,
     contradicted, few_landmarks, partial(inputs_conflict, foreign=True), ambiguous, unexplained,
 )  # fmt: skip
-"""In the order in which causes hide each other: the first that says something is the cause."""
+"""In the order in which causes hide each other: the first that applies is the cause."""
 
 
 def landmarks_of(part: Part) -> str:

@@ -1,4 +1,4 @@
-"""Distance that an update moves a place in the map that has had so many before."""
+"""Distance that an update moves a place in the map, by the number of updates before."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ class ComponentMoves(MetricStage):
     """Measures how far the places at which views are seen move with each update, against how many they have had.
 
     Gross, Koenig & Müller 2005, section 2.3: "the influence of a single update step decreases with time, and the MoG
-    stabilizes gradually". A component is followed to the nearest one of the same view after an update, where that lies
+    stabilizes gradually". A component is followed to the nearest one of the same view after an update, where that is
     within `NEAR_M`; an update that leaves its mean as it was (one of its weight alone) does not count.
 
     `component_moves`: lists with an entry for each of a component's first `MIN_MOVES` moves: `updates`, how many it had

@@ -1,4 +1,4 @@
-"""Summary of a run's confidence where no ground truth says how right it was."""
+"""Summary of a run's confidence where no ground truth shows how right it was."""
 
 import math
 from typing import Any
@@ -39,7 +39,7 @@ class Confidence(MetricStage):
     """Measures a run without ground truth: how sure it was, and whether its estimates agree with odometry.
 
     Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `MIN_WEIGHT` of it
-    and its position's largest standard deviation is at most `MAX_SIGMA_M`; that says how sure the method is, not that
+    and its position's largest standard deviation is at most `MAX_SIGMA_M`; that shows how sure the method is, not that
     it is right (`confident_share`, `first_confident_frame`).
     `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
     belief is always a single pose. `probability`: the confidence that a monitor states (median), `doubtful_share`: the

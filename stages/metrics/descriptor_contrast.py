@@ -1,4 +1,4 @@
-"""Similarity of a view to the map's view of its own place, and how well it is told from other places."""
+"""Similarity of a view to the map's view of its own place, and how well it is distinguished from other places."""
 
 from collections.abc import Sequence
 

@@ -26,7 +26,7 @@ class ErrorCurves(MetricStage):
     comes after the last visit is an entry too.
     `over_steps`: lists, each entry the mean over an equal part of the frames: `step` (its middle), `position_error_m`,
     `odometry_error_m`. `over_distance`: the same over the true distance from the first true position, with the odometry
-    error of the first lap alone beside it (`first_lap_odometry_error_m`); None where no frame lies at that distance.
+    error of the first lap alone beside it (`first_lap_odometry_error_m`); None where no frame is at that distance.
     Odometry alone starts at the first true pose and is not aligned. Nothing without ground truth.
     """
 
@@ -81,7 +81,7 @@ def lap_ends(poses: Array, start: Array, home_m: float) -> list[int]:
     """The rows of a drive (N, 3) at which a lap after the first begins: where it is nearest to its start, each time.
 
     A visit begins within `home_m` of the start pose (3,), headed as there (within a right angle), and ends beyond
-    twice that; only what lies between two visits is a lap.
+    twice that; only what is between two visits is a lap.
     """
     away = np.hypot(*(poses[:, :2] - start[:2]).T)
     home = (away <= home_m) & (np.cos(poses[:, 2] - start[2]) > 0.0)

@@ -14,7 +14,7 @@ COLUMNS = ("images", "time (s)", "driven (m)", "state", "what happened", "what s
 
 
 class ExplainDrive(Stage):
-    """Finds the stretches in which a drive was searching, unsure, blind or wrong, and says why, as `omninav explain`.
+    """Finds the stretches in which a drive was searching, unsure, blind or wrong, and why, as `omninav explain`.
 
     Causes come from what each image said of the estimate (`MeasureEvidence`), by fixed rules: docs/explain.md.
     """

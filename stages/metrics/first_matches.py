@@ -63,15 +63,15 @@ SPECS = {
 class FirstMatches(MetricStage):
     """Counts how many matches of pairs of images are right, from the best to the worst, up to the first wrong one.
 
-    Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". The first image of each pair lies
+    Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". The first image of each pair is
     evenly along the log, the second is the next one that was taken a given distance away (straight).
 
     A match of patches is right where its point, by its depth in one view, is seen in the other close to its partner, or
     within half the patch's diameter, if that is more; one of columns where both of its ends are. Without depths: where
-    its bearings lie close to a plane with the direction of travel and meet in front of both views. Under `matches`, by
+    its bearings are close to a plane with the direction of travel and meet in front of both views. Under `matches`, by
     distance and over `all`: `matched`, `first_right` and `right` (medians over pairs), `right_share`; `found_again`:
     the share of the first images' features that a right match finds in the second; `by_chance`: the share of wrong
-    partners that would be counted as right. Raises BadInput where no truth says where images were taken.
+    partners that would be counted as right. Raises BadInput where no truth states where images were taken.
     """
 
     pairs: Annotated[int, Bounds(ge=1)] = 30

@@ -30,7 +30,7 @@ HEADLINES = ("loops.loop_closures.precision", "loops.loop_closures.recall")
 NEAR_M = 2.5
 """Largest distance between two images of one place, metres."""
 MIN_IMAGES_BETWEEN = 10
-"""Images of the tour that must lie between two views for their hypothesis to be a loop closure."""
+"""Images of the tour that must be between two views for their hypothesis to be a loop closure."""
 
 
 class LoopClosures(Stage):
@@ -45,7 +45,7 @@ class LoopClosures(Stage):
     (see there). `at_supports` is what they would be with
     other thresholds of support. `parts`: between which no path leads; more than one where a map was added to from a
     tour that it does not know. `step_m`: how far apart neighbouring path images were taken. `size_bytes`: of the map's
-    file, but for what it says of its making.
+    file, without its description of its making.
     """
 
     class Out(Outputs):

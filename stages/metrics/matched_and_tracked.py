@@ -1,4 +1,4 @@
-"""Number and accuracy of the features that two images of a homing drive share, matched anew or tracked."""
+"""Number and accuracy of the features that two images of a homing drive share, matched again or tracked."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -48,10 +48,10 @@ class MatchedAndTracked(MetricStage):
     Goedemé et al. 2007, section 7.1.2, where matches of the first and the target image are called "more plentiful and
     less influenced by noise" than tracked features. Matches: between the image in which the map was made and the
     target's, which was taken at the drive's first pose. Tracks: between the same image and the last in which the map
-    was tracked, without those that contradict the robot's pose then, and without features that were matched anew on the
-    way. Every map that was made `APART_M` from the target or farther counts.
+    was tracked, without those that contradict the robot's pose then, and without features that were matched again on
+    the way. Every map that was made `APART_M` from the target or farther counts.
 
-    A pair is right where its bearings lie within `RIGHT_DEG` of a plane with the true baseline and meet in front of
+    A pair is right where its bearings are within `RIGHT_DEG` of a plane with the true baseline and meet in front of
     both views; errors along that plane are not seen. Under `pairs`: `maps`, how many; for `matched` and `tracked` each
     `used` and `right`, per map, `noise_deg`, the median angle of the features that are right as both, and `apart_m`,
     the mean distance of the two images; `kept`, right tracks over right matches; `noise_ratio`, the noise of matches

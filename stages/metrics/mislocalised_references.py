@@ -23,7 +23,7 @@ POINTS = 60
 class MislocalisedReferences(MetricStage):
     """Measures how long references stay at wrong places, such as those learned right after a kidnapping.
 
-    A reference counts whose heaviest component lies far from the true position of the frame in which it was seen, at
+    A reference counts whose heaviest component is far from the true position of the frame in which it was seen, at
     its coming. Of its weight, the share at places that far off is followed to the end. Under `mislocalised_references`:
     `references`, how many there are; `kept`, of how many some of that weight is left at the end; lists with an entry
     for each of them in the order in which they were seen: `along_m`, the true path length (m) from where the first of

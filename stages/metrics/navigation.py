@@ -155,7 +155,7 @@ def metres_to_goal(map: TopologicalMap | ReferenceGraph, spot: Array, route: Pla
 
 
 def lost_metres(drive: Drive) -> float | None:
-    """Metres of a kilometre that were driven from ticks whose estimate was too far off; None of a robot that stood."""
+    """Metres of a kilometre that were driven from ticks whose estimate was too far off; None where it did not move."""
     steps = np.diff(drive.distance)
     lost = ~(np.hypot(*(drive.estimate - drive.truth)[:-1, :2].T) <= WITHIN_M)
     return 1000.0 * float(steps[lost].sum() / steps.sum()) if steps.sum() > 0.0 else None

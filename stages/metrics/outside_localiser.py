@@ -161,7 +161,7 @@ class OutsideLocaliser(Stage):
 
 
 def wait(words: Sequence[str], folder: Path, output: IO[bytes]) -> int:
-    """Run a program until it ends, or this process does, even killed: then nothing of it goes on."""
+    """Run a program until it ends, or this process does, even killed: no process of it survives."""
     own = os.environ | {"PATH": _path()}
     own.pop("PYTHONSAFEPATH", None)  # which a command of ours sets for processes of ours
     process = subprocess.Popen(

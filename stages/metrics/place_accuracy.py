@@ -33,8 +33,8 @@ class PlaceAccuracy(MetricStage):
     `adjacent_accuracy`: the believed place is the closest or one of its neighbours; `accuracy_after`: of the first,
     second ... update since the belief began (`begun`: at which images it did), as the paper counts, and
     `adjacent_accuracy_after`; `image_accuracy_after`: the believed place has the closest medoid, or the closest of all
-    images that the map keeps (where a place is long, its medoid lies far from its ends); `tolerant_accuracy_after`: its
-    medoid is hardly further away than the closest (where the tour came by twice, two medoids may lie side by side).
+    images that the map keeps (where a place is long, its medoid is far from its ends); `tolerant_accuracy_after`: its
+    medoid is hardly further away than the closest (where the tour came by twice, two medoids may be side by side).
     `place_distance_m`: the median distance between the believed place's medoid and the truth, and
     `nearest_place_distance_m`, the closest one's. Gives nothing where poses or the map's are not ground truth.
     """

@@ -44,7 +44,7 @@ class PlaceRecognition(Stage):
     """Measures recall@1, @5 and @10: how often one of the most similar references was taken close by.
 
     Of the last log, under `place_recognition`: the share of images (`queries`) for which one of the best N references
-    lies within `distance_m` of the true position. An image counts where the map has such a reference at all.
+    is within `distance_m` of the true position. An image counts where the map has such a reference at all.
     `at_distances`: the same at several distances, a list for each figure. A filter that compares only references near
     its belief is measured on those.
     """

@@ -56,6 +56,6 @@ def components(rows: Array) -> Array:
 
 
 def kept(rows: Array) -> Array:
-    """Shares (D,) of the sum of squares of rows (N, D) that lie in their first 1 to D columns."""
+    """Shares (D,) of the sum of squares of rows (N, D) in their first 1 to D columns."""
     squares = np.square(rows).sum(axis=0)
     return np.asarray(np.cumsum(squares) / squares.sum())

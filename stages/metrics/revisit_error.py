@@ -20,7 +20,7 @@ class RevisitError(MetricStage):
 
     A place is a square cell of the floor, by true positions; a visit ends where the robot has driven `AWAY_M` since it
     was last in the cell, or where a log ends. Porta & Kröse 2004, section 5, and Gross, Koenig & Müller 2005, section
-    3, say of a map that is learned while it is used that its error at a place is that of the odometry of the first
+    3, state of a map that is learned while it is used that its error at a place is that of the odometry of the first
     visit.
 
     `visits`, over the places that were visited at least as often as half of all places, so that every entry is of the

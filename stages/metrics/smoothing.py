@@ -18,7 +18,7 @@ tells how wrong it may be. Without one (a trust of 1) the covariance alone does.
 MIN_TRUST = 0.01
 """Smallest probability at which an estimate still counts."""
 OFF_SCALE, SPAN = 0.08, 10
-"""Largest share by which odometry's length may differ from that of trusted estimates so many poses apart, and be
+"""Largest share by which odometry's length may differ from that of trusted estimates this many poses apart, and be
 believed to `SIGMA_PER_METRE`: filters that lag behind make up to 0.07 of it."""
 JUMP_M, JUMP_DEG = 1.0, 20.0
 """Differences beyond which estimates contradict odometry."""
@@ -52,7 +52,7 @@ def smoothed_with_lag(
 ) -> Array:
     """Smooths as `smoothed`, but each pose from the `window` frames up to it and `lag` frames after it.
 
-    A run could say as much `lag` frames late. NaN where none of these frames has an estimate.
+    A run could give them `lag` frames late. NaN where none of these frames has an estimate.
     """
     found = np.full_like(estimates, np.nan)
     there: Bools = np.asarray(np.isfinite(estimates).all(axis=1))
@@ -100,7 +100,7 @@ def odometry_sigma(estimates: Array, trust: Array, motions: Array) -> float:
 
 
 def contradicted(estimates: Array, trust: Array, motions: Array) -> Bools:
-    """Which motions (N - 1, 3) lie between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
+    """Which motions (N - 1, 3) are between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
     path = chain(np.concatenate([np.zeros((1, 3)), motions]))
     moved = compose(estimates[:-1], motions)
     jumps = _disagree(moved, estimates[1:])

@@ -20,22 +20,22 @@ from omninav.stages.values.stretches import Stretch, StretchState
 Columns = Mapping[str, npt.NDArray[Any]]
 
 BLIND_CORRELATION, MIN_CONTRAST = 0.15, 1.0 / 255.0
-"""Images say nothing whose correlation with the ones before is below `InputConflicts`'s limit, or whose parts differ by
-less than a grey level."""
+"""Correlation with the ones before below which images show nothing (`InputConflicts`), and contrast below which they do
+not: a grey level."""
 OFF_MAP_SCALES, OFF_MAP_SCALES_BY_APPEARANCE = 5.0, 2.0
 """Distance from the nearest reference, in length scales, at which half of the images have a pose by landmarks
 (`ConfidenceMonitor`), and beyond which a best match is of another place (without landmarks)."""
 MIN_PART = 5
 """Images off the map, or on it, in a row that are a stretch of their own."""
 NEAR_M, NEAR_SCALES = 0.5, 2.0
-"""A pose by landmarks lies at the estimate within the confidence's tolerance (m), a best match within so many length
+"""A pose by landmarks is at the estimate within the confidence's tolerance (m), a best match within this many length
 scales."""
 GAP_M, GAP_SHARE = 0.5, 0.1
 """Distance (m, plus a share of the metres driven) from odometry's prediction that working odometry never exceeds."""
 MAX_HEADING_ERROR_DEG = 10.0
 """Median error of the heading of sure estimates from which it is said, degrees."""
 NOT_RECORDED = (
-    "What single images say was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
+    "What single images show was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
     "particle filter in a map has, as variant=omninav."
 )
 """Sentence on a run without `ImageEvidence`."""
@@ -85,7 +85,7 @@ class Log:
 
     @cached_property
     def blind(self) -> Bools:
-        """Which images say nothing, in rows of `MIN_EMPTY` and more."""
+        """Which images show nothing, in rows of `MIN_EMPTY` and more."""
         empty = (self["correlation"] < BLIND_CORRELATION) | (self["contrast"] < MIN_CONTRAST)
         empty |= self["features"] < MIN_SEEN
         if self.known("similarity"):
@@ -94,7 +94,7 @@ class Log:
 
     @cached_property
     def off_map(self) -> Bools:
-        """Which estimates lie beside the map and have no landmarks there, in rows of `MIN_PART` and more."""
+        """Which estimates are beside the map and have no landmarks there, in rows of `MIN_PART` and more."""
         limit = OFF_MAP_SCALES if self.known("landmarks") else OFF_MAP_SCALES_BY_APPEARANCE
         beside = (self["nearest_scales"] > limit) & ~(self["landmarks_away_m"] < NEAR_M)
         return without_short(beside, MIN_PART)
@@ -161,7 +161,7 @@ class Part:
 
     @cached_property
     def at_estimate(self) -> float:
-        """Share of images whose best match lies at the estimate; without any 0."""
+        """Share of images whose best match is at the estimate; without any 0."""
         return float((self["match_away_m"] < self.log.gate).mean())
 
     @cached_property
@@ -178,7 +178,7 @@ def logs_of(columns: Columns) -> list[Log]:
 
 
 def parts(log: Log, lost_m: float) -> Iterator[Part]:
-    """The stretches of one log that were not tracked; what lies off the map is one of its own."""
+    """The stretches of one log that were not tracked; the part off the map is one of its own."""
     begun = np.maximum.accumulate(log.sure)
     states = np.where(log.sure, "", np.where(begun, "unsure", "searching")).astype(object)
     states[log.sure & (log.jumps > GAP_M)] = "jumped"

@@ -45,7 +45,7 @@ class TrajectoryErrors(MetricStage):
     standard deviation `std`, median, p90, max); `loss_rate`, the share of frames in which the robot was lost;
     `converged_after_frames`, how many frames went by before the error stayed below 1 m and 20 degrees for ten frames
     (None if it never did); the errors and loss rate again under `after_convergence`. `odometry_alone` starts at the
-    first true pose, and says how far off it ended. The top level is the last log, and `logs` has one entry per log
+    first true pose, and states how far off it ended. The top level is the last log, and `logs` has one entry per log
     where there are several. Frames without truth or without estimate are left out and counted.
     Warns of a truth that fits the estimates of a sure robot only once it is changed.
     """
@@ -53,7 +53,7 @@ class TrajectoryErrors(MetricStage):
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
     """Position error (m) above which the robot counts as lost."""
     settle_steps: Annotated[int, Bounds(ge=0)] | None = None
-    """Frames at each log's start without which errors and loss rate stand once more under `after_settling`. These are
+    """Frames at each log's start without which errors and loss rate are given again under `after_settling`. These are
     the same frames for every method, where `after_convergence` leaves out more of a method that stays lost for longer.
     None: no such entry."""
 

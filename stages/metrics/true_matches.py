@@ -33,9 +33,9 @@ def right_by_depth(
 
 
 def right_by_epipolar(first: npt.ArrayLike, second: npt.ArrayLike, moved: Motion, limit: float) -> Bools:
-    """Matches (N,) whose bearings lie within `limit` (rad) of one plane with the way, and meet in front of both views.
+    """Matches (N,) whose bearings are within `limit` (rad) of one plane with the way, and meet in front of both views.
 
-    Where there is no depth, this is all that truth says: a wrong match along the plane passes, and all on the horizon
+    Where there is no depth, this is all that truth tells: a wrong match along the plane passes, and all on the horizon
     do. Bearings within `limit` of parallel meet far away.
     """
     first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)

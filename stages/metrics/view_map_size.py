@@ -27,7 +27,7 @@ class ViewMapSize(MetricStage):
     Under `map`: `references` (views), `components`, `size_bytes` of all its arrays as stored in its file (whose head,
     some kilobytes of text, is not counted), `reference_size_bytes` (a view's share of them), `pose_source`,
     `visited_area_m2` and `references_per_m2`. A known map may hold more than what this run visited: its density then
-    says too much.
+    is too high.
     """
 
     def step(self, ctx: Context, drive: Drive, map: ViewMixtures) -> MetricStage.Out:

@@ -38,8 +38,8 @@ class ViewSpacing(MetricStage):
     Porta & Kroese 2004, section 5: learning on-line "guarantees a uniform sampling of the feature space and not of the
     geometric space, as it happens in normal appearance-based localization". Under `spacing`: `between_views` (in the
     views' unit) and `between_places_m` (between the heaviest components' x, y), each with `mean`, `median`, `p10`,
-    `p90` and `unevenness`, the standard deviation over the mean, which has no unit: 0 where all lie evenly. Nothing for
-    a map of fewer than three views.
+    `p90` and `unevenness`, the standard deviation over the mean, which has no unit: 0 where all are evenly spaced.
+    Nothing for a map of fewer than three views.
     """
 
     def step(self, ctx: Context, drive: Drive, map: ViewMixtures, view: WholeView) -> MetricStage.Out:

@@ -35,9 +35,9 @@ from omninav.stages.values.track import Track
 from .consistency import consistency, log_odds_of_right
 
 MAX_IMAGES = 500
-"""Images that are remembered, of a robot that stands or moves slowly."""
+"""Images that are remembered, of a robot that stops or moves slowly."""
 ELSEWHERE, TURNED = 2.0, math.radians(30.0)
-"""A match is of another place than the best one beyond so many radii of agreement, or turned by more (rad)."""
+"""A match is of another place than the best one beyond this many radii of agreement, or turned by more (rad)."""
 STEEPNESS = 4
 """Power of the lead by which an image counts: as good as nothing at half of `DISTINCT_LEAD`, fully at twice."""
 MEMORY = 20.0
@@ -70,7 +70,7 @@ SURE = 0.9
 SURE_TOGETHER = 4.6
 """Log odds of an estimate on which poses of fewer landmarks agree, from which on the same is known: 99 %."""
 MIN_FEATURES = 100
-"""Features of an image below which it says nothing by showing no landmarks: it is dark or blurred."""
+"""Features of an image below which it proves nothing by showing no landmarks: it is dark or blurred."""
 MAX_AGAINST = (1.0, 6.0)
 """Log odds that images without landmarks speak against an estimate, at most: on the map, where some of it has changed;
 and before any was found, in what may be another building."""
@@ -83,7 +83,7 @@ class ConfidenceMonitorState(State):
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
     that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
     `contradictions` (M,) how much each image still counts against its own; `contradicted` is the last one's share.
-    `sure`: the estimate was since the robot began; `localised`: it is; `empty`: images in a row that say nothing.
+    `sure`: the estimate was since the robot began; `localised`: it is; `empty`: images in a row that show nothing.
     `geometry`: log odds of right by landmarks; `found`: these have shown that the robot is on the map; `missed`: until
     then, how surely the images so far would have shown some there, 0 to 1.
     """
@@ -102,14 +102,14 @@ class ConfidenceMonitorState(State):
     empty: int = 0
 
     def forget(self) -> None:
-        """Begin anew: the robot may be anywhere."""
+        """Forget all: the robot may be anywhere."""
         self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
         self.novelties, self.weights, self.contradictions = np.zeros(0), np.zeros(0), np.zeros(0)
         self.contradicted, self.geometry, self.found, self.missed = 0.0, 0.0, False, 0.0
 
     def told(self, probability: float) -> TrackingState:
         """The state that follows from the confidence; a robot that is not localised does not become so by images that
-        say nothing."""
+        show nothing."""
         empty = self.empty >= MIN_EMPTY
         self.localised = probability >= MIN_SURE and (self.localised or not empty)
         if not self.localised:
@@ -135,23 +135,23 @@ class ConfidenceMonitorState(State):
 class ConfidenceMonitor(Stage):
     """The probability that the estimate is within a tolerance of the truth, from images and belief.
 
-    A filter follows whatever its images say, so a sharp belief may be a wrong one. Each image by itself, without any
+    A filter follows its images, so a sharp belief may be a wrong one. Each image by itself, without any
     belief, resembles one reference most; odometry carries the places of the last images' best matches to now. How many
     of them agree with the estimate is compared with how many agree with a wrong one by chance, which the map's own
     images tell (`LearnWrongPoseAgreement`): the odds that the estimate is in the right place at all. That probability
     times the belief's share within the tolerance is the confidence.
 
     An image counts as much as it does in the filter (the likelihood's novelty), and the more, the farther its best
-    match leads all matches elsewhere: one that resembles many places says nothing of any. It may still say where the
+    match leads all matches elsewhere: one that resembles many places supports none. It may still show where the
     robot is not: it counts against its estimate, the more, the farther its best match leads all those around the
     estimate, and fully if it is the first to do so, since it then repeats none before it. A way without images
     raises the probability that the robot was carried elsewhere, as images do.
 
-    Landmarks say more than any similarity: a sure pose by them outweighs all appearance, for or against
+    Landmarks count more than any similarity: a sure pose by them outweighs all appearance, for or against
     the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
     robot may be nowhere on the map. So until one is found, in images that have features, appearance is not believed
-    either: it agrees with itself in another building too. Where `track` says that the robot was carried, all that was
-    known before is forgotten.
+    either: it agrees with itself in another building too. Where `track` reports that the robot was carried, all that
+    was known before is forgotten.
 
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
@@ -251,7 +251,7 @@ def by_landmarks(
 
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
     how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. A wrong pose
-    lies in one of `PLACES_ALIKE`, so that few landmarks that agree with the estimate say much for it; where they lie
+    is in one of `PLACES_ALIKE`, so that few landmarks that agree with the estimate count much for it; where they are
     elsewhere, as much as the pose may be wrong speaks against it. A sure pose outweighs all that was known before, as
     the robot may have been carried elsewhere.
     """
@@ -281,12 +281,12 @@ def share_found(distance: float) -> float:
 
 
 def share_counted(lead: float) -> float:
-    """Share of an image that counts, 0 to 1, whose best match leads others by so many standard deviations."""
+    """Share of an image that counts, 0 to 1, whose best match leads others by this many standard deviations."""
     return 1.0 / (1.0 + (DISTINCT_LEAD / max(lead, 1e-9)) ** STEEPNESS)
 
 
 def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
-    """The pose (3,) of a robot that stands where the most similar reference was taken, turned as the view is."""
+    """The pose (3,) of a robot that is where the most similar reference was taken, turned as the view is."""
     values = similarities.values
     row = int(similarities.best.argmax())
     reference = row if similarities.candidates is None else int(similarities.candidates[row])
@@ -298,7 +298,7 @@ def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
 def leads_of_best(similarities: Similarities, map: ReferenceGraph, pose: Array, elsewhere_m: float) -> MatchLeads:
     """The leads of the most similar reference over others, and over those near an estimated pose (3,).
 
-    Elsewhere: beyond so many metres, or seen from another heading. Near the pose: within as many, seen from any.
+    Elsewhere: beyond this many metres, or seen from another heading. Near the pose: within as many, seen from any.
     """
     best, compared = similarities.best, similarities.candidates
     places = map.poses if compared is None else map.poses[compared]

@@ -41,7 +41,7 @@ def log_odds_of_right(
     ever, never = betaln(1.0, 1.0), betaln(a, b)
     right_before, wrong_before = betaln(1.0 + agree, 1.0 + other) - ever, betaln(a + agree, b + other) - never
     right_since, wrong_since = betaln(1.0 + left, 1.0 + right) - ever, betaln(a + left, b + right) - never
-    # The last of each stayed as it is; in place of the first, which nothing precedes, stands that.
+    # The last of each stayed as it is; that is put in place of the first, which nothing precedes.
     change = np.log(np.maximum(kidnapping * novelties[1:], 1e-300))
     recovered, kidnapped = wrong_before[:-1] + right_since[:-1], right_before[:-1] + wrong_since[:-1]
     recovered[1:] += change

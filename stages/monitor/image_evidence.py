@@ -1,4 +1,4 @@
-"""Keeps what each image says for or against the estimate."""
+"""Keeps the evidence of each image for or against the estimate."""
 
 import math
 from dataclasses import field
@@ -29,7 +29,7 @@ class MeasureEvidenceState(State):
 
 
 class MeasureEvidence(Stage):
-    """Measures what each image by itself says of the estimate, for `omninav explain`; it changes no estimate.
+    """Measures the evidence of each image by itself on the estimate, for `omninav explain`; it changes no estimate.
 
     Best matches and leads are those of `ConfidenceMonitor`, landmarks those of `LandmarkPose`.
     """

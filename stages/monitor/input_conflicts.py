@@ -41,7 +41,7 @@ COLUMNS = 11
 class Watched:
     """The last N images, from rows of `COLUMNS` numbers: their `times` (N,) in s; `odometry` (N, 3) with a heading that
     is not wrapped, and the path that it drove (`metres`) and turned, to either side (`radians`); best `matches` (N, 3)
-    in the map (NaN without one), and whether each lies `at_estimate` (N,) (NaN without one). Against the image before:
+    in the map (NaN without one), and whether each is `at_estimate` (N,) (NaN without one). Against the image before:
     `correlation` (N,), whether it is the `same` (N,), and `sure_turns` (N - 1,) seen (rad), NaN in images unlike it."""
 
     def __init__(self, rows: Array) -> None:
@@ -71,7 +71,7 @@ def driven(odometry: Array) -> tuple[float, float]:
 class InputConflictsState(State):
     """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`, and the `strips` (rows,
     columns) of the last ones, of which all but the first are still to be compared with the one before; the kind that
-    the last judgement found; what was said, by its kind, and how many judgements ago each that stands was found last.
+    the last judgement found; what was found, by its kind, and how many judgements ago each that holds was found last.
     """
 
     strips: list[Floats] = field(default_factory=list)
@@ -85,19 +85,19 @@ class InputConflictsState(State):
 
 
 class InputConflicts(Stage):
-    """Says which inputs do not fit each other, without ground truth, for as long as they do not.
+    """Reports which inputs do not fit each other, without ground truth, for as long as they do not.
 
     Motion seen in the images (turns between panoramas, and whether anything changes) is compared with odometry's, over
     the last `WINDOW` images; the track of single images' best matches in the map, without any belief, with odometry's
-    track and with the estimate. A finding needs two judgements in a row (that the camera is frozen, none), is said
-    once, as a warning, with what to check, and stands until two judgements in a row do not find it. Where nothing
-    measured the motion, nothing is said of it. Which conflicts are noticed after how many images, where the limits are
+    track and with the estimate. A finding needs two judgements in a row (that the camera is frozen, none), is reported
+    once, as a warning, with what to check, and holds until two judgements in a row do not find it. Where nothing
+    measured the motion, it is not judged. Which conflicts are noticed after how many images, where the limits are
     from, and what cannot be noticed:
     docs/conflicts.md.
     """
 
     class Out(Outputs):
-        """All that was found so far, and what of it stands."""
+        """All that was found so far, and what of it still holds."""
 
         conflicts: Conflicts
 
@@ -202,7 +202,7 @@ def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Arr
 
 
 def lies_at(match: Array, estimate: PoseEstimate | None, length_scale_m: float) -> float:
-    """Tests whether a match (3,) lies where the robot is believed to be: 1 or 0, NaN without an estimate."""
+    """Tests whether a match (3,) is where the robot is believed to be: 1 or 0, NaN without an estimate."""
     if estimate is None:
         return math.nan
     away = match - np.array(pose_row(estimate.pose))
@@ -250,7 +250,7 @@ for a cover to be told from a wall and from a robot that stands."""
 MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
 """Images before a leap of the clock, and what it is at least (s, and times the usual interval)."""
 LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)
-"""A robot that drives on does at least so much between two images (m), and lies at most this share of it and this angle
+"""A robot that drives on does at least this much between two images (m), and is at most this share of it and this angle
 (rad) off from where the last step repeated leads."""
 MIN_FROZEN, FROZEN_M, FROZEN_RAD = 3, 0.5, 0.5
 """Images that are equal to the last bit while odometry drives so far (m) or turns so much (rad) are one image."""
@@ -261,18 +261,18 @@ SURE_CORRELATION, SURE_TURN = 0.4, math.radians(3.0)
 MIN_SEEN_TURN = math.pi / 2.0
 """Least turning of the images, to either side, before anything is said of turns (rad)."""
 STILL_M, STILL_RAD = 1e-3, 1e-3
-"""Odometry that stays below these over all images stands (m, rad)."""
+"""Odometry that stays below these over all images stands still (m, rad)."""
 NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
 """Odometry's turning as a share of the seen one: below the first it has no heading, above the second (and so much
 turning, rad) its headings are something else."""
 EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.25
 """Share of the seen turning that must be explained; at most so much as it is where turns are reversed; so much more
-than as it is where images are late, by at least so many seconds."""
+than as it is where images are late, by at least this many seconds."""
 MISPLACED_M = 0.5
-"""A robot that drives so far within the delay of its images is not where the estimate says: the confidence's tolerance
+"""A robot that drives this far within the delay of its images is not at the estimate: the confidence's tolerance
 (m)."""
 TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
-"""Matches must move so many length scales to say anything, in so many pairs, of which this share agrees on one relation
+"""Matches must move this many length scales to count, in this many pairs, of which this share agrees on one relation
 of the tracks, and so much less on the right one where that is mirrored."""
 REVERSED = (np.array((1.0, 1.0, -1.0)), np.array((1.0, -1.0, -1.0)))
 """Factors that put right an odometry whose heading has the wrong sign, and one whose left is its right."""
@@ -281,7 +281,7 @@ CHANGING = 0.97
 MISSCALED_OCTAVES, MISTURNED = 0.4, math.radians(20.0)
 """A relation of tracks is a wrong one beyond these."""
 NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
-"""A match lies at the estimate within so many length scales, turned by less than this (rad)."""
+"""A match is at the estimate within this many length scales, turned by less than this (rad)."""
 SCATTERED, ELSEWHERE = 0.05, 0.1
 """Largest shares, over a whole window, of pairs of matches that agree with odometry and of matches at the estimate,
 with which images are said to fit no place of the map."""
@@ -427,7 +427,7 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
             "positive in odometry, x and y not exchanged, and the map's poses likewise"
         )
     if math.log2(fit.scale) > MISSCALED_OCTAVES and np.nanmedian(watched.correlation) > CHANGING:
-        return ""  # the robot stands, and its best match goes back and forth
+        return ""  # the robot stands still, and its best match goes back and forth
     if watched.metres < STILL_M:
         metres = float(np.hypot(*np.diff(matches[:, :2], axis=0).T).sum())
         return (
@@ -459,8 +459,8 @@ def foreign(watched: Watched, length_scale_m: float) -> str:
     if fit.pairs < WINDOW or fit.share > SCATTERED or there > ELSEWHERE:
         return ""
     return (
-        f"{FOREIGN}: of {len(believed)} best matches {100 * there:.0f} % lie at the estimate, "
-        f"and {100 * fit.share:.0f} % of {fit.pairs} pairs lie to each other as odometry says: check that the map is of"
+        f"{FOREIGN}: of {len(believed)} best matches {100 * there:.0f} % are at the estimate, "
+        f"and {100 * fit.share:.0f} % of {fit.pairs} pairs agree with odometry: check that the map is of"
         " this place, and was made with this camera and in a light like this"
     )
 

@@ -21,13 +21,13 @@ MAX_COMPARED = 1000
 NEIGHBOURS = 4
 """Nearest references whose likeness is looked at."""
 MIN_EXTENT_M, MAX_SPACING_M = 0.01, 50.0
-"""A map that is smaller lies at one place; one whose neighbours are further apart is in another unit."""
+"""A map that is smaller is at one place; one whose neighbours are further apart is in another unit."""
 OUTLIER = 1000.0
-"""A reference so many times further from the middle of the map than half of all is lost."""
+"""A reference this many times further from the middle of the map than half of all is lost."""
 MIN_LIKENESS = 0.7
 """Probability that a neighbour in space is more similar than another reference; 0.5 where poses are shuffled."""
 MIN_TURN = math.radians(10.0)
-"""Turns between neighbours that say in which sense headings are counted (rad), and how many of them are needed."""
+"""Turns between neighbours that show in which sense headings are counted (rad), and how many of them are needed."""
 MIN_TURNS, REVERSED_GAIN = 10, 0.5
 SAMPLES = 50
 """Images of the map, evenly spaced, that are compared with the others."""
@@ -36,7 +36,7 @@ SAMPLES = 50
 class CheckMap(Stage):
     """Compares images of a map with each other: neighbours in space ought to look alike, turned as their headings are.
 
-    Says as a warning where all references lie at one place, one is lost, spacings are those of another unit, poses are
+    Warns where all references are at one place, one is lost, spacings are those of another unit, poses are
     shuffled, or headings are counted clockwise. Views are compared by their best segments, whatever the variant
     compares by. Limits: docs/conflicts.md.
     """
@@ -84,17 +84,17 @@ def of_poses(poses: Array) -> str:
     """Sentence on the poses (R, 3) of a map by themselves; "" where nothing is wrong."""
     extent = float(np.hypot(*np.ptp(poses[:, :2], axis=0)))
     if extent < MIN_EXTENT_M:
-        return f"all {len(poses)} references of the map lie at one place, within {extent:.3g} m: check its positions"
+        return f"all {len(poses)} references of the map are at one place, within {extent:.3g} m: check its positions"
     away = np.hypot(*(poses[:, :2] - np.median(poses[:, :2], axis=0)).T)
     usual, lost = float(np.median(away)), int(away.argmax())
     if away[lost] > OUTLIER * max(usual, MIN_EXTENT_M):
         return (
-            f"reference {lost} of the map lies {away[lost]:.0f} m from its middle, half of all within {usual:.3g} m: "
+            f"reference {lost} of the map is {away[lost]:.0f} m from its middle, half of all within {usual:.3g} m: "
             "check its positions"
         )
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     if (spacing := float(np.median(steps))) > MAX_SPACING_M:
-        return f"the map's images lie {spacing:.3g} m apart, one after the other: check the unit of its positions (m)"
+        return f"the map's images are {spacing:.3g} m apart, one after the other: check the unit of its positions (m)"
     return ""
 
 

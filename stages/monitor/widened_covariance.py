@@ -20,10 +20,10 @@ from omninav.stages.values.pose import Motion
 DRIFT_M = (0.1, 0.05)
 """Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""
 MAX_SQUARES = 16.0
-"""Largest squared Mahalanobis distance from the estimate at which a pose by landmarks is taken for it; 99.9 % of
+"""Largest squared Mahalanobis distance from the estimate at which a pose by landmarks agrees with it; 99.9 % of
 correct poses are within it (chi-square, 3 degrees of freedom)."""
 AGREES = 0.9
-"""Smallest probability of a pose by landmarks that is taken for the estimate."""
+"""Smallest probability of a pose by landmarks that agrees with the estimate."""
 
 
 class WidenCovarianceState(State):
@@ -95,7 +95,7 @@ def is_the_estimate(fix: LandmarkFix, estimate: PoseEstimate) -> bool:
 
 
 def map_covariance(pose: Array, map: ReferenceGraph) -> Array:
-    """The covariance (3, 3) about a pose (3,) of a robot that stands at any reference, turned anyhow."""
+    """The covariance (3, 3) about a pose (3,) of a robot at any reference, with any heading."""
     covariance = np.zeros((3, 3))
     if len(map):
         away = map.poses[:, :2] - pose[:2]

@@ -27,12 +27,12 @@ MIN_GOAL_PROBABILITY, SURE_GOAL_PROBABILITY = 0.2, 0.95
 """Least probability of a pose of the goal's image that the robot drives to, and the one below which it compares images
 there: of 168 goals in rooms' middles 21 have less than 0.9, 16 of them a right pose (docs/experiments/landmarks.md)."""
 UNLIKE_IMAGES = 5
-"""Images in a row that do not look like a doubtful goal's, at its place, after which it is given up: a person may stand
+"""Images in a row that do not look like a doubtful goal's, at its place, after which it is given up: a person may be
 before the camera."""
 LOOKAHEAD_M = 0.8
 """Distance along the path of the point that the robot drives towards, metres."""
 LEG_M = 2.0
-"""Length of the legs of a path, metres: whoever watches whether the robot comes closer compares within one."""
+"""Length of the legs of a path, metres: progress towards the goal is compared within one."""
 ARRIVAL_M, MAX_HEADING_ERROR_DEG = 0.02, 2.0
 """Distance to the goal at which the robot has only to turn, metres, and heading error with which it has arrived."""
 DETOUR_M, BLOCKED_RADIUS_M = 10.0, 0.8
@@ -44,7 +44,7 @@ FAR_M = 5.0
 """Largest distance of a point to drive to from the references, metres: nothing is known beyond."""
 NEAR_M, HOVER_S = 0.1, 10.0
 """Distance of the estimate from a point, metres, and seconds of it after which the robot has arrived, though no
-landmarks say so."""
+landmarks show so."""
 SEARCH_S = 120.0
 """Seconds for which the robot may not know where it is, and wander, before it gives up."""
 
@@ -89,11 +89,11 @@ class RoadmapPlanner(Stage):
     The roadmap's points are the references, joined along the drive and wherever two are closer than the robot is wide,
     so that no wall is between them. The goal's pose is that of its image by landmarks. While the confidence in its own
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
-    landmarks tell. It has arrived where landmarks in its present image say so. Where they are not sure of the goal, few
-    are seen there: then its estimate tells too, and its image must show what the goal's does; else it goes on to the
-    other place that they name. Where a path is blocked, ways around are preferred; where none leads past that place, it
-    gives up. Blocked within its own radius of the goal, it ends there. Raises BadInput for a goal that the map's
-    landmarks cannot place.
+    landmarks tell. It has arrived where landmarks in its present image show so. Where they are not sure of the goal,
+    few are seen there: then its estimate tells too, and its image must show what the goal's does; else it continues to
+    the other place that they name. Where a path is blocked, ways around are preferred; where none leads past that
+    place, it gives up. Blocked within its own radius of the goal, it ends there. Raises BadInput for a goal that the
+    map's landmarks cannot place.
     """
 
     goal: str | int | None = None
@@ -155,7 +155,7 @@ class RoadmapPlanner(Stage):
             state.arrival = state.arrival if state.docking else ARRIVAL_M
         elif tick.stamp >= state.retry:
             state.retry = tick.stamp + int(RETRY_S * 1e9)
-            if known and away <= self.robot_radius_m:  # what stands there today lets it no closer
+            if known and away <= self.robot_radius_m:  # what is there today lets it no closer
                 state.arrival = away + ARRIVAL_M
             elif places is not None:
                 ctx.count("blocked_path")
@@ -246,7 +246,7 @@ class RoadmapPlanner(Stage):
             self._set_out(state, map, goal_pose)
         else:
             state.ended = "gave up"
-            reached = ", from as close as what stands there allows" if state.arrival > ARRIVAL_M else ""
+            reached = ", from as close as what is there allows" if state.arrival > ARRIVAL_M else ""
             hint = "give an image from closer to the mapped way"
             state.why = f"where landmarks put {self.goal} it looks different{reached}; {hint}"
 

@@ -63,7 +63,7 @@ class ShortestPathPlanner(Stage):
     too often is closed. A robot that is lost before it has come to the first view of its route is perhaps elsewhere:
     each time it is half as likely to be at that place, and every other route from there begins behind the medoid. Lost
     again where it has been lost before, it looks around before it plans. After too many routes, or where no route is
-    left, the planner gives up with the reason and an empty path, so that the robot stands. Raises BadInput for a goal
+    left, the planner gives up with the reason and an empty path, so that the robot stops. Raises BadInput for a goal
     that the map does not have, and for an image of no place in it.
     """
 
@@ -72,7 +72,7 @@ class ShortestPathPlanner(Stage):
     it."""
     search_s: Annotated[float, Bounds(ge=0)] = 15.0
     """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
-    around (it stands, then wanders) before it plans; sure of another place, it plans at once."""
+    around (it stops, then wanders) before it plans; sure of another place, it plans at once."""
     max_routes: Annotated[int, Bounds(ge=1)] = 20
     """Routes after which the planner gives up."""
 
@@ -239,7 +239,7 @@ def _likeliest(probabilities: Array, state: ShortestPathPlannerState) -> tuple[i
 
 
 def _failing(state: ShortestPathPlannerState, reached: int, lost: bool) -> Ints:
-    """The link on which a route fails behind so many of its views; lost before the first, its place with itself."""
+    """The link on which a route fails behind this many of its views; lost before the first, its place with itself."""
     if lost and not reached:
         return state.places[[0, 0]]
     leg = int(np.searchsorted(state.views, reached, side="right"))

@@ -72,7 +72,7 @@ def draw_landmarks(axes: "Axes", landmarks: Landmarks | None) -> None:
 
 
 def shown_landmarks(landmarks: Landmarks) -> Array:
-    """x and y (N, 2) of the landmarks, without the few that lie far from all others: depths may be uncertain."""
+    """x and y (N, 2) of the landmarks, without the few that are far from all others: depths may be uncertain."""
     xy = landmarks.points[:, :2].astype(np.float64)
     if not len(xy):
         return xy

@@ -43,7 +43,7 @@ def _summary(drive: Drive, several: bool) -> str:
 
 
 def _draw(logs: Sequence[Drive]) -> bytes:
-    """Logs stand one after the other on one axis of time."""
+    """Logs follow one another on one axis of time."""
     begins = np.cumsum([0.0, *(float(drive.seconds[-1]) + 1.0 for drive in logs)])
     charts = []
     for name, errors, limit, top in (

@@ -30,7 +30,7 @@ class FoxgloveServer:
         self.server.clear_session()
 
     def send(self, stamp: int, messages: list[TopicMessages]) -> None:
-        """Send messages at a time (ns) to whoever watches their topics."""
+        """Send messages at a time (ns) to all clients that watch their topics."""
         for each in messages:
             channel = self.channels.get(each.topic) or self._open(each.topic, each.msgtype)
             self.last[channel.id()] = channel, stamp, each
@@ -61,7 +61,7 @@ _servers: dict[tuple[str, int], FoxgloveServer] = {}
 
 
 def foxglove_server(host: str, port: int) -> FoxgloveServer:
-    """The server at an address; a later run of the same process goes on with the same one. Raises `BadInput`."""
+    """The server at an address; a later run of the same process uses the same one. Raises `BadInput`."""
     if (host, port) in _servers:
         return _servers[host, port]
     try:

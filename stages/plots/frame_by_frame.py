@@ -46,12 +46,12 @@ MAX_DOTS = 150
 class FrameByFrame(PlotStage):
     """Shows up to 60 frames of the last log, at even steps: the image, its best match and the belief.
 
-    The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
+    The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image is
     below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of
     the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it. Features
-    that were taken for landmarks are marked where a snapshot holds them.
+    that were matched to landmarks are marked where a snapshot holds them.
 
-    With `answers` the most similar references of a database stand there, each with the error of the pose that it means.
+    With `answers` the most similar references of a database are there, each with the error of the pose that it means.
     With `homing` the image is the robot's own, with the features that it follows; the target view, the homing vector,
     the planned route and the robot's state are shown too. Gives nothing where there are no frames.
     """
@@ -147,7 +147,7 @@ def _of(values: Sequence[Any] | None, tick: int) -> Any:
 
 
 def shown_frames(shown: Sequence[int], frames: int) -> str:
-    """Which of so many frames can be stepped to: `Every second frame is shown.`"""
+    """Which of this many frames can be stepped to: `Every second frame is shown.`"""
     steps = {after - before for before, after in pairwise(shown)}
     if len(steps) != 1:
         return f"{len(shown)} of {counted(frames, 'frame')} can be stepped to."

@@ -32,7 +32,7 @@ def images(snapshot: EncodedHomingView, target: Pixels | None) -> list[tuple[str
 
 
 def draw_vector(layer: Layer, pose: Array, vector: HomingVector | None, goal: Array) -> None:
-    """The homing vector from the robot's true pose (3,), as long as odometry says or else a metre, dashed; a ring where
+    """The homing vector from the robot's true pose (3,), as long as by odometry or else a metre, dashed; a ring where
     the target view was truly taken, `goal` (3,)."""
     layer.ring(goal, "orange")
     if vector is None or not is_known(vector):

@@ -21,7 +21,7 @@ BANDS: tuple[tuple[float, float, Colour, str], ...] = (
 class ShowHomingVectors(PlotStage):
     """Plots a dart where each view was taken, along its homing vector, coloured by its error.
 
-    As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them. Gives nothing where
+    As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan is under them. Gives nothing where
     there is no field.
     """
 

@@ -1,4 +1,4 @@
-"""The features of an image that were taken for landmarks, drawn on it."""
+"""The features of an image that were matched to landmarks, drawn on it."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ AGREEING, OTHER = (80, 230, 0), (0, 94, 255)
 """Green and orange (blue-green-red), bright enough on images: features that agree with the pose, and the others."""
 RADIUS_PX = 1.25
 """Radius of a feature's dot."""
-COLOURS = "Dots in the image are features that were taken for landmarks: green where they agree with the pose."
+COLOURS = "Dots in the image are features that were matched to landmarks: green where they agree with the pose."
 """Sentence of the caption that names the colours."""
 
 

@@ -17,7 +17,7 @@ class ShowLoopHypotheses(PlotStage):
     """Plots accepted and rejected loop hypotheses over the drive, and the map with its places, links and path images.
 
     As Figures 11 and 12 of Goedeme et al. 2007. Poses are those that the map keeps for drawing: truth, or odometry.
-    With `plan` wired the world's floor plan lies under both. Gives nothing where no image has a pose.
+    With `plan` wired the world's floor plan is under both. Gives nothing where no image has a pose.
     """
 
     def step(

@@ -57,7 +57,7 @@ def _draw(map: ViewMixtures, paths: Sequence[Array], plan: FloorPlan | None, tru
         colour: Colour = "ink" if true else "blue"
         chart.base.line(path[known(path)], colour, 0.9, opacity=0.6)
         chart.name("true path" if true else "estimate", colour)
-    order = np.argsort(map.weights, kind="stable")[-MAX_ELLIPSES:]  # what weighs most lies on top
+    order = np.argsort(map.weights, kind="stable")[-MAX_ELLIPSES:]  # what weighs most is on top
     share = np.clip(map.weights[order] / (map.weights.max() or 1.0), 0.15, 1.0)
     chart.base.ellipses(map.means[order], map.covariances[order], share, "pink", SIGMAS)
     chart.name("places of the map's views", "pink", "ring")

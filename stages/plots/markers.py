@@ -74,7 +74,7 @@ def axis_ends(means: Array, covariances: Array) -> Array:
 def weighted_points(
     stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array, kind: int = POINTS
 ) -> Fields:
-    """Points (N, 2), or ends of lines, each as opaque as its weight in [0, 1] says."""
+    """Points (N, 2), or ends of lines, each as opaque as its weight in [0, 1]."""
     rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
     shown = marker(stamp, namespace, kind, size, colour, points(places))
     return shown | {"colors": [rgba(*colour, weight) for weight in opacity(weights).tolist()]}

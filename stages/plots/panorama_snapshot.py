@@ -23,7 +23,7 @@ class EncodedPanorama(Value):
     """A panorama as JPEG bytes, columns as in `Panorama`; or windows side by side, the left one on the left.
 
     `headings`: where windows look, from the left to the right (radians, counter-clockwise from forward); empty: it is
-    a panorama. `points` (N, 2): columns and rows in the JPEG of the features that were taken for landmarks, NaN where
+    a panorama. `points` (N, 2): columns and rows in the JPEG of the features that were matched to landmarks, NaN where
     it does not show them, and `agree` (N,): which of them agree with the pose that they give; None: not looked for.
     """
 
@@ -54,7 +54,7 @@ class PanoramaSnapshot(Stage):
 
 
 def small_image(panorama: Panorama | Windows, columns: int) -> tuple[Thumbnail, tuple[float, ...]]:
-    """A panorama, or windows side by side, in at most so many columns; and where the windows look."""
+    """A panorama, or windows side by side, in at most this many columns; and where the windows look."""
     if isinstance(panorama, Panorama):
         return thumbnail(panorama.pixels, None, columns), ()
     # From just right of straight behind around to straight behind, as a panorama is cut open.

@@ -18,7 +18,7 @@ from .plan_chart import tinted
 PINK = (154, 96, 195)
 """Blue-green-red."""
 COLUMNS = 900
-"""Ticks that are told apart in the plot; of longer drives the largest belief in each."""
+"""Ticks that are distinct in the plot; of longer drives the largest belief in each."""
 
 
 class PlaceBeliefOverTime(PlotStage):

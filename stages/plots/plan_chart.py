@@ -1,4 +1,4 @@
-"""Draws maps, grids and floor plans under what else stands on a chart of the plane."""
+"""Draws maps, grids and floor plans under what else is on a chart of the plane."""
 
 import cv2
 import numpy as np
@@ -18,7 +18,7 @@ from .drawing import extent_of, grid_extent, shown_landmarks
 Extent = tuple[float, float, float, float]
 
 STANDING = (152, 143, 139)
-"""Grey (blue-green-red) of what stands on the floor, on light and on dark pages."""
+"""Grey (blue-green-red) of what is on the floor, on light and on dark pages."""
 SPECKS_PX = 500
 """Length of the longer side of the picture of landmarks, pixels."""
 JUMP_M = 2.5
@@ -32,7 +32,7 @@ def plan_chart(extent: Extent | None, height: tuple[float, float] = (190.0, 520.
 
 
 def draw_surroundings(chart: Chart, map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None) -> None:
-    """Draws what stands on the floor, by the grid or else the plan, and the map's references or places over it.
+    """Draws what is on the floor, by the grid or else the plan, and the map's references or places over it.
 
     A grid or plan in another frame than a map of odometry is left out.
     """
@@ -67,7 +67,7 @@ def draw_map(chart: Chart, map: AnyMap) -> None:
 
 
 def draw_landmarks(chart: Chart, map: AnyMap | None) -> None:
-    """A map's landmarks from above as faint specks; call it before what stands over them."""
+    """A map's landmarks from above as faint specks; call it before what is drawn over them."""
     if not isinstance(map, ReferenceGraph) or map.landmarks is None or not len(map.landmarks):
         return
     xy = shown_landmarks(map.landmarks)
@@ -83,7 +83,7 @@ def draw_landmarks(chart: Chart, map: AnyMap | None) -> None:
 
 
 def jumps(path: Array) -> list[int]:
-    """The rows of a path (N, 2 or more) that lie farther than `JUMP_M` from the row before."""
+    """The rows of a path (N, 2 or more) that are farther than `JUMP_M` from the row before."""
     far: list[int] = (np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > JUMP_M) + 1).tolist()
     return far
 
@@ -111,7 +111,7 @@ def _outlines(plan: FloorPlan) -> tuple[bytes, Extent]:
 
 
 def tinted(opacity: Bytes, colour: tuple[int, int, int] = STANDING) -> bytes:
-    """PNG bytes of one colour (blue-green-red), as opaque as (rows, columns) says."""
+    """PNG bytes of one colour (blue-green-red), as opaque as given (rows, columns)."""
     pixels = np.empty((*opacity.shape, 4), np.uint8)
     pixels[:, :, :3], pixels[:, :, 3] = colour, opacity
     return cv2.imencode(".png", pixels)[1].tobytes()

@@ -56,7 +56,7 @@ def path_bytes(stamps: npt.ArrayLike, poses: Array, now: int) -> bytes:
     set_stamps(rows["header"], stamps)
     set_poses(rows["pose"], poses)
     first, *others = (pose[_HEAD:] for pose in row_bytes(rows))
-    # Doubles lie at multiples of 8: the first pose, 20 bytes behind the head, is the only one with a gap before them.
+    # Doubles are at multiples of 8: the first pose, 20 bytes behind the head, is the only one with a gap before them.
     gap = len(first) - 7 * 8
     return b"".join((empty[:-4], len(poses).to_bytes(4, "little"), first[:gap], bytes(4), first[gap:], *others))
 

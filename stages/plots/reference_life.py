@@ -90,7 +90,7 @@ def farthest_moved(events: Sequence[ViewEvent | None]) -> int | None:
 def lives_of(snapshots: Sequence[Snapshot], same_m: float) -> list[Array]:
     """Each place over the snapshots: (n, 4) frame, x, y, weight; the one that weighed most comes first.
 
-    From snapshot to snapshot the closest pair is taken for one place first, none that is further apart than `same_m`.
+    From snapshot to snapshot the closest pair is identified first, none that is further apart than `same_m`.
     """
     done: list[list[tuple[float, ...]]] = []
     alive: list[list[tuple[float, ...]]] = []

@@ -1,4 +1,4 @@
-"""The run as a log of ROS 2 messages, for Foxglove, rosbags and whoever else reads MCAP."""
+"""The run as a log of ROS 2 messages, for Foxglove, rosbags and other readers of MCAP."""
 
 from collections.abc import Sequence
 from importlib.resources import files
@@ -27,7 +27,7 @@ class ResultLog(Stage):
     That is, in the map frame, per log: `/estimate/path`, its estimates (at most 10,000), and `/odometry/path`, where
     odometry alone would have led from the first true pose (without any, through the last estimate); and `/map` as it
     was left.
-    Beside it stands `foxglove_layout.json`, a layout of Foxglove's panels for these topics.
+    Beside it is `foxglove_layout.json`, a layout of Foxglove's panels for these topics.
     """
 
     def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> None:

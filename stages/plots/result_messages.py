@@ -1,4 +1,4 @@
-"""A tick of a run as ROS 2 messages, for whoever watches it."""
+"""A tick of a run as ROS 2 messages, for those who watch it."""
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.ros_messages import RosMessages

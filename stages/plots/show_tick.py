@@ -56,7 +56,7 @@ class ShownTick(Value):
 
     `belief` (K, 3): poses of the belief; of a mixture with their `covariances`, of places and of a mixture with their
     `weights`. `similar` (M, 3): x, y (m) and similarity of the most similar references, the most similar first.
-    `jpeg`: the panorama. `made`: messages that come seldom, as they are. Of so many ticks as `views_every` says, one
+    `jpeg`: the panorama. `made`: messages that come seldom, as they are. One of `views_every` ticks
     keeps what is only looked at: belief, similar references, panorama and homing arrow.
     """
 
@@ -89,7 +89,7 @@ class ShowTickState(State):
 
 
 class ShowTick(Stage):
-    """Keeps what `result.mcap` and whoever watches show of each tick, from the inputs that are wired.
+    """Keeps what `result.mcap` and live viewers show of each tick, from the inputs that are wired.
 
     No message is made here but the few that come seldom: `/grid` at a log's first frame, `/map` there and whenever the
     map has grown by a tenth, `/plan` with each new route, `/estimate/state` with each new one. `ResultMessages` lists

@@ -11,8 +11,8 @@ from .panorama_snapshot import EncodedPanorama, small_image
 class SmallPanorama(Stage):
     """Encodes the panorama or the windows of every frame as a small JPEG (quality 70).
 
-    It is a stage of its own so that it can be cached with the log's other features: whoever needs the panorama itself
-    makes every run read and unwarp all images again.
+    It is a stage of its own so that it can be cached with the log's other features: a stage that needs the panorama
+    itself makes every run read and unwarp all images again.
     """
 
     columns: Annotated[int, Bounds(ge=0, le=8192)] = 360

@@ -15,7 +15,7 @@ def is_snapshot_frame(frame: int) -> bool:
 
 
 def even_frames(frames: int) -> range:
-    """At most `FRAMES` of so many frames at even steps from the first on, all of them snapshot frames."""
+    """At most `FRAMES` of a number of frames at even steps from the first on, all of them snapshot frames."""
     step = 1
     while frames > FRAMES * step:
         step *= 2

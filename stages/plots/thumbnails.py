@@ -100,6 +100,6 @@ class ViewThumbnails(Stage):
 
 
 def joined(jpegs: Sequence[bytes]) -> Thumbnails:
-    """Thumbnails in one value; b"" stands for a missing one."""
+    """Thumbnails in one value; b"" for a missing one."""
     ends = np.cumsum([0, *(len(jpeg) for jpeg in jpegs)], dtype=np.int64)
     return Thumbnails(np.frombuffer(b"".join(jpegs), np.uint8), ends)

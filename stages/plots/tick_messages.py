@@ -76,7 +76,7 @@ def tick_messages(ticks: Sequence[ShownTick], before: PathSoFar, views_every: in
     """Messages of ticks in a row, topic by topic, in the order in which a tick's are written (see `ResultMessages`).
 
     The transform from `map` to `odom` is the estimate less odometry; without any estimate the first true pose is taken.
-    With `views_every` a path so far comes at so many ticks at most.
+    With `views_every` a path so far comes at one of that many ticks at most.
     """
     if not ticks:
         return []
@@ -113,7 +113,7 @@ def tick_messages(ticks: Sequence[ShownTick], before: PathSoFar, views_every: in
 
 
 def by_tick(messages: Sequence[TopicMessages], number: int) -> list[list[tuple[str, str, bytes]]]:
-    """Topic, type and bytes of each message of so many ticks, tick by tick."""
+    """Topic, type and bytes of each message of a number of ticks, tick by tick."""
     ticks: list[list[tuple[str, str, bytes]]] = [[] for _ in range(number)]
     for each in messages:
         for n, data in zip(each.ticks, each.encode(), strict=True):

@@ -22,7 +22,7 @@ from .plan_chart import draw_landmarks, draw_surroundings, jumps, plan_chart
 class TrajectoryOverMap(Stage):
     """Plots estimate, truth and odometry alone over the map's references and edges (map frame, m).
 
-    With `grid` or `plan` wired, all of it over what stands on the floor. The last log has a plot of its own. Of a robot
+    With `grid` or `plan` wired, all of it over what is on the floor. The last log has a plot of its own. Of a robot
     that drives by itself every contact is marked; with `routes` the planned routes, the last one bold, and its goal.
     """
 

@@ -37,7 +37,7 @@ EXAMPLES = 5
 
 
 class ShowVisibilityAreas(PlotStage):
-    """Plots visibility areas of some references over the grid, and how many views' areas each free cell lies in.
+    """Plots visibility areas of some references over the grid, and how many views' areas each free cell is in.
 
     As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the image was taken, its axis, the point lambda and
     the area from which that is visible; of a panorama, of every sector. The references are taken at equal

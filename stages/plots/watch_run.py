@@ -1,4 +1,4 @@
-"""A run, watched while it goes on."""
+"""A run, watched while it runs."""
 
 from typing import Annotated, Literal
 

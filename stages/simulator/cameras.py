@@ -40,7 +40,7 @@ class Rays(NamedTuple):
 
 
 def camera_of(world: WorldConfig) -> Camera:
-    """A world's camera. Raises `UnreadableRecording` for a description that is wrong, or says no height."""
+    """A world's camera. Raises `UnreadableRecording` for a description that is wrong, or states no height."""
     camera = camera_from(world.camera, "world.camera")
     if camera.height is None:
         raise UnreadableRecording("world.camera: key 'height' is missing: metres of the camera above the floor")
@@ -48,7 +48,7 @@ def camera_of(world: WorldConfig) -> Camera:
 
 
 def shutter_times(sensor: Sensor, at: float) -> Array:
-    """Moments (s) of the sub-exposures of an image taken at a time: they lie evenly around it."""
+    """Moments (s) of the sub-exposures of an image taken at a time: they are spaced evenly around it."""
     if sensor.shutter == 0.0:
         return np.array([at])
     parts: Array = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)

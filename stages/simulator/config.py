@@ -2,7 +2,7 @@
 
 Bodies are listed one by one (shelves, blocks, wall panels, lamps) or in groups (aisle blocks, rooms, a lamp grid),
 which `layout.expand` turns into single bodies. Metres and radians in the map frame (z up, the floor at 0) unless a
-field says otherwise.
+field states otherwise.
 """
 
 from dataclasses import dataclass, field
@@ -40,7 +40,7 @@ class Shelf:
     """Rows of compartments."""
     yaw: float = 0.0
     stock: bool = True
-    """Whether cartons stand on top."""
+    """Whether cartons are on top."""
     department: str = ""
     """Shelves of one department hold the same assortment of goods."""
 
@@ -324,7 +324,7 @@ class CameraErrors:
     focal: Annotated[float, Bounds(ge=0, le=0.2)] = 0.0
     """Share by which its focal lengths are longer or shorter."""
     centre_px: Annotated[float, Bounds(ge=0, le=100)] = 0.0
-    """Pixels by which its centre lies elsewhere."""
+    """Pixels by which its centre is off."""
 
 
 @dataclass(frozen=True)
@@ -383,9 +383,9 @@ class Delivery:
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """A hall of `size`, what stands in it, the robot that drives there and its sensors.
+    """A hall of `size`, what is in it, the robot that drives there and its sensors.
 
-    Day k is `days[k]`; later days are like the last one. With the ceiling material `sky` the world lies in the open and
+    Day k is `days[k]`; later days are like the last one. With the ceiling material `sky` the world is outdoors and
     rooms have roofs.
     """
 

@@ -52,15 +52,15 @@ class _Floor(NamedTuple):
 def drawn_office(world: WorldConfig) -> WorldConfig:
     """Another floor with rooms of the same names and kinds.
 
-    Many rooms lie along a straight corridor, one with a branch, or one that runs round a core; few lie on one side of
-    it or on both. Rooms that lie within a larger one, their corridor, get other walls and that one other widths.
-    Raises `BadInput` where rooms lie along no corridor.
+    Many rooms are along a straight corridor, one with a branch, or one that runs round a core; few are on one side of
+    it or on both. Rooms that are within a larger one, their corridor, get other walls and that one other widths.
+    Raises `BadInput` where rooms are along no corridor.
     """
     rng = stream(world.draw_seed, "plan")
     hall = next((room for room in world.rooms if _contains_the_others(room, world.rooms)), None)
     if hall is None:
         raise BadInput(
-            f"world.plan: the rooms of world '{world.name}' lie along no corridor, a room with walls: false, so no "
+            f"world.plan: the rooms of world '{world.name}' are along no corridor, a room with walls: false, so no "
             "plan can be drawn; type world.plan=paper"
         )
     rooms = [room for room in world.rooms if room is not hall]
@@ -205,7 +205,7 @@ def _front(room: Room) -> float:
 
 
 def _placed(room: Room, at: float, front: float, row: _Row, size: Point, rng: np.random.Generator) -> Room:
-    """A room in a row: its doors somewhere to the corridor, its windows on all sides that lie outside."""
+    """A room in a row: its doors somewhere to the corridor, its windows on all outer sides."""
     side = row.sides[int(rng.integers(len(row.sides)))]
     stretch = front / max(1, len(room.doors))
     doors = []
@@ -321,7 +321,7 @@ def _spot(
 def _led(route: Route, listed: WorldConfig, drawn: WorldConfig, hall: Room, places: Array) -> Route:
     """A listed route through the same rooms: each point keeps its place relative to its room's walls and door.
 
-    Where something stands there it is moved to the nearest of the `places` (N, 2) in the room.
+    Where something is there it is moved to the nearest of the `places` (N, 2) in the room.
     """
 
     def moved(point: Point) -> Point:

@@ -16,7 +16,7 @@ def laid_out(world: WorldConfig) -> WorldConfig:
     """A world with the floor plan that `world.plan` asks for, listed in full.
 
     Drawn are worlds with blocks of aisles, and those under a roof with several rooms; others have nothing to draw and
-    keep their plan. Raises `BadInput` for rooms that lie along no corridor.
+    keep their plan. Raises `BadInput` for rooms along no corridor.
     """
     if world.plan == "paper":
         return world

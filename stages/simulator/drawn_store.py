@@ -40,11 +40,11 @@ class Area(NamedTuple):
         return self.x1 - self.x0, self.y1 - self.y0
 
     def holds(self, point: Point, inset: float = 0.0) -> bool:
-        """Tells whether a point lies in it, at least `inset` m from its edge."""
+        """Tells whether a point is in it, at least `inset` m from its edge."""
         return self.x0 + inset < point[0] < self.x1 - inset and self.y0 + inset < point[1] < self.y1 - inset
 
     def grown(self, by: float) -> "Area":
-        """A rectangle that is larger by so many metres on each side."""
+        """A rectangle that is larger by a distance (m) on each side."""
         return Area(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
 
 
@@ -146,7 +146,7 @@ def _divided(floor: Area, count: int, gap: float, rng: np.random.Generator) -> t
 
 
 def _kept_from(part: Area, standing: list[Area]) -> Area:
-    """A part less what lies too close to things that stand: on the side where that takes the least away."""
+    """A part less what is too close to other things: on the side where that takes the least away."""
     for thing in standing:
         near = thing.grown(DESK_ROOM_M)
         if part.x0 < near.x1 and near.x0 < part.x1 and part.y0 < near.y1 and near.y0 < part.y1:

@@ -30,7 +30,7 @@ class Layout:
 
 
 def expand(config: WorldConfig, day: int = 0) -> Layout:
-    """Lay out a world as it stands on a day (from 0)."""
+    """Lay out a world as it is on a day (from 0)."""
     shelves, blocks, lamps, aisles = list(config.shelves), list(config.blocks), list(config.lamps), []
     for number, block in enumerate(config.aisle_blocks):
         named = replace(block, name=block.name or f"block {number}")

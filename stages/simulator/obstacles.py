@@ -19,8 +19,8 @@ class Obstacles(NamedTuple):
     """Boxes by the cells they are near to.
 
     `boxes` (B, 6): centre x, y, cosine and sine of the yaw, half length, half depth. `start` (cells + 1,) and
-    `members`: which boxes lie within `reach` m of each cell. `rows`, `columns`: of cells, the first at 0, 0. `width`,
-    `depth`: of the floor; what lies beyond is no room to drive.
+    `members`: which boxes are within `reach` m of each cell. `rows`, `columns`: of cells, the first at 0, 0. `width`,
+    `depth`: of the floor; what is beyond is no room to drive.
     """
 
     boxes: Array

@@ -64,7 +64,7 @@ def odometry(
 ) -> Array:
     """Odometry poses (N, 3), the first at 0, 0, 0, of a drive through true poses (N, 3).
 
-    `rolled_to` (N, 3): where the wheels brought the robot, where that was not where it went on from (it was lifted).
+    `rolled_to` (N, 3): where the wheels brought the robot, where that was not where it continued from (it was lifted).
     """
     poses = np.asarray(poses, dtype=np.float64)
     ends = poses if rolled_to is None else np.asarray(rolled_to, dtype=np.float64)
@@ -73,7 +73,7 @@ def odometry(
 
 
 def _misjudged(rotation: Array, length: Array, noise: OdometryNoise, half: Array, bias: Bias, drawn: Array) -> Array:
-    """Rotations as the wheels say, each with its half of what drifts over the metres."""
+    """Rotations as the wheels measure them, each with its half of what drifts over the metres."""
     sigma = np.sqrt(noise.rotation**2 * np.abs(rotation) + half)
     seen: Array = rotation * (1.0 + bias.rotation) + 0.5 * bias.turn * length + sigma * drawn
     return seen

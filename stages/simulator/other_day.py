@@ -17,7 +17,7 @@ class OtherDay(Stage):
     """Renders the image at the robot's true pose on another day, in that day's light and without people.
 
     For what is said to stay the same as the light changes: of no two drives are images taken from the same places.
-    Noise is drawn anew for each image.
+    Noise is drawn for each image.
     """
 
     world: WorldConfig = WorldConfig()

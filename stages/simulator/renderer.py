@@ -1,6 +1,6 @@
 """The renderer: a ray caster for boxes on a floor under a ceiling, for any set of rays.
 
-Every body is an upright box, turned by any angle, that stands on the floor or hangs (walls, shelves, posters, people).
+Every body is an upright box, turned by any angle, that is on the floor or hangs (walls, shelves, posters, people).
 Rays come in wedges of like azimuth. For a wedge, the cells of a grid over the floor are walked outwards once, and the
 boxes in them are found, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
 against these few. So an image costs what is seen, not what the world holds. Each pixel is computed by one thread
@@ -496,7 +496,7 @@ def _first_hit(
 def _first_hit_in_column(
     found: Array, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
-    """As `_first_hit`, for a ray in a wedge of one azimuth, where the found say how far off boxes begin and end."""
+    """As `_first_hit`, for a ray in a wedge of one azimuth, where the found tell how far off boxes begin and end."""
     slope = dz / max(ahead, 1e-9)
     distance, which, face = 1e9, -1, 5
     if slope < 0.0:

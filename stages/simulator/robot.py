@@ -45,7 +45,7 @@ class SimulatedDrive:
 
 
 def at_rest(pose: npt.ArrayLike) -> Array:
-    """The state (8,) of a robot that stands at a pose."""
+    """The state (8,) of a stationary robot at a pose."""
     state = np.zeros(8)
     state[:3] = pose
     return state
@@ -114,7 +114,7 @@ def _kept_off(state: Array, dx: float, dy: float, robot: Array, room: Obstacles,
     then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
     if robot[5] == 0.0 or (then < robot[0] and then < now - 1e-12):
         dx = dy = 0.0
-    if math.hypot(dx, dy) < 0.1 * before:  # it stands; along a wall it scrapes on as fast as its wheels turn
+    if math.hypot(dx, dy) < 0.1 * before:  # it stands still; along a wall it scrapes on as fast as its wheels turn
         state[SPEED] = 0.0
     return dx, dy
 

@@ -65,7 +65,7 @@ class RobotCamera:
         return steady * float(2.0 ** (sensor.exposure_jumps * stops))
 
     def _rays_at(self, pose: Array) -> Rays:
-        """The rays of the camera in the frame of a robot that stands level."""
+        """The rays of the camera in the frame of a robot that is level."""
         if self._world.ramps.slope_deg == 0.0:
             return self._rays
         return leaning(self._rays, self._slope(float(pose[0]), float(pose[2])))

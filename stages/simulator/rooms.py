@@ -19,7 +19,7 @@ DOOR_CLEARANCE_M = 0.7
 
 
 class Opening(NamedTuple):
-    """A gap in walls: whether they run along x, where they lie across that, its middle along it, and its width."""
+    """A gap in walls: whether they run along x, where they are across that, its middle along it, and its width."""
 
     along_x: bool
     line: float
@@ -33,9 +33,9 @@ class Opening(NamedTuple):
 
 
 class _Wall(NamedTuple):
-    """A side of a room: whether it runs along x, where it lies across that, and where it begins and ends.
+    """A side of a room: whether it runs along x, where it is across that, and where it begins and ends.
 
-    `inward`: 1 where the room lies on the side of greater x or y, else -1.
+    `inward`: 1 where the room is on the side of greater x or y, else -1.
     """
 
     along_x: bool
@@ -45,7 +45,7 @@ class _Wall(NamedTuple):
     inward: int
 
     def inside(self, inset: float) -> float:
-        """Gives the coordinate across the wall that lies so many metres inside the room."""
+        """Gives the coordinate across the wall that is a distance (m) inside the room."""
         return self.line + self.inward * inset
 
     def on_map(self, along: float, across: float) -> Point:
@@ -65,7 +65,7 @@ class _Wall(NamedTuple):
 
 @dataclass(frozen=True)
 class _Piece:
-    """Furniture along a wall: length along it, depth, height, looks, the height it hangs at, and what stands on it."""
+    """Furniture along a wall: length along it, depth, height, looks, the height it hangs at, and what is on it."""
 
     length: float
     depth: float
@@ -116,7 +116,7 @@ TABLES: dict[Furniture, tuple[Point, Material]] = {
 """Size and look of the table in the middle, where there is room around it."""
 
 TABLE_ROOM_M = 4.3
-"""Metres that a room is wider than a table in it, so that a robot gets around the table and what stands along walls."""
+"""Metres that a room is wider than a table in it, so that a robot gets around the table and what is along walls."""
 
 
 def openings(config: WorldConfig) -> list[Opening]:
@@ -137,7 +137,7 @@ def _wall(room: Room, side: Side) -> _Wall:
 
 
 def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
-    """Walls of a room just inside its rectangle, and its facade just outside; above openings they go on."""
+    """Walls of a room just inside its rectangle, and its facade just outside; above openings they continue."""
     height = room.height or config.height
     layers: list[tuple[float, Material, str, float]] = [(INNER_WALL_M / 2, room.wall, f"{room.name} wall", 0.0)]
     if room.facade:
@@ -275,7 +275,7 @@ def _placed_along(
 
 
 def _against_wall(room: Room, wall: _Wall, along: float, piece: _Piece, turn: float) -> Iterator[Block]:
-    """A piece of furniture with its back to the wall, what stands on it, and the chair in front."""
+    """A piece of furniture with its back to the wall, what is on it, and the chair in front."""
 
     def body(part: _Piece, depth_at: float, yaw: float = 0.0, look: str = "") -> Block:
         centre = wall.on_map(along, wall.inside(INNER_WALL_M + 0.01 + depth_at))

@@ -35,11 +35,11 @@ JITTER_PERIOD_M = 2.5
 
 
 class UnreachableRoute(Exception):
-    """A route that cannot be driven on this day; the message says why."""
+    """A route that cannot be driven on this day; the message states why."""
 
 
 def plan(world: World, route: Route) -> Array:
-    """The points (W, 2) of a route around what stands in the world on its day, rounded with smoothed corners.
+    """The points (W, 2) of a route around what is in the world on its day, rounded with smoothed corners.
 
     Where the world `drives_backwards`, laps go round the other way from the same first point, a lead-in too; all other
     routes but random ones begin at their end. All points keep the robot's radius and 0.1 m from obstacles where there

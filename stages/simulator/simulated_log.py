@@ -31,7 +31,7 @@ def record(
     """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
 
     Topics as every recording has them: JPEG images, camera information, odometry, truth, ranges (`/scan`); what was
-    done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached, and rooms.yaml where rooms have
+    done to the robot is on `/ground_truth/event` as JSON; camera.yaml is attached, and rooms.yaml where rooms have
     names. Odometry, truth and ranges come at their own rates. Log times run behind header stamps as a camera's, a
     wheel's and a ring's do. `progress` hears of every image: how many are written, of how many.
     """
@@ -103,7 +103,7 @@ def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arr
     camera = recording.camera
     size = {"width": camera.width, "height": camera.height_px}
     stamp += camera.delay_ns
-    info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml says the rest
+    info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml states the rest
     _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
     image = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)

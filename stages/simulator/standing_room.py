@@ -34,7 +34,7 @@ def standing_room(world: WorldConfig) -> Array:
 
 
 def within(places: Array, room: Room) -> Array:
-    """Those of the places (N, 2) that lie in a room."""
+    """Those of the places (N, 2) that are in a room."""
     low, high = np.array(room.corner), np.add(room.corner, room.size)
     inside: Array = places[((places > low) & (places < high)).all(axis=1)]
     return inside

@@ -76,7 +76,7 @@ def cloud(rng: np.random.Generator, cells: int, strength: float) -> Floats:
 
 
 def _bumps(rng: np.random.Generator, shape: tuple[int, int], strength: float) -> Floats:
-    """Smooth noise (DRAWN, DRAWN, 1) around 0 between so many rows and columns of random numbers."""
+    """Smooth noise (DRAWN, DRAWN, 1) around 0 between rows and columns of random numbers."""
     coarse = rng.normal(0.0, strength, shape).astype(np.float32)
     smooth: Floats = cv2.resize(coarse, (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC).astype(np.float32)
     return smooth[..., None]
@@ -410,7 +410,7 @@ def _board(rng: np.random.Generator) -> Floats:
 
 
 def _goods(rng: np.random.Generator) -> Floats:
-    """One compartment of a shelf: what stands on a board, its price rail below, an upright at the left edge."""
+    """One compartment of a shelf: what is on a board, its price rail below, an upright at the left edge."""
     canvas = blank((52, 50, 48)) + cloud(rng, 4, 5.0)
     FILLINGS[int(rng.integers(len(FILLINGS)))](canvas, rng)
     rail = vivid(rng, (0.1, 0.9)) if rng.uniform() < 0.5 else (230.0, 230.0, 230.0)

@@ -39,7 +39,7 @@ def _drawn(seed: int, material: str, name: str) -> Bytes:
 
 
 class World:
-    """A world from its configuration, as it stands on a day.
+    """A world from its configuration, as it is on a day.
 
     The seed decides textures and goods; on days other than 0 a share of the shelves' compartments is filled again.
     """
@@ -136,10 +136,10 @@ class World:
             sides.append(here[rng.integers(len(here), size=shape)])
         rearranged = self.config.day(self.day).rearranged
         if rearranged:
-            anew = stream(self.config.draw_seed, "goods", number, "day", self.day)
+            redrawn = stream(self.config.draw_seed, "goods", number, "day", self.day)
             for side in sides:
-                changed = anew.uniform(size=side.shape) < rearranged
-                side[changed] = here[anew.integers(len(here), size=int(changed.sum()))]
+                changed = redrawn.uniform(size=side.shape) < rearranged
+                side[changed] = here[redrawn.integers(len(here), size=int(changed.sum()))]
         return sides
 
     def _assortment(self, department: str) -> Ints:

@@ -1,4 +1,4 @@
-"""A simulated robot that goes where it is told: the source of a closed loop."""
+"""A simulated robot that follows commands: the source of a closed loop."""
 
 from dataclasses import field
 from typing import Annotated, Literal
@@ -59,7 +59,7 @@ class ClosedLoop(Source):
     """Simulates a robot that obeys the last command; every tick gives image, odometry, ranges and contacts.
 
     It starts at rest. The command of the tick before holds until this tick; without one it brakes. `motion` is what its
-    wheels say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.
+    wheels measure, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.
     Images are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody knows the next command.
     An image that is lost or late on its way (`world.delivery`) is absent, and counted. Raises `UnreadableRecording`
     for a place to start, or to go to, where the robot has no room, BadInput for goals where nothing reads them.
@@ -85,9 +85,9 @@ class ClosedLoop(Source):
     rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
     """Ticks a second."""
     rest_s: Annotated[float, Bounds(ge=0)] = 1.0
-    """Time that it goes on once the planned route, or a path without one, has ended: it has arrived, or given up."""
+    """Time that it continues once the planned route, or a path without one, has ended: it has arrived, or given up."""
     goals: tuple[tuple[float, float], ...] = ()
-    """Points that it is asked to go on to, x, y (m), each once its route has ended: it has arrived, or given up."""
+    """Points that it is asked to drive on to, x, y (m), each once its route has ended: it has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
@@ -157,7 +157,7 @@ class ClosedLoop(Source):
         return out
 
     def _drive(self, ctx: Context, simulation: ClosedLoopState, command: Command) -> Motion:
-        """One tick under a command, and what the wheels say of it."""
+        """One tick under a command, and what the wheels measure of it."""
         robot, now = simulation.robot, simulation.ticks / self.rate_hz
         before, driven = robot[:3].copy(), robot[DISTANCE]
         people = round_bodies(self._people(simulation))

@@ -12,13 +12,13 @@ Cut = tuple[int, int]
 
 
 def check_cuts(cuts: Sequence[Cut], frames: int, name: str) -> None:
-    """Raise UnreadableRecording where a cut does not lead onwards within a log of so many frames."""
+    """Raise UnreadableRecording where a cut does not lead onwards within a log of a number of frames."""
     end = 0
     for after, to in cuts:
         if not end < after < to < frames:
             raise UnreadableRecording(
                 f"{name}: the cut [{after}, {to}] does not lead onwards between {end} and {frames - 1}; type "
-                "cuts=[[60,300]] to go on with image 300 once the first 60 are through"
+                "cuts=[[60,300]] to continue with image 300 once the first 60 are through"
             )
         end = to
 
@@ -43,7 +43,7 @@ def thinned(frames: Ints, stamps: Ints, rate_hz: float | None) -> Ints:
 
 
 def crossed(cuts: Sequence[Cut], frames: Ints) -> Bools:
-    """Tells whether a cut lies between each of the frames (N,) and the next: (N - 1,)."""
+    """Tells whether a cut is between each of the frames (N,) and the next: (N - 1,)."""
     done = np.searchsorted([to for _, to in cuts], frames, side="right")
     between_them: Bools = np.diff(done) > 0
     return between_them

@@ -20,7 +20,7 @@ from omninav.stages.values.pose import AssumedMotion, Motion
 COLUMNS, ROWS = 360, 24
 """Size of the panoramas that the compass compares, pixels."""
 BAND = math.radians(30.0)
-"""Elevation (rad) above and below the horizon that they reach: what stands around turns, floor and sky do not."""
+"""Elevation (rad) above and below the horizon that they reach: the surroundings turn, floor and sky do not."""
 BLUR_PX = 1.0
 """Standard deviation of the blur of their columns: between images, leaves and noise change."""
 NOMINAL_SPEED = 0.5
@@ -72,7 +72,7 @@ class DeadReckoning(State):
 def dead_reckon(
     compass: VisualCompass, speed: float, position: DeadReckoning, image: Image, camera: Camera, seconds: float | None
 ) -> AssumedMotion | None:
-    """The assumed motion to an image, by which `position` goes on; None at the first image of a log.
+    """The assumed motion to an image, by which `position` moves on; None at the first image of a log.
 
     `speed`: m/s. `seconds`: since the image before; None: there is none.
     """
@@ -95,7 +95,7 @@ def assumed_motion(before: Floats | None, after: Floats | None, seconds: float, 
 
 
 def assumed_speed(ctx: Context, name: str, camera: Camera | None, speed: float | None, has_truth: bool) -> float:
-    """The speed (m/s) by which a log without odometry and positions is driven, with a warning that says so.
+    """The speed (m/s) by which a log without odometry and positions is driven, with a warning.
 
     `name`: of the log. `camera`: None where it is not known yet.
     Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by

@@ -61,7 +61,7 @@ class GoalImage(Stage):
             return self.Out(image=Image(room_view(self.world, str(self.goal).strip())), camera=camera_of(self.world))
         pixels = read_image(file)
         if self.camera is None and self.world is None:
-            raise BadInput(f"goal: nothing says what camera took {file}; give camera=PATH/camera.yaml")
+            raise BadInput(f"goal: nothing states what camera took {file}; give camera=PATH/camera.yaml")
         camera = self._camera(pixels)
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
@@ -75,7 +75,7 @@ class GoalImage(Stage):
             return camera_of(self.world or WorldConfig())
         camera = named_camera(self.camera, lambda: pixels.shape[1::-1])[0].found_in(pixels)
         if camera is None:
-            raise BadInput("goal: no ring of a mirror stands out in the image; give centre and mask in a camera.yaml")
+            raise BadInput("goal: no ring of a mirror is found in the image; give centre and mask in a camera.yaml")
         return camera
 
     def _file(self) -> Path | None:

@@ -166,7 +166,7 @@ def grid_around(target: tuple[float, float, float], spacing: float, radius: floa
 
 
 def in_sight(world: World, target: tuple[float, ...], points: Array) -> Bools:
-    """Tell of points (N, 2) whether no body stands between them and a target at the height of the camera: (N,)."""
+    """Tell of points (N, 2) whether no body is between them and a target at the height of the camera: (N,)."""
     away = np.column_stack([points - target[:2], np.zeros(len(points))])
     metres = np.linalg.norm(away, axis=1)
     eye = (target[0], target[1], world.config.eye_height)

@@ -15,7 +15,7 @@ from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
 
 NEW_LOG_AFTER_S = 3600.0
-"""Longest pause within a log, seconds: a longer one begins another, since several days may lie in one file."""
+"""Longest pause within a log, seconds: a longer one begins another, since several days may be in one file."""
 STILL = 1e-9
 """Metres and radians: below, odometry has not changed between two images."""
 MIN_STEP_M, MIN_STEPS, MIN_DISTANCE_M = 0.01, 5, 0.5
@@ -63,7 +63,7 @@ def parts_of(
     driven = np.empty((0, 3)) if poses is None else as_if_driven(poses, cuts)
     steps = np.diff(stamps[frames])
     if isinstance(recording, LiveRecording):
-        ends = steps <= 0  # its run went on after pauses, and not where its clock was set back
+        ends = steps <= 0  # its run continued after pauses, and not where its clock was set back
     else:
         ends = (steps > NEW_LOG_AFTER_S * 1e9) & ~crossed(cuts, frames)
     kind = _odometry_kind(recording, truth, guess)

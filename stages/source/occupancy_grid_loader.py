@@ -81,7 +81,7 @@ class OccupancyGridLoader(Stage):
         clearance = 0.0 if grid.made_from == "tour" else CLEARANCE_M
         space = free_space(grid, clearance, None if map is None else map.poses)
         if space is None:
-            ctx.count("references_off_the_free_space", detail="grid: no reference lies in free cells; all are kept")
+            ctx.count("references_off_the_free_space", detail="grid: no reference is in free cells; all are kept")
             space = free_space(grid, clearance, None)
         if space is None:
             raise BadInput(
@@ -138,7 +138,7 @@ def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) 
 def along_path(poses: Array, edges: Ints, reach: float, resolution: float) -> OccupancyGrid:
     """A grid that stands in for an unknown one: free within `reach` metres of a path, with a wall around it.
 
-    The path are places (R, >= 2) and the straight `edges` (E, 2) between them. The wall is one cell thick; what lies
+    The path are places (R, >= 2) and the straight `edges` (E, 2) between them. The wall is one cell thick; what is
     behind it is unknown. So a view sees the end of the free path ahead of it, and its visibility area is the stretch of
     path from which that end is in sight: right along the path and beside it, and never through what nobody drove along.
     """

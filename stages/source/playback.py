@@ -35,7 +35,7 @@ class PlaybackState(DeadReckoning):
 
 
 class Playback(Source, ABC):
-    """Plays recordings one after another, wherever they come from; `LogSource` says what it gives."""
+    """Plays recordings one after another, wherever they come from; `LogSource` states what it gives."""
 
     limits: MotionLimits = MotionLimits()
     """Limits of the robot: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
@@ -53,7 +53,7 @@ class Playback(Source, ABC):
     stride: Annotated[int, Bounds(ge=1)] = 1
     """Every how many frames one is used."""
     cuts: tuple[Cut, ...] = ()
-    """A kidnapping made of a log that has none: [[60, 300]] goes on with frame 300 of each log once the first 60 are
+    """A kidnapping made of a log that has none: [[60, 300]] continues with frame 300 of each log once the first 60 are
     through, and odometry has not noticed."""
     rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] | None = None
     """Images per second that are used at most; of a folder of images without times, how many were taken. Null: all."""

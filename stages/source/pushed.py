@@ -29,7 +29,7 @@ from .outputs import DriveOutputs, motion_of, pose_of
 INTERVAL_NS = 100_000_000
 """Time between images that come without a time stamp, ns."""
 MAX_STAMP_NS = 10**9 << 31
-"""Nanoseconds since 1970 below which a stamp lies: ROS counts seconds in 31 bits."""
+"""Nanoseconds since 1970 below which a stamp is: ROS counts seconds in 31 bits."""
 MAX_NUMBER = 1e8
 """Largest accepted coordinate of a pose (m, rad)."""
 MAX_READINGS = 100_000
@@ -88,7 +88,7 @@ class PushedSource(Source):
             self._opened = self._camera_of(self.camera, (0, 0))
 
     def inputs_digest(self) -> str | None:
-        """Hash of the camera, where a file says everything about it. Raises `BadInput` where there is no camera."""
+        """Hash of the camera, where a file describes it fully. Raises `BadInput` where there is no camera."""
         if self.camera is None:
             raise BadInput("camera: what took the images is not known; type camera=FILE.yaml or camera=NAME")
         is_file = user_path(self.camera).is_file()
@@ -215,7 +215,7 @@ class PushedSource(Source):
             whole = parse_camera(position.camera, "camera") if position.camera else camera.found_in(pixels)
             if whole is None:
                 raise BadInput(
-                    "step: no ring of a mirror stands out in the image; leave this frame out, or give centre and mask "
+                    "step: no ring of a mirror is found in the image; leave this frame out, or give centre and mask "
                     "in a camera.yaml"
                 )
             if not position.camera and whole.ring is not None:
@@ -265,7 +265,7 @@ def _sound_scan(scan: Scan | None) -> Scan | None:
 
 
 def _refuse_masked(name: str, given: object) -> None:
-    """Refuse an array with values that its owner has masked: they are not known, and would be taken as they stand."""
+    """Refuse an array with values that its owner has masked: they are not known, and would be taken as valid."""
     if np.ma.is_masked(given):
         raise BadInput(f"step: {name} has masked values, expected an array without a mask; fill them, or leave it out")
 

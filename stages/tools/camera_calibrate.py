@@ -98,7 +98,7 @@ def find_corners(pixels: Pixels, columns: int, rows: int) -> Array | None:
     if not there:
         return None
     spacing = np.linalg.norm(np.diff(corners.reshape(rows, columns, 2), axis=1), axis=2).min()
-    window = max(2, int(spacing / 3))  # no other corner may lie in it
+    window = max(2, int(spacing / 3))  # no other corner may be in it
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
     refined = cv2.cornerSubPix(grey, corners, (window, window), (-1, -1), stop)
     return np.asarray(refined, np.float64).reshape(-1, 2)

@@ -15,7 +15,7 @@ class RecordCamera(Tool):
     """Writes the images of a webcam, or of another camera that OpenCV reads, as an MCAP log, until Ctrl-C.
 
     Each image has the time at which it was read, and is kept as JPEG; camera.yaml is attached. Images that come faster
-    than `rate_hz` are left out. Raises BadInput where there is no such camera, or nothing says how it is to be read.
+    than `rate_hz` are left out. Raises BadInput where there is no such camera, or nothing states how it is to be read.
     """
 
     example = "device=0 camera=perspective out=drive.mcap"
@@ -23,7 +23,7 @@ class RecordCamera(Tool):
     camera: str | None = None
     """Its camera.yaml, or a projection (equirectangular, dual_fisheye, fisheye, donut, perspective)."""
     device: int | str = 0
-    """Number of the camera, or its file as /dev/video0; a video stands for a camera too."""
+    """Number of the camera, or its file as /dev/video0; a video serves as a camera too."""
     out: str = "camera.mcap"
     """The log to write."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
@@ -34,7 +34,7 @@ class RecordCamera(Tool):
     """Quality of the JPEGs, 1 to 100."""
 
     def run(self, ctx: Context) -> None:
-        """Record, and say what was recorded."""
+        """Record, and report what was recorded."""
         path = user_path(self.out)
         if path.suffix != ".mcap":
             raise BadInput(f"record: out={self.out:.100} is no .mcap; type out=camera.mcap")

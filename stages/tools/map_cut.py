@@ -13,9 +13,9 @@ Area = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 
 
 class CutMap(Tool):
-    """Writes the part of a map that lies in an area: its references or places, and the edges or links between them.
+    """Writes the part of a map that is in an area: its references or places, and the edges or links between them.
 
-    Raises BadInput where the file is no such map, or nothing of it lies there.
+    Raises BadInput where the file is no such map, or nothing of it is there.
     """
 
     example = "a.omap area=[0,0,10,5] out=cut.omap"
@@ -36,7 +36,7 @@ class CutMap(Tool):
         if not inside.any():
             edges = (edge(poses[:, :2], axis=0).round(1).tolist() for edge in (np.min, np.max)) if len(poses) else ()
             where = f"it goes from {' to '.join(map(str, edges))}" if len(poses) else "it is empty"
-            raise BadInput(f"area={list(self.area)}: nothing of {source.path} lies there; {where}")
+            raise BadInput(f"area={list(self.area)}: nothing of {source.path} is there; {where}")
         left = cut_references(whole, inside) if isinstance(whole, ReferenceGraph) else cut_places(whole, inside)
         write_saved(path, left, [source], f"cut area={list(self.area)}")
         what = "references" if isinstance(whole, ReferenceGraph) else "places"

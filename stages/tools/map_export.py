@@ -115,7 +115,7 @@ class ExportMap(Tool):
 
 
 def spaced(poses: Array, spacing: float) -> Ints:
-    """Rows of poses (N, >= 2) of which each lies at least `spacing` metres from the one before it that is kept."""
+    """Rows of poses (N, >= 2) of which each is at least `spacing` metres from the one before it that is kept."""
     kept: list[int] = []
     for row, (x, y) in enumerate(poses[:, :2].tolist()):
         if not kept or math.dist(poses[kept[-1], :2], (x, y)) >= spacing:

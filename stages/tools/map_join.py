@@ -57,7 +57,7 @@ def _of_landmarks(sources: Sequence[SavedMap], landmarks: Landmarks) -> Iterator
     graphs = [(source.path, source.map) for source in sources if isinstance(source.map, ReferenceGraph)]
     given = [map.landmarks for _, map in graphs if map.landmarks is not None]
     if not all(np.array_equal(each.words.centres, landmarks.words.centres) for each in given):
-        yield "with visual words learned anew from all of them"
+        yield "with visual words learned from all of them"
     if without := [str(path) for path, map in graphs if map.landmarks is None]:
         yield f"none from {' and '.join(without)}, where images are compared as a whole"
 

@@ -44,7 +44,7 @@ class MakeVideo(Tool):
 
     It is drawn from the run's `result.mcap`. The belief is pink, the truth black with the way so far, the estimate
     blue while the robot is tracked and orange while it is not, the planned route green. Raises BadInput for a folder
-    without a `result.mcap`, and where no pose lies in it.
+    without a `result.mcap`, and where no pose is in it.
     """
 
     example = "runs/latest out=lost.mp4 begin=60 end=120"
@@ -201,7 +201,7 @@ def _writer(out: Path, rate: float, size: tuple[int, int]) -> Iterator[cv2.Video
             raise BadInput(f"out: {out} cannot be written; may you write to its folder, or type out=video.mp4")
         yield writer
         writer.release()
-        if not cv2.VideoCapture(str(part)).isOpened():  # OpenCV's writer says nothing of a full disk
+        if not cv2.VideoCapture(str(part)).isOpened():  # OpenCV's writer does not report a full disk
             raise BadInput(f"out: {out} could not be written whole; is there space left?")
         os.replace(part, out)
     finally:

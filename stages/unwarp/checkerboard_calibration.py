@@ -16,7 +16,7 @@ from omninav.stages.geometry.arrays import Array
 Model = Literal["ocamcalib", "hyperbolic", "fisheye"]
 Make = Callable[[tuple[int, int], Ring, Array], Camera]
 MIN_BOARDS = 3
-"""Images of a board: with fewer, focal length and distance cannot be told apart."""
+"""Images of a board: with fewer, focal length and distance cannot be separated."""
 SHAPES = (1.02, 1.08, 1.2, 1.5, 2.0)
 TOP_DEG = (0.0, 10.0, 20.0, 30.0, 45.0)
 """Mirrors that are tried as a start: `k` of `mirror_camera`, and the elevation of the image's rim."""

@@ -1,4 +1,4 @@
-"""Remap tables: where in a camera's image each pixel of another image lies, in OpenCV's fixed point."""
+"""Remap tables: where in a camera's image each pixel of another image is, in OpenCV's fixed point."""
 
 from typing import NamedTuple, cast
 
@@ -22,7 +22,7 @@ class RemapTable(NamedTuple):
     wraps: bool
 
     def remap(self, pixels: Pixels) -> Pixels:
-        """Another image made of this one; what lies outside of it is black."""
+        """Another image made of this one; what is outside of it is black."""
         border = cv2.BORDER_WRAP if self.wraps else cv2.BORDER_CONSTANT
         return cast(Pixels, cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border))
 

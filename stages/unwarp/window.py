@@ -88,7 +88,7 @@ class PerspectiveWindow(Stage):
         if dark > 0.0:
             ctx.count(
                 "windows_beyond_the_camera",
-                detail=f"unwarp: {100 * dark:.1f} % of the windows lie outside of what the camera sees, and are black; "
+                detail=f"unwarp: {100 * dark:.1f} % of the windows are outside of what the camera sees, and are black; "
                 "nodes.unwarp.pitch_deg or a smaller field_deg moves them inside",
             )
         self._seen = None if dark == 0.0 else seen.reshape(len(headings), self.rows, self.columns)

@@ -88,7 +88,7 @@ class SinglePose(Belief):
 class PlaceBelief(Belief):
     """Which place of a topological map the robot is at. `probabilities`: (P,), sum 1.
 
-    `poses` (P, 3): x, y (m), heading (rad) of the robot if it stood where each place's medoid was taken; the heading
+    `poses` (P, 3): x, y (m), heading (rad) of the robot if it was where each place's medoid was taken; the heading
     includes the turn between the two views. Places have no size in metres: the covariance is zero.
     """
 

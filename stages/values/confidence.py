@@ -34,7 +34,7 @@ class PoseConfidence(Value):
 
 
 class WrongPoseAgreement(Value):
-    """Share in [0, 1] of the map's images whose best match lies where a robot wrongly believes to be."""
+    """Share in [0, 1] of the map's images whose best match is where a robot wrongly believes to be."""
 
     costly: ClassVar[bool] = True
 

@@ -10,7 +10,7 @@ class Conflicts(Value):
     """Which inputs do not fit each other, a sentence each, with its figures.
 
     `sentences`: all that was found so far; `standing`: those of them that still hold, those that mislead first;
-    `misleading`: whether one stands for which the estimate may be wrong, and not only its stamp.
+    `misleading`: whether one holds for which the estimate may be wrong, and not only its stamp.
     """
 
     sentences: tuple[str, ...]

@@ -11,7 +11,7 @@ class Correspondences(Value):
 
     `first` (M,) and `second` (M,): their rows among the points of the first and of the second view, patches and then
     ends of columns (`LocalFeatures.point_bearings`). Nothing is in two pairs. `distance` (M,): how different they look,
-    in the units of whoever matched them. In homing the first view is the current one and the second the target.
+    in the units of the stage that matched them. In homing the first view is the current one and the second the target.
     """
 
     first: Annotated[Ints, Shape("M"), Bounds(ge=0)]

@@ -59,11 +59,11 @@ class Drive(Value):
     confidence: Array
     """Probability that the estimate is right, as a monitor tells it; NaN where there is none."""
     evidence: Array
-    """Numbers that each image says of the estimate (N, `EVIDENCE`); NaN where there is none."""
+    """Evidence of each image on the estimate (N, `EVIDENCE`); NaN where there is none."""
     state: Ints
     """Which of `TRACKING_STATES` it is in, as a monitor tells it; -1 where there is none."""
     conflict: Ints
-    """Which of `conflicts` stood first at each image; -1 where none did."""
+    """Which of `conflicts` held first at each image; -1 where none did."""
     conflicts: tuple[str, ...]
     """Findings of inputs that do not fit each other."""
 

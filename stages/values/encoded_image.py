@@ -1,4 +1,4 @@
-"""Images as the bytes of a file: how large they say they are, and their pixels."""
+"""Images as the bytes of a file: the size they state, and their pixels."""
 
 import re
 import struct
@@ -34,15 +34,16 @@ _TURNS: dict[int, Callable[[npt.NDArray[Any]], npt.NDArray[Any]]] = {
 
 
 class Undecodable(ValueError):
-    """Bytes that are no image; the message says what is wrong with them."""
+    """Bytes that are no image; the message states what is wrong with them."""
 
 
 def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS) -> Bytes:
     """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
 
-    A JPEG is turned as its EXIF orientation says, as of a camera that was held on its side.
-    JPEG, PNG, BMP, PNM, WebP and TIFF. Raises `Undecodable`; before anything is unpacked where the file says that it is
-    larger than `max_pixels`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
+    A JPEG is turned as its EXIF orientation states, as of a camera that was held on its side.
+    JPEG, PNG, BMP, PNM, WebP and TIFF. Raises `Undecodable`; before anything is unpacked where the file states that it
+    is larger than `max_pixels`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with
+    grey.
     """
     width, height = size_of(data)
     if not 0 < width * height <= max_pixels or min(width, height) < 1:
@@ -65,7 +66,7 @@ def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS)
 
 
 def orientation_of(data: bytes) -> int:
-    """The orientation that the beginning of a JPEG file states in its EXIF, 1 to 8; 1, as it lies, where it has none.
+    """The orientation that the beginning of a JPEG file states in its EXIF, 1 to 8; 1, as it is, where it has none.
 
     Exif 2.32 (CIPA DC-008), tag 0x0112.
     """
@@ -89,7 +90,7 @@ def size_of(data: bytes) -> tuple[int, int]:
     try:
         return read(data)
     except (struct.error, KeyError, ValueError):
-        raise Undecodable(f"{len(data)} bytes of an image that does not say its size") from None
+        raise Undecodable(f"{len(data)} bytes of an image that does not state its size") from None
 
 
 def _png(data: bytes) -> tuple[int, int]:
@@ -98,7 +99,7 @@ def _png(data: bytes) -> tuple[int, int]:
 
 
 def _png_is_whole(data: bytes) -> bool:
-    """Tells whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk says it has."""
+    """Tells whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk states."""
     at = 8
     while at + 12 <= len(data):
         kind = data[at + 4 : at + 8]

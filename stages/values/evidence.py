@@ -46,4 +46,4 @@ class ImageEvidence(Value):
     correlation: Annotated[float, Bounds(ge=-1.01, le=1.01)] | None = None
     """Correlation with the image before at the turn where it is highest, 1: the same image."""
     conflict: str = ""
-    """The first finding that stands of inputs that do not fit each other."""
+    """The first finding that holds of inputs that do not fit each other."""

@@ -14,7 +14,7 @@ class SegmentFeatures(Value):
     """A view described by equal segments of its panorama. `values`: (segments, bins) float32.
 
     Segment j covers the columns from j/segments to (j+1)/segments of the panorama, clockwise from straight behind. A
-    view that is described as a whole is one segment, and says nothing of the robot's heading. `kind`: how segments of
+    view that is described as a whole is one segment, and shows nothing of the robot's heading. `kind`: how segments of
     a class are compared, and what a map calls them.
     """
 
@@ -24,7 +24,7 @@ class SegmentFeatures(Value):
 
 
 class SegmentHistograms(SegmentFeatures):
-    """Histograms per segment, each with a sum of at most 1, so that intersections lie in [0, 1].
+    """Histograms per segment, each with a sum of at most 1, so that intersections are in [0, 1].
 
     Segments sum to 1 (erratum 20 in docs/papers.md) unless some of their pixels were left out: bins are shares of all
     pixels of a segment. Pixels left out do not count in a match that divides by the query's own sum (erratum 43).
@@ -46,7 +46,7 @@ class SegmentColours(SegmentFeatures):
 
 
 class SegmentDescriptors(SegmentFeatures):
-    """A vector of any kind per segment, of length 1: what a network says of it, for example. (segments, D) float32."""
+    """A vector of any kind per segment, of length 1: a network's output for it, for example. (segments, D) float32."""
 
     kind = "descriptors"
 

@@ -30,7 +30,7 @@ class OccupancyGrid(Value):
     made_from: GridSource = "map"
 
     def cells_of(self, points: Array) -> Ints:
-        """Row and column of the cells in which points (N, >= 2) lie: (N, 2), also of cells that are not there."""
+        """Row and column of the cells in which points (N, >= 2) are: (N, 2), also of cells that are not there."""
         return cells_of(points, self.origin, self.resolution)
 
     def centres(self, rows: Ints, columns: Ints) -> Array:
@@ -40,7 +40,7 @@ class OccupancyGrid(Value):
 
 
 def cells_of(points: Array, origin: tuple[float, float], resolution: float) -> Ints:
-    """Row and column of the cells in which points (N, >= 2) lie: (N, 2)."""
+    """Row and column of the cells in which points (N, >= 2) are: (N, 2)."""
     cells: Ints = np.floor((points[:, 1::-1] - origin[::-1]) / resolution).astype(np.int64)
     return cells
 

@@ -78,7 +78,7 @@ class TrackedFeatures(Value):
     it was found again in the image before), MATCHED (not tracked, but matched with the target view). `points` (N, 2):
     columns and rows, pixels of the image; of lost ones where they should be, NaN where that is outside of it.
     `bearings` (N, 3): unit vectors in the robot's frame, and `places` (N, 3): positions in the local map of what is
-    tracked, which lies beside the feature.
+    tracked, which is beside the feature.
     """
 
     number: int
@@ -173,7 +173,7 @@ class DrivingStatus(Value):
     """Action of a robot that follows a homing vector, and why it does not do more.
 
     `waiting`: it has no target; `driving`; `docking`: it turns to the last view's heading; `arrived`; `lost`: it does
-    not know where the target is; `blocked`: there is no way through what stands around it.
+    not know where the target is; `blocked`: there is no way through what is around it.
     """
 
     state: Literal["waiting", "driving", "docking", "arrived", "lost", "blocked"]

@@ -24,9 +24,9 @@ class Landmarks(Value):
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
     `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
     `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
-    `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings say.
-    `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description says and as its
-    images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
+    `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings imply.
+    `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description states and as
+    its images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
     `pose_sigmas` (R, 3): standard deviations of the references' poses in the map frame (m, m, rad), 0 where they were
     given and the images confirm them; None where nothing was adjusted.
     """
@@ -68,7 +68,7 @@ class Landmarks(Value):
         return np.array([x, y, self.mount[2] - described[2] if same else 0.0])
 
     def late_by(self, described_s: float | None) -> float:
-        """Time (s) by which images are later than a description with this delay (None: without one) says."""
+        """Time (s) by which images are later than a description with this delay (None: without one) states."""
         if described_s is None:
             return self.delay_s
         return self.delay_s - described_s if described_s == self.described_delay_s else 0.0

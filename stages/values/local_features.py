@@ -16,7 +16,7 @@ class VerticalSegments(Value):
     `azimuths` (N,): radians, counter-clockwise from forward. `elevations` (N, 2): of the upper and the lower end
     (radians above the horizon). `descriptors` (N, 10) float32: three colour correlations, seven cosine coefficients of
     the intensity profile (grey levels) from the upper end down. `weights` (N,): how many neighbouring segments each
-    stands for. `points` (N, 2, 2): columns and rows of both ends (pixels) in the image they were found in.
+    means. `points` (N, 2, 2): columns and rows of both ends (pixels) in the image they were found in.
     """
 
     azimuths: Annotated[Array, Shape("N")]

@@ -35,7 +35,7 @@ class Motion(Value):
 
 
 class BridgedMotion(Motion):
-    """A motion across a gap of the odometry, bridged from what lies about it: less certain than a measured one.
+    """A motion across a gap of the odometry, bridged from what is around it: less certain than a measured one.
 
     `unmeasured_s`: how long the gap is, in seconds.
     """

@@ -38,7 +38,7 @@ class ShortVectors(ReferenceIndex):
 class InvertedLists(ReferenceIndex):
     """A short code of each reference, in lists of similar ones: an inverted file with product quantisation.
 
-    The short vector of reference r lies in list `lists[r]` around `centroids[lists[r]]` (d,); how it differs from there
+    The short vector of reference r is in list `lists[r]` around `centroids[lists[r]]` (d,); how it differs from there
     is in `codes[r]`: four bits for each pair of dimensions, the number of an entry of `codebooks` (d / 2, 16, 2), the
     first pair in the low bits of the first byte.
     """

@@ -1,4 +1,4 @@
-"""ROS 2 messages as they lie in a log."""
+"""ROS 2 messages as they are stored in a log."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Ranges to what stands around the robot."""
+"""Ranges to what is around the robot."""
 
 from typing import Annotated
 

@@ -11,7 +11,7 @@ from omninav.stages.geometry.probability.evidence import best_headings, centre_a
 class Similarities(Value):
     """Similarity of the current view to references at headings. `values`: (references, headings) float32 in [0, 1].
 
-    Column h stands for a robot whose heading is the reference view's own heading turned counter-clockwise by
+    Column h is for a robot whose heading is the reference view's own heading turned counter-clockwise by
     2 pi h / headings. `candidates` (references,) holds the indices of the map's references that were compared, in
     ascending order; None means all of them. `sampling_weight` (references,): how many references of the map each
     compared one represents, where only a sample was compared; None: one each. Sums weighted by it are unbiased
@@ -91,7 +91,7 @@ class BestMatch(Value):
     """The part of a map that looks most like the current view.
 
     `reference`: its number in the map; of a map that forgets views the view's lasting number, of a topological map the
-    place. `turn`: how far the robot stands turned against it (radians, counter-clockwise). `similarity` in [0, 1], 1 is
+    place. `turn`: how far the robot is turned against it (radians, counter-clockwise). `similarity` in [0, 1], 1 is
     equal; `distance` in the unit of the comparison, 0 is equal; each None where the comparison does not give it.
     """
 

@@ -10,8 +10,8 @@ StretchState = Literal["searching", "unsure", "blind", "wrong", "jumped"]
 class Stretch(Value):
     """Successive images, the state of the localisation in them, and what happened.
 
-    `searching`: not sure yet; `unsure`: not sure any more; `blind`: images that say nothing; `wrong`: sure, and beside
-    the truth; `jumped`: the one image at which a sure estimate lies elsewhere than odometry leads.
+    `searching`: not sure yet; `unsure`: not sure any more; `blind`: images that show nothing; `wrong`: sure, and beside
+    the truth; `jumped`: the one image at which a sure estimate is elsewhere than odometry leads.
     """
 
     log: int

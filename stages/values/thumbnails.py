@@ -14,7 +14,7 @@ from .image import Pixels
 class Thumbnails(Value):
     """A small image of each reference of a map, in the map's order.
 
-    `jpegs`: their JPEG bytes one after the other; image n lies from `ends[n]` to `ends[n + 1]`; empty: missing.
+    `jpegs`: their JPEG bytes one after the other; image n is from `ends[n]` to `ends[n + 1]`; empty: missing.
     """
 
     jpegs: Annotated[Bytes, Shape("bytes")]

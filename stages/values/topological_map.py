@@ -17,7 +17,7 @@ from .pose import PoseSource
 Small = npt.NDArray[np.int16]
 
 ANGLE = math.pi / 32768.0
-"""Radians that one step of a stored angle stands for: 0.0055 degrees."""
+"""Radians of one step of a stored angle: 0.0055 degrees."""
 DRIVEN, LOOP = 0, 1
 """Kinds of links: as the tour went; between two places that were found to be one."""
 
@@ -181,11 +181,11 @@ class TopologicalMap(Value):
 
 
 class LoopHypotheses(Value):
-    """Origin of a map: the tour's pictures, what they were taken for, and which of them were thought the same.
+    """Origin of a map: the tour's pictures, what they were identified as, and which of them were thought the same.
 
     `poses` (N, 3): of all pictures, from the map's `pose_source`. `cluster`, `subcluster` and `place` (N,): what each
     belongs to, subclusters numbered along the drive. `tour` (N,): which tour it is from. `pairs` (H, 2): the pictures
-    that stand for the two subclusters of each hypothesis. `distances` (H,): their visual ones. `initial` and `masses`
+    that represent the two subclusters of each hypothesis. `distances` (H,): their visual ones. `initial` and `masses`
     (H, 3): for, against and unknown, before and after the evidence of neighbours. `accepted` (H,).
     """
 

@@ -94,7 +94,7 @@ class Neighbours(Value):
     """The map's views within the novelty threshold of the current one, nearest first.
 
     `rows`: (J,) their rows in the map. `distances`: (J,) in the views' unit. `similarities`: (J,) in [0, 1], 1 at
-    distance 0, falling to 0 at the threshold. `turns`: (J,) how far the robot stands turned, counter-clockwise, from
+    distance 0, falling to 0 at the threshold. `turns`: (J,) how far the robot is turned, counter-clockwise, from
     its heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
     """
 

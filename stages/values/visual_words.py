@@ -21,7 +21,7 @@ MIN_SIMILARITY = 0.01
 class VisualWords(Value):
     """A vocabulary of local features, and which of its words each view of a map holds.
 
-    `centres` (K, D): descriptors, as `root_descriptors` makes them, that stand for one word each. `rarity` (K,): what a
+    `centres` (K, D): descriptors, as `root_descriptors` makes them, that represent one word each. `rarity` (K,): what a
     word weighs. Of view v the words are rows `starts[v]` to `starts[v + 1]` of `words` (W,), ascending, and their
     weights (W,), which have length 1 together.
     """

@@ -244,7 +244,7 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
     assert "page: runs/dice_full/dice.html" in dice.said
     *verdicts, why, _ = dice.said.splitlines()[-5:]
     assert [line.split("  ")[0] for line in verdicts] == ["undecided"] * 3
-    assert why == "undecided: one scenario says nothing of the next; a verdict needs several"
+    assert why == "undecided: one scenario says nothing about the next; a verdict needs several"
     verdicts = read_result(folder / "dice.result.json").verdicts
     better, published, best = verdicts["better"], verdicts["published"], verdicts["best"]
     assert [case.holds for case in better] == [None, None]  # six seeds of one drive say nothing of another

@@ -112,7 +112,7 @@ def test_a_sweep_that_is_typed_again_does_only_what_is_missing(toy, tmp_path: Pa
 def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path: Path):
     where = ("--config-dir=mine", "-m", "hydra.sweep.dir=out")
     toy(*where, "seed=0", check=True)
-    toy(*where, "seed=0", check=True)  # the same again goes on with it
+    toy(*where, "seed=0", check=True)  # the same again continues it
     refused = toy(*where, "seed=5")
     assert refused.returncode == 2
     assert refused.stderr.startswith("out: another sweep is in it (seed=0 variant=toy)")
@@ -160,8 +160,8 @@ def test_what_is_said_to_be_typed_is_quoted_for_the_shell(toy, omninav, tmp_path
     assert "all metrics: omninav report 'a b'\n" in ended.stdout
     folder = tmp_path / "a b"
     (folder / "report.html").unlink()
-    assert f"`omninav resume '{folder}'` goes on" in omninav("report", "a b").stderr
-    with pytest.raises(BadInput, match=f"`omninav resume '{folder}'` goes on"):
+    assert f"`omninav resume '{folder}'` continues" in omninav("report", "a b").stderr
+    with pytest.raises(BadInput, match=f"`omninav resume '{folder}'` continues"):
         _ = open_run(folder).report
     (folder / "metrics.json").write_text("{}")
     with pytest.raises(BadInput, match=f"`omninav resume '{folder}'` makes"):

@@ -53,7 +53,7 @@ def test_a_sweep_is_tried_by_its_first_choices_and_each_other_option_of_a_group(
     ],
 )
 def test_a_sweep_of_no_value_is_refused(word: str, hint: str):
-    with pytest.raises(BadInput, match="stands for no value") as refused:
+    with pytest.raises(BadInput, match="means no value") as refused:
         list(jobs_to_try([word], ()))
     assert hint in str(refused.value)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C: the run that goes on is named, and no other one."""
+"""Ctrl-C: the run to resume is named, and no other one."""
 
 import importlib
 from pathlib import Path
@@ -31,9 +31,9 @@ def test_in_its_loop_its_own_folder_is_named(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Engine, "tick", stop)
     assert main(RUN) == 130
     (folder,) = (tmp_path / "runs").glob("*_toy")
-    assert capsys.readouterr().err.splitlines()[-1] == f"stopped; `omninav resume runs/{folder.name}` goes on"
+    assert capsys.readouterr().err.splitlines()[-1] == f"stopped; `omninav resume runs/{folder.name}` continues it"
     assert main(["resume", str(folder), "toys"]) == 130
-    assert capsys.readouterr().err.splitlines()[-1] == "stopped; the same command goes on"
+    assert capsys.readouterr().err.splitlines()[-1] == "stopped; the same command continues it"
 
 
 def test_before_its_folder_is_whole_nothing_is_named_and_nothing_left(

@@ -112,7 +112,7 @@ def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: p
         ("thin", "a.omap", "out=./a.omap"): "this map is read; type another name",
         ("thin", "a.omap", "out=b.txt"): "type out=NAME.omap",
         ("thin", "a.omap", "b.omap"): "maps: 2 files are given, expected 1 map",
-        ("cut", "a.omap", "area=[90,90,91,91]"): "nothing of a.omap lies there; it goes from [",
+        ("cut", "a.omap", "area=[90,90,91,91]"): "nothing of a.omap is there; it goes from [",
         ("show", "projection.omap"): "it holds a Projection, no map",
         ("show", "none.omap"): "none.omap: there is no such file",
     }

@@ -36,7 +36,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["check", "seed\u00a0=1"], "a space in it is a no-break space; type it again"),
         (["--log", "a.mcap"], "--log: there is no such flag; settings have no dashes: type log=…"),
         (["check", "--log=a.mcap"], "--log=a.mcap: there is no such flag; settings have no dashes: type log=a.mcap"),
-        (["check", "-help"], "a short flag stands alone; did you mean --help?"),
+        (["check", "-help"], "a short flag is a single letter; did you mean --help?"),
         (["check", "speed=0,5"], "speed: '0,5' are several values\n      type 'speed=[0,5]' for a list, or"),
         (["check", "speed=0,5"], "for a run with each; decimal fractions have a point: 0.5"),
         (["check", "variant=omniviewmcl"], "did you mean 'variant=omniview_mcl'? (one of "),
@@ -56,10 +56,10 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["check", "seed=range(3)"], "seed: 'range(3)' are several values\n      type omninav -m seed=range(3) …"),
         (["log=nothere.mcap"], "  nothere.mcap: no such file"),
         (["check", "log=nothere.mcap"], "  map: this variant needs a map, and none is given"),
-        (["check", "log="], "  log: nothing stands behind the =\n      name it, as log=FILE, or leave log= out"),
-        (["check", "map= "], "  map: nothing stands behind the ="),
+        (["check", "log="], "  log: nothing follows the =\n      name it, as log=FILE, or leave log= out"),
+        (["check", "map= "], "  map: nothing follows the ="),
         (["log=~/nothere.mcap"], f"  {Path.home()}/nothere.mcap: no such file"),
-        ([str(DRIVE)], f"a file or folder stands behind the setting that reads it: log={DRIVE}"),
+        ([str(DRIVE)], f"a file or folder is typed behind the setting that reads it: log={DRIVE}"),
         (["check", "variant=omninav match=l2"], "quotes hold several words together: type each by itself"),
         (["check variant=omninav"], "quotes hold several words together: type each by itself"),
         (["map", "show", str(DRIVE.parent)], f"{DRIVE.parent}: this is a folder, expected a file"),
@@ -79,7 +79,7 @@ def test_a_folder_that_is_not_there_is_not_made(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "drives").mkdir()
     assert "nothere: not a run folder" in said(capsys, "resume", "nothere")
-    assert "stands behind the setting that reads it: omninav log=drives" in said(capsys, "drives")
+    assert "is typed behind the setting that reads it: omninav log=drives" in said(capsys, "drives")
     assert [path.name for path in tmp_path.iterdir()] == ["drives"]
 
 

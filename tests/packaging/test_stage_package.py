@@ -105,4 +105,4 @@ def test_everything_that_is_wrong_with_a_class_is_said_at_once():
     with pytest.raises(AssertionError) as found:
         check_stage(Mute)
     assert "docstring begins with ''" in str(found.value)
-    assert "'gain' does not say what it means" in str(found.value)
+    assert "'gain' is not explained" in str(found.value)

@@ -84,7 +84,7 @@ def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(r
     settings = {"log": DRIVE, "camera": "donut", "cache": shared_cache, "progress": False}
     whole, folder = omninav.run("omniview_cml", folder=tmp_path / "batch", **settings), tmp_path / "run"
     with omninav.open("omniview_cml", camera="donut", folder=folder) as session:
-        with pytest.raises(omninav.BadInput, match="step: no ring of a mirror stands out in the image"):
+        with pytest.raises(omninav.BadInput, match="step: no ring of a mirror is found in the image"):
             session.step(image=np.indices((210, 280, 3)).sum(0).astype(np.uint8))
         for frame in frames_of(recording, 0, 9):
             session.step(**frame)

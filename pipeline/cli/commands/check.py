@@ -27,7 +27,7 @@ MAX_TRIED = 1 << 26
 """Bytes of an artifact's file with which a first tick is tried: reading and preparing a larger one takes long."""
 
 HYDRA_FOLDERS = ("hydra.run.dir", "hydra.sweep.dir")
-"""Settings of Hydra that name where runs lie."""
+"""Settings of Hydra that name the folders of runs."""
 
 
 def command(arguments: list[str]) -> int:

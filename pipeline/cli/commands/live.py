@@ -1,4 +1,4 @@
-"""`omninav live`: a variant whose frames come now, until it is told to stop."""
+"""`omninav live`: run a variant on frames that arrive now, until it is stopped."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,12 +15,12 @@ RESULTS = ("estimate", "command")
 
 
 def command(arguments: list[str]) -> int:
-    """Run a variant live. Whatever else may be typed for a run may be typed here."""
+    """Run a variant live. It takes all that a run takes."""
     return run(live_words(arguments), prepare_live)
 
 
 def live_words(arguments: list[str]) -> list[str]:
-    """Gives the words of `omninav` or `omninav check` that stand for those typed behind `omninav live`."""
+    """Gives the words of `omninav` or `omninav check` that replace those typed behind `omninav live`."""
     typed = dict(word.split("=", 1) for word in arguments if "=" in word)
     if typed.get("log", "live") != "live":
         typed.setdefault("publish", "")  # what is plugged into this computer has nobody to tell it to

@@ -1,4 +1,4 @@
-"""`omninav report`: a run's results, and where its report lies; with `plots=all` drawn again."""
+"""`omninav report`: a run's results, and the path of its report; with `plots=all` drawn again."""
 
 import shlex
 from pathlib import Path
@@ -15,7 +15,8 @@ from omninav.pipeline.run.metrics_files import read_metrics
 def command(arguments: list[str]) -> int:
     """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report again.
 
-    That runs it once more: as of a run that goes on, other code than `omninav stages` lists is typed after the folder.
+    That runs it once more: as of a run that continues, other code than `omninav stages` lists is typed after the
+    folder.
     """
     plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
     named = [word for word in arguments if not word.startswith("plots=")]
@@ -34,7 +35,7 @@ def command(arguments: list[str]) -> int:
         if not (folder / "manifest.json").is_file():
             raise BadInput(f"{folder}: there is no run in it; `ls runs` shows what there is")
         raise BadInput(
-            f"{folder}: no report.html in it; `omninav resume {shlex.quote(str(folder))}` goes on with a run that did "
+            f"{folder}: no report.html in it; `omninav resume {shlex.quote(str(folder))}` continues a run that did "
             "not end"
         )
     show(results_table(read_metrics(folder)))

@@ -1,4 +1,4 @@
-"""`omninav resume`: go on with a run or an experiment that was stopped."""
+"""`omninav resume`: continue a run or an experiment that was stopped."""
 
 import os
 import shlex
@@ -50,15 +50,15 @@ def _resume_run(given: str, here: Path) -> int:
         print(f"{failed}\nthe traceback is in {folder / 'run.log'}", file=sys.stderr)
         return 1
     finally:
-        os.chdir(here)  # a run goes on where it was started
+        os.chdir(here)  # a run continues where it was started
     if run.complete:
-        print(f"{given} was complete: there was nothing to go on with. Its results:")
+        print(f"{given} was complete: there was nothing to continue. Its results:")
     show_results(run.folder, metrics, run.manifest)
     return 0
 
 
 def _resume_experiment(folder: Path) -> int:
-    """An experiment goes on when its command is typed again, where it was typed."""
+    """An experiment continues when its command is typed again, where it was typed."""
     from .run import command as run
 
     file = folder / "experiment.json"
@@ -69,7 +69,7 @@ def _resume_experiment(folder: Path) -> int:
     known = {name: manifest.get(name) for name in ("argv", "cwd")}
     state, problems = convert_fields(known, ExperimentState, "experiment")
     if problems or not state["argv"]:
-        raise BadInput(f"{file}: it does not say how the experiment was started; type its command again")
+        raise BadInput(f"{file}: it does not state how the experiment was started; type its command again")
     words, place = list(state["argv"][1:]), Path(state["cwd"])
     refuse_unreadable(words)
     if read_flags(words).multirun:  # whose jobs would know nothing of what was typed

@@ -39,7 +39,7 @@ def command(
 ) -> int:
     """Run one job, or all of a sweep. Hydra composes the configurations, and `prepare` checks each run.
 
-    `on_sweep` is told the folder of a sweep before its first job.
+    `on_sweep` gets the folder of a sweep before its first job.
     """
     flags = read_flags(arguments)
     words, folders = flags.overrides, [flags.config_dir] if flags.config_dir else []
@@ -153,7 +153,7 @@ def _own_folder(hydra: Any, words: Sequence[str]) -> Iterator[tuple[Path, list[s
 
 
 def _refuse_other_sweep(folder: Path, words: Sequence[str]) -> None:
-    """A sweep that was stopped goes on when it is typed again; another one does not take its folder."""
+    """A sweep that was stopped continues when it is typed again; another one does not take its folder."""
     file = folder / "multirun.yaml"
     if not file.is_file():
         return

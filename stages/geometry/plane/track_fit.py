@@ -18,7 +18,7 @@ NEAR_OCTAVES, NEAR_RAD = 0.5, math.radians(30.0)
 """Largest distance of a pair from a relation that it agrees with, octaves of scale and rad."""
 
 PAIR_MOVED, PAIR_ALIKE = 2.0, 1.5
-"""Length scales by which a pair must have moved to count, and within which it lies alike in two tracks."""
+"""Length scales by which a pair must have moved to count, and within which two tracks agree on it."""
 
 
 class TrackFit(NamedTuple):
@@ -61,14 +61,14 @@ def track_fit(track: Array, other: Array, min_metres: float) -> TrackFit | None:
 
 
 class Agreement(NamedTuple):
-    """The `share` of `pairs` of poses that lie to each other alike in two tracks."""
+    """The `share` of `pairs` of poses with the same relative pose in two tracks."""
 
     share: float
     pairs: int
 
 
 def agreement(track: Array, other: Array, length_scale_m: float) -> Agreement:
-    """Counts the pairs of poses of `other` (N, 3) that lie to each other as those of `track` (N, 3) do, as they are.
+    """Counts the pairs of poses of `other` (N, 3) that are to each other as those of `track` (N, 3) are.
 
     Pairs count where `track` moved by two length scales; they agree within one and a half, turned by less than 30
     degrees. Matches that are drawn by chance agree in some hundredths.

@@ -104,7 +104,7 @@ def test_a_value_and_how_it_was_made_come_back_and_its_file_opens_in_numpy(tmp_p
         ({"facts": {"made_by": 3}}, "its header's made_by is 3, expected a name"),
         ({"facts": {"warnings": "dark"}}, "its header's warnings is"),
         ({"facts": {"warnings": ["dark", 3]}}, "its header's warnings is a list, expected texts"),
-        ({"arrays": []}, "its header says no arrays"),
+        ({"arrays": []}, "its header states no arrays"),
     ],
 )
 def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: dict, message: str):
@@ -122,7 +122,7 @@ def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: d
         ({"header.json": b"[" * 100_000}, "not a valid artifact"),
         ({"rest.npy": b""}, "not a valid artifact"),
         ({"rest.npy": npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904,)}")}, "as long as"),
-        ({"rest.npy": npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}")}, "as long as it says"),
+        ({"rest.npy": npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}")}, "as long as it states"),
         ({"rest.npy": npy("{'descr': '|V0', 'fortran_order': False, 'shape': (16777217,)}")}, "has 16777217 rows"),
         ({"surplus.npy": bytes(100_000_000)}, r"it would unpack \d+ bytes to 1000\d+"),
     ],

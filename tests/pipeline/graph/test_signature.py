@@ -98,7 +98,7 @@ class Silent(toys.Constant):
         (OtherDefault, "'offset' has no type, and so sets no parameter; write `offset: float = 2.0`"),
         (OutOfBounds, "the default of 'gain': -1.0 is out of bounds, expected float > 0; write another"),
         (OfNoKind, "'gain' cannot be a complex; parameters are numbers, words, Literal"),
-        (Silent, "step does not say that it gives its Out; write `-> Out`"),
+        (Silent, "step does not state that it gives its Out; write `-> Out`"),
         (NoStep, "has no step method; write `def step"),
         (Untyped, "argument 'number' has no type; write `number: SomeValue`"),
         (Bare, "write a nested `class Out\\(Outputs\\)`"),

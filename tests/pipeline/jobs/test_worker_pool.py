@@ -90,7 +90,7 @@ def test_a_job_ends_whose_client_gives_no_sign_of_life(tmp_path: Path, monkeypat
     lease.write_text("token")
     endless = job("take", tmp_path, megabytes=1, seconds=60, mark=str(tmp_path / "mark"))
     ended = perform.perform(endless.text(0, lease, "token", None))
-    assert ended["error"] == "stopped, because whoever started it has ended"
+    assert ended["error"] == "stopped, because the process that started it has ended"
     wait_for(lambda: not lives(int((tmp_path / "mark").read_text())))
 
 

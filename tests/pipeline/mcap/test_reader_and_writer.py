@@ -388,7 +388,7 @@ def test_a_file_may_unpack_to_so_many_bytes_and_messages() -> None:
 
 @pytest.mark.parametrize(("bytes_", "limit"), [(100, 1 << 22), (20_000, 256 * (32 + 8 + 20_000))])
 def test_a_chunk_may_say_that_it_unpacks_to_4_mb_or_256_times_its_bytes(bytes_: int, limit: int) -> None:
-    for size, said in ((bytes_, None), (limit, "not as long as it says"), (limit + 1, f"unpack to {limit + 1}")):
+    for size, said in ((bytes_, None), (limit, "not as long as it states"), (limit + 1, f"unpack to {limit + 1}")):
         content = struct.pack("<QQQIIQ", 0, 0, size, 0, 0, bytes_) + bytes(bytes_)
         with nullcontext() if said is None else pytest.raises(ValueError, match=said):
             assert unpack(content, whole=True) == bytes(bytes_)

@@ -62,6 +62,6 @@ def test_before_a_closed_door_it_stands_and_says_that_it_is_blocked_and_tries_ag
     assert states[first + 50] == "driving"
     seen, told = done[-1]
     assert (told.command.speed, told.command.turning) == (0.0, 0.0)
-    assert "something stands in the way" in told.status.why
+    assert "something is in the way" in told.status.why
     assert seen.truth.y > 3.0
     assert seen.tally.collisions == 0

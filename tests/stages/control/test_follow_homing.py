@@ -132,7 +132,7 @@ def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long_and_tri
     assert states == ["driving"] * 21 + ["blocked"] * 20 + ["driving"] * 21 + ["blocked"] * 18
     assert all(out.command.turning for out in said[:21])
     assert command(said[-1]) == STAND
-    assert said[-1].status.why == "something stands in the way, and going around it for 4 s led no closer"
+    assert said[-1].status.why == "something is in the way, and going around it for 4 s led no closer"
     another = robot.drive(vector(number=1, metres=1.0, state="new"), progress(), wall)
     assert another.status.state == "driving"
 

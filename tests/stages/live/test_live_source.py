@@ -289,7 +289,7 @@ def test_images_that_odometry_never_reaches_are_a_trouble(wire: Wire, tmp_path: 
         assert synchronizer.next(0.0) is None
     synchronizer.watch()
     assert "no image is used: outside_odometry" in wire.status.troubles["ticks"]
-    assert "odometry says up to" in wire.status.troubles["ticks"]
+    assert "odometry has up to" in wire.status.troubles["ticks"]
 
 
 def ahead(data: bytes) -> bytes:

@@ -225,9 +225,9 @@ def placed(
     ("finding", "given", "said"),
     [
         (foreign, {}, ""),  # matches follow odometry
-        (foreign, {"scattered": True}, f"of {WINDOW} best matches 0 % lie at the estimate"),
+        (foreign, {"scattered": True}, f"of {WINDOW} best matches 0 % are at the estimate"),
         (foreign, {"scattered": True, "number": WINDOW - 1}, ""),
-        (foreign, {"scattered": True, "at_estimate": 12}, f"best matches {1200 / WINDOW:.0f} % lie at the estimate"),
+        (foreign, {"scattered": True, "at_estimate": 12}, f"best matches {1200 / WINDOW:.0f} % are at the estimate"),
         (foreign, {"scattered": True, "at_estimate": 13}, ""),
         (tracked, {}, ""),
         (tracked, {"scale": 1.25}, ""),

@@ -40,11 +40,11 @@ def test_a_small_map_is_not_judged(number: int, judged: bool) -> None:
 @pytest.mark.parametrize(
     ("extent_m", "said"),
     [
-        (0.0, "all 30 references of the map lie at one place, within 0 m: check its positions"),
+        (0.0, "all 30 references of the map are at one place, within 0 m: check its positions"),
         (0.009, "all 30 references"),
         (0.011, ""),
         (29 * 49.9, ""),
-        (29 * 50.1, "the map's images lie 50.1 m apart"),
+        (29 * 50.1, "the map's images are 50.1 m apart"),
     ],
 )
 def test_a_map_has_an_extent_and_a_spacing(extent_m: float, said: str) -> None:
@@ -60,7 +60,7 @@ def test_a_reference_is_lost_a_thousand_times_further_away_than_half_of_all(time
     poses[40, :2] = times, 0.0
     poses[:, :2] += 700.0, -300.0  # wherever its frame begins
     found = of_poses(poses)
-    assert ("reference 40 of the map lies 1010 m from its middle" in found) == lost
+    assert ("reference 40 of the map is 1010 m from its middle" in found) == lost
     assert bool(found) == lost
 
 
@@ -69,7 +69,7 @@ def test_a_lost_reference_of_a_map_in_a_corner_is_measured_by_its_smallest_exten
     poses[40, 0] = 9.9  # half of all within 0 m: as if within a centimetre
     assert of_poses(poses) == ""
     poses[40, 0] = 10.1
-    assert "reference 40 of the map lies 10 m from its middle, half of all within 0 m" in of_poses(poses)
+    assert "reference 40 of the map is 10 m from its middle, half of all within 0 m" in of_poses(poses)
 
 
 def test_headings_are_judged_by_neighbours_that_turn() -> None:

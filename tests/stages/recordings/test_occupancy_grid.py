@@ -93,7 +93,7 @@ def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where
         ("mode: pretty\n", r"mode: 'pretty' .* 'trinary' \| 'scale' \| 'raw'"),
         ("negate: 7\n", "negate: 7 .* expected bool"),
         ("image: [\n", "not valid YAML"),
-        ("image: other.pgm\n", "line 6: the key 'image' stands there twice"),
+        ("image: other.pgm\n", "line 6: the key 'image' occurs twice"),
     ],
 )
 def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, text, said):

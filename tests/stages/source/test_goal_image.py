@@ -36,7 +36,7 @@ def test_the_camera_of_a_goal_may_be_a_projection_by_its_name(tmp_path):
     found = GoalImage(goal=file, world=None, camera="donut").step(Context("goal"))
     assert found.camera.ring == pytest.approx((79.5, 59.5, 9.0, 58.0), abs=4.0)
     cv2.imwrite(file, np.full((120, 160, 3), 90, np.uint8))
-    with pytest.raises(BadInput, match="goal: no ring of a mirror stands out in the image; give centre and mask"):
+    with pytest.raises(BadInput, match="goal: no ring of a mirror is found in the image; give centre and mask"):
         GoalImage(goal=file, world=None, camera="donut").step(Context("goal"))
 
 

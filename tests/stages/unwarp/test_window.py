@@ -78,7 +78,7 @@ def test_what_the_camera_does_not_see_is_black_and_said() -> None:
     elevation = np.arctan2(rays[..., 2], np.hypot(rays[..., 0], rays[..., 1]))
     assert np.array_equal(cut.seen[0], elevation <= MIRROR.elevations[0])
     share = 100 * (1 - cut.seen.mean())
-    assert f"{share:.1f} % of the windows lie outside" in ctx.details["windows_beyond_the_camera"]
+    assert f"{share:.1f} % of the windows are outside" in ctx.details["windows_beyond_the_camera"]
     assert windows(MIRROR, white, field_deg=50.0).seen is None
 
 
