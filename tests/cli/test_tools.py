@@ -90,7 +90,7 @@ def test_a_joined_map_says_what_became_of_landmarks(tmp_path: Path, capsys: pyte
     for maps, said in (
         (["a", "a"], f"landmarks: {2 * number}\n"),
         (["a", "b"], f"landmarks: {number}, none from b.omap, where images are compared as a whole\n"),
-        (["c", "a"], f"landmarks: {2 * number}, with visual words learned anew from all of them\n"),
+        (["c", "a"], f"landmarks: {2 * number}, with visual words learned from all of them\n"),
     ):
         assert main(["map", "join", *(f"{name}.omap" for name in maps)]) == 0
         assert said in capsys.readouterr().out
