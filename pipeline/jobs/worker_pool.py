@@ -1,6 +1,7 @@
 """Runs many jobs: one that fails is reported, one that dies is tried again, and neither stops the others."""
 
 import json
+import os
 import queue
 import secrets
 import threading
@@ -116,7 +117,7 @@ class WorkerPool:
     def _renew(self) -> None:
         while not self._over.wait(RENEW_S):
             with suppress(OSError):  # gone, or a full disk
-                self._lease.touch() if self._lease.exists() else None
+                os.utime(self._lease)
 
 
 def _outcome(future: Future[dict[str, Any]]) -> Outcome:

@@ -18,7 +18,7 @@ FONT = "Helvetica, Arial, 'DejaVu Sans', sans-serif"
 INK, QUIET, WIRE, DELAY = "#1d2733", "#5b6775", "#7b8896", "#0072b2"
 COLOURS = {"before": ("#eef2f8", "#5b7db1"), "tick": ("#eef7f1", "#2f8f5b"), "after": ("#f5f0f9", "#8456a8")}
 """Ground and ink of the bands."""
-LANE, COLUMN_GAP, BAND_GAP, TOP = 20.0, 54.0, 24.0, 44.0
+LANE, COLUMN_GAP, BAND_GAP, TOP, CORNER_RADIUS = 20.0, 54.0, 24.0, 44.0, 7.0
 
 
 def svg(graph: Graph) -> str:
@@ -197,12 +197,12 @@ def _described(item: Item, port: str) -> str:
     return f"{item.name}.{port}" if isinstance(item, Box) else "…"
 
 
-def _rounded(points: Sequence[tuple[float, float]], radius: float = 7.0) -> str:
+def _rounded(points: Sequence[tuple[float, float]]) -> str:
     """A path along right angles with rounded corners."""
     path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
-        into = _towards(corner, before, radius)
-        onward = _towards(corner, after, radius)
+        into = _towards(corner, before, CORNER_RADIUS)
+        onward = _towards(corner, after, CORNER_RADIUS)
         path += f" L{into[0]:.1f} {into[1]:.1f} Q{corner[0]:.1f} {corner[1]:.1f} {onward[0]:.1f} {onward[1]:.1f}"
     return path + f" L{points[-1][0]:.1f} {points[-1][1]:.1f}"
 

@@ -11,23 +11,23 @@ from omninav.stages.geometry.two_views.relative_pose_ransac import agreement
 
 MIN_PAIRS = 8
 """Pairs of a linear fit."""
+ROUNDS, MIN_SHARE = 20, 0.3
+"""Linear fits, each of fewer pairs, and the share of all pairs in the last one."""
 
 
-def generate_and_select(
-    first: npt.ArrayLike, second: npt.ArrayLike, threshold: float, rounds: int = 20, min_share: float = 0.3
-) -> AgreedPose | None:
+def generate_and_select(first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> AgreedPose | None:
     """Pose of view 2 seen from view 1, by Svoboda's algorithm as Goedemé et al. 2007, section 7.1.1, tell it.
 
     An overdetermined system is solved again and again, built from the pairs of unit bearings (N, 3) and (N, 3) that
-    missed the essential matrix before by the least, fewer in each of the `rounds`, down to `min_share` of all; that
-    with the best quality q_e counts. Which pairs agree with it is said as in `relative_pose`, within `threshold` (rad).
+    missed the essential matrix before by the least, fewer in each of the `ROUNDS`, down to `MIN_SHARE` of all; that
+    with the best quality q_e counts. Pairs agree with it as in `relative_pose`, within `threshold` (rad).
     None for fewer than eight pairs. How many pairs are left out in a round is our reading.
     """
     first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
     if len(first) < MIN_PAIRS:
         return None
     chosen, best, found = np.arange(len(first)), math.inf, np.zeros((3, 3))
-    for share in np.linspace(1.0, min_share, rounds):
+    for share in np.linspace(1.0, MIN_SHARE, ROUNDS):
         matrix, quality = eight_points(first[chosen], second[chosen])
         if quality < best:
             best, found = float(quality), matrix
@@ -37,4 +37,4 @@ def generate_and_select(
     close = angular_residuals(found, first, second) <= threshold
     k = int(np.argmax(in_front((rotations, translations), first[close], second[close])))
     pose = rotations[k], translations[k]
-    return AgreedPose(*pose, agreement(*pose, first, second, threshold), rounds)
+    return AgreedPose(*pose, agreement(*pose, first, second, threshold), ROUNDS)

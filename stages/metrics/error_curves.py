@@ -45,7 +45,7 @@ def error_curves(drive: Drive) -> dict[str, Any]:
     path = drive.odometry_alone()
     odometry = np.full(len(metres), np.nan) if path is None else position_errors(path[scored], truth)
     start = drive.truth[np.argmax(known(drive.truth))]
-    laps = np.split(np.arange(len(truth)), lap_ends(truth, start, HOME_M))
+    laps = np.split(np.arange(len(truth)), lap_ends(truth, start))
     shares = [share for share in np.array_split(np.arange(len(truth)), min(POINTS, len(truth))) if len(share)]
     away = np.hypot(*(truth[:, :2] - start[:2]).T)
     rings = (away // STEP_M).astype(np.int64)
@@ -77,18 +77,18 @@ def error_curves(drive: Drive) -> dict[str, Any]:
     }
 
 
-def lap_ends(poses: Array, start: Array, home_m: float) -> list[int]:
+def lap_ends(poses: Array, start: Array) -> list[int]:
     """The rows of a drive (N, 3) at which a lap after the first begins: where it is nearest to its start, each time.
 
-    A visit begins within `home_m` of the start pose (3,), headed as there (within a right angle), and ends beyond
+    A visit begins within `HOME_M` of the start pose (3,), headed as there (within a right angle), and ends beyond
     twice that; only what is between two visits is a lap.
     """
     away = np.hypot(*(poses[:, :2] - start[:2]).T)
-    home = (away <= home_m) & (np.cos(poses[:, 2] - start[2]) > 0.0)
+    home = (away <= HOME_M) & (np.cos(poses[:, 2] - start[2]) > 0.0)
     ends: list[int] = []
     nearest: int | None = 0  # of the visit that is on; None between visits
     for row, distance in enumerate(away):
-        if distance > 2.0 * home_m:
+        if distance > 2.0 * HOME_M:
             if nearest is not None:
                 ends.append(nearest)
             nearest = None

@@ -6,7 +6,7 @@ from omninav.pipeline import Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Drive, known
 
-from .error_curves import HOME_M, lap_ends
+from .error_curves import lap_ends
 
 FRAMES = 5
 """Frames at the start that count."""
@@ -34,6 +34,6 @@ class LoopEndError(MetricStage):
                 "position_error_m": float(errors[end : end + FRAMES].mean()),
                 "odometry_error_m": None if odometry is None else float(odometry[end : end + FRAMES].mean()),
             }
-            for end in lap_ends(truth, log.truth[np.argmax(known(log.truth))], HOME_M)
+            for end in lap_ends(truth, log.truth[np.argmax(known(log.truth))])
         ]
         return self.Out(metrics=Metrics({"returns": returns}))

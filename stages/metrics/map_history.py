@@ -51,7 +51,7 @@ class MapHistory(MetricStage):
         counts = counted(events, after_last)
         if not len(counts):
             return self.Out(metrics=Metrics({}))
-        parts = parts_of(logs, HOME_M)
+        parts = parts_of(logs)
         came, went = (np.diff(column, prepend=0) for column in counts[:, 2:].T)
         ends = np.cumsum(parts) - 1
         starts = ends - parts + 1
@@ -72,7 +72,7 @@ class MapHistory(MetricStage):
             },
         }
         if logs[0].has_truth:
-            values["first_map"] = first_map(logs[0], HOME_M)
+            values["first_map"] = first_map(logs[0])
         return self.Out(metrics=Metrics(values, SPECS, details=("first_map",)))
 
 
@@ -96,30 +96,30 @@ def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = N
     return np.column_stack([held[latest], came.cumsum(), went.cumsum()]).astype(np.int64)
 
 
-def parts_of(logs: Sequence[Drive], home_m: float) -> Ints:
+def parts_of(logs: Sequence[Drive]) -> Ints:
     """Number of frames of each lap of the first log, and of each later log."""
     first = logs[0]
     rows = np.flatnonzero(known(first.truth))
-    ends = lap_ends(first.truth[rows], first.truth[rows[0]], home_m) if len(rows) else []
+    ends = lap_ends(first.truth[rows], first.truth[rows[0]]) if len(rows) else []
     laps = np.diff([0, *rows[ends].tolist(), len(first)])
     return np.concatenate([laps, [len(log) for log in logs[1:]]]).astype(np.int64)
 
 
-def last_new_ground(path: Array, near_m: float) -> int:
-    """The last row of a path (N, 2) at a place that it had not been to: within `near_m`, and left beyond twice that."""
+def last_new_ground(path: Array) -> int:
+    """The last row of a path (N, 2) at a place that it had not been to: within `HOME_M`, and left beyond twice that."""
 
     def is_new(row: int) -> bool:
         away = np.hypot(*(path[:row] - path[row]).T)
-        left = np.flatnonzero(away > 2.0 * near_m)
-        return not len(left) or bool((away[: left[-1]] > near_m).all())
+        left = np.flatnonzero(away > 2.0 * HOME_M)
+        return not len(left) or bool((away[: left[-1]] > HOME_M).all())
 
     return next(row for row in reversed(range(len(path))) if is_new(row))
 
 
-def first_map(drive: Drive, home_m: float) -> dict[str, Any]:
+def first_map(drive: Drive) -> dict[str, Any]:
     """Errors of odometry alone and of the estimate up to the last new ground of a drive that has ground truth."""
     rows = np.flatnonzero(known(drive.truth))
-    frames = int(rows[last_new_ground(drive.truth[rows, :2], home_m)]) + 1
+    frames = int(rows[last_new_ground(drive.truth[rows, :2])]) + 1
     scored = (known(drive.truth) & known(drive.estimate))[:frames]
     truth = drive.truth[:frames][scored]
     if not len(truth):

@@ -128,7 +128,6 @@ def drive(
     waypoints: npt.ArrayLike,
     robot: Robot,
     rate: float,
-    start_heading: float | None = None,
     room: Obstacles | None = None,
     kidnappings: Sequence[Kidnapping] = (),
 ) -> SimulatedDrive:
@@ -136,16 +135,15 @@ def drive(
 
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
     turns on the spot where it would have to look back. Speed and turning change no faster than the limits allow. The
-    robot starts at rest at the first waypoint, facing the second unless `start_heading` is given. Obstacles stop it
-    where `room` is given. After a kidnapping it continues from the nearest point of the route; of several equally near
-    ones, as on laps, from the next.
+    robot starts at rest at the first waypoint, facing the second. Obstacles stop it where `room` is given. After a
+    kidnapping it continues from the nearest point of the route; of several equally near ones, as on laps, from the
+    next.
     """
     points, ends = _legs(waypoints)
     length = float(ends[-1])
     start = points[0]
     ahead = points[min(1, len(points) - 1)] - start
-    heading = math.atan2(ahead[1], ahead[0]) if start_heading is None else start_heading
-    state = at_rest((*start, heading))
+    state = at_rest((*start, math.atan2(ahead[1], ahead[0])))
     bounds = limits(robot)
     if room is None:
         bounds[0], room = 0.0, gather(np.empty((0, 6)), (1.0, 1.0), 0.0)

@@ -20,12 +20,13 @@ from .world_rooms import rooms_of
 
 ODOMETRY_LATENCY_NS, SCAN_LATENCY_NS = 2_000_000, 5_000_000
 """Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
+JPEG_QUALITY = 90
+"""Quality of the images, of 100."""
 
 
 def record(
     recordings: SimulatedRecording | Sequence[SimulatedRecording],
     path: Path,
-    quality: int = 90,
     progress: Callable[[int, int | None], None] = lambda done, total: None,
 ) -> None:
     """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
@@ -44,10 +45,10 @@ def record(
         if rooms is not None:
             log.attach(ROOMS, write_rooms(rooms).encode(), "application/yaml")
         for drive in drives:
-            _write(log, drive, quality, lambda: progress(next(written), total))
+            _write(log, drive, lambda: progress(next(written), total))
 
 
-def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_image: Callable[[], None]) -> None:
+def _write(log: LogWriter, recording: SimulatedRecording, wrote_image: Callable[[], None]) -> None:
     for arrival, topic, number in sorted(_arrivals(recording)):
         if topic == "odometry":
             _write_odometry(log, recording, number, arrival)
@@ -61,7 +62,7 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_im
             said = json.dumps(asdict(recording.kidnapped[number][1]))
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
-            _write_image(log, recording, number, arrival, quality)
+            _write_image(log, recording, number, arrival)
             wrote_image()
 
 
@@ -98,13 +99,13 @@ def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arri
     log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.scan_times[number]), message, arrival)
 
 
-def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
+def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
     _, stamp, shot = recording.sent[number]
     camera = recording.camera
     size = {"width": camera.width, "height": camera.height_px}
     stamp += camera.delay_ns
     info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml states the rest
-    _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     image = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
     log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, image, arrival)

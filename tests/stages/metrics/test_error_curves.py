@@ -97,6 +97,6 @@ def test_frames_are_numbered_from_the_first_and_distances_are_from_the_first_tru
 )
 def test_a_visit_begins_within_the_radius_and_ends_beyond_twice_that(path: list[float], ends: list[int]):
     poses = along_x(*path)
-    assert lap_ends(poses, poses[0], 2.0) == ends
+    assert lap_ends(poses, poses[0]) == ends
     across = np.add(poses, (0.0, 0.0, np.pi / 2 + 0.01))
-    assert lap_ends(across, poses[0], 2.0) == []
+    assert lap_ends(across, poses[0]) == []

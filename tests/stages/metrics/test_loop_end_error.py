@@ -37,9 +37,9 @@ def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_e
     home = {"step": 4, "position_error_m": pytest.approx(38 / 5), "odometry_error_m": None}
     assert figures(LoopEndError(), drive)["returns"] == [home]
     monkeypatch.setattr(f"{MODULE}.FRAMES", 1)
-    monkeypatch.setattr(f"{MODULE}.HOME_M", 2.2)
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.HOME_M", 2.2)
     assert figures(LoopEndError(), drive)["returns"][0]["position_error_m"] == 5.0
-    monkeypatch.setattr(f"{MODULE}.HOME_M", 2.3)
+    monkeypatch.setattr("omninav.stages.metrics.error_curves.HOME_M", 2.3)
     assert figures(LoopEndError(), drive)["returns"] == []
 
 

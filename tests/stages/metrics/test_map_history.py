@@ -53,7 +53,7 @@ def test_a_known_map_is_there_before_the_first_event_with_what_that_removes():
     ],
 )
 def test_ground_is_new_beyond_the_radius_of_what_was_left(xs: list[float], row: int):
-    assert last_new_ground(np.array([(0.0, x) for x in xs]), 2.0) == row
+    assert last_new_ground(np.array([(0.0, x) for x in xs])) == row
 
 
 def test_without_truth_there_are_counts_but_no_errors():
