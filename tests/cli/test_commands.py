@@ -172,6 +172,8 @@ def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_sou
     ):
         assert part in selective, part
     assert "use  _target_" in omninav("stages", "metrics.map_size", check=True).stdout
+    assert "    field  values: an array of float64 >= 0" in omninav("stages", "Likelihood", check=True).stdout
+    assert "camera.unified.Unified" in omninav("stages", "camera", check=True).stdout
 
 
 def test_variants_and_doctor_answer(omninav):

@@ -1,22 +1,26 @@
-"""`omninav stages`: all stages, those of a role, or everything about one."""
+"""`omninav stages`: all stages, those of a role, or everything about one, or about a value that travels on wires."""
 
 import dataclasses
+import inspect
 import re
 import sys
 from collections.abc import Iterator
 
 from omninav.pipeline.cli.config_groups import options_with
-from omninav.pipeline.graph.parameters import Parameter
+from omninav.pipeline.graph.parameters import Parameter, first_line, read_parameters
 from omninav.pipeline.graph.ports import type_name
 from omninav.pipeline.graph.problems import counted, suggest
-from omninav.pipeline.graph.registry import Entry, UnknownStage, entries, resolve
+from omninav.pipeline.graph.registry import BUILT_IN, Entry, UnknownStage, entries, resolve
 from omninav.pipeline.graph.signature import signature
+from omninav.pipeline.graph.value import VALUE_TYPES
 
 
 def command(arguments: list[str]) -> int:
     """List stages in one line each, by role; of a stage that is named, print ports, parameters, source and use."""
     arguments = [word.replace("=", ".") for word in arguments]  # as it is typed for a run: match=l2
-    known = list(entries())
+    stages = list(entries())
+    of_stages = {entry.role for entry in stages if entry.origin == "built in"}
+    known = [*stages, *(_values() if arguments else [])]
     classes = {re.split("[.:]", entry.target)[-1]: entry.name for entry in known}
     arguments = [classes.get(word, word) for word in arguments]  # as pages name a stage: IndexedCandidates
     roles, names = {entry.role for entry in known}, {entry.name for entry in known}
@@ -28,13 +32,23 @@ def command(arguments: list[str]) -> int:
             return 2
     broken = 0
     for entry in known:
-        if arguments and entry.role not in arguments and entry.name not in arguments:
+        listed = entry.role in arguments and (entry in stages or entry.role not in of_stages)
+        if arguments and not listed and entry.name not in arguments:
             continue
         broken += bool(entry.problem)
         print("\n".join(_described(entry) if entry.name in arguments else _listed(entry)))
     if broken:
         print(f"{counted(broken, 'plugin')} cannot be loaded; all other stages can be used", file=sys.stderr)
     return 0
+
+
+def _values() -> list[Entry]:
+    """The values that omninav itself defines: their modules are imported with those of its stages."""
+    return [
+        Entry(target.removeprefix(f"{BUILT_IN}."), target, "built in", first_line(cls))
+        for target, cls in sorted(VALUE_TYPES.items())
+        if target.startswith(f"{BUILT_IN}.") and not inspect.isabstract(cls)
+    ]
 
 
 def _listed(entry: Entry) -> list[str]:
@@ -48,6 +62,9 @@ def _described(entry: Entry) -> Iterator[str]:
         yield f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n"
         return
     yield f"{entry.name}  [{entry.origin}]  {entry.summary}"
+    if value := VALUE_TYPES.get(entry.target):
+        yield from _fields(value)
+        return
     try:
         cls = resolve(entry.target)
     except UnknownStage:  # a value, which no graph names
@@ -65,6 +82,16 @@ def _described(entry: Entry) -> Iterator[str]:
     target = entry.target if entry.origin == "built in" else entry.name  # a path depends on the folder it is typed in
     for use in [*options_with(entry), f"_target_: {target}"]:
         yield f"    use  {use}"
+    yield ""
+
+
+def _fields(value: type) -> Iterator[str]:
+    """The rest of a value's docstring, and its fields."""
+    yield from (f"    {line}" for line in inspect.cleandoc(value.__doc__ or "").split("\n")[2:])
+    for field in read_parameters(value).values():
+        yield f"    field  {field.name}: {type_name(field.type)}"
+        if field.meaning:
+            yield f"           {field.meaning}"
     yield ""
 
 
