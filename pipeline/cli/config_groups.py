@@ -11,7 +11,7 @@ from importlib.resources.abc import Traversable
 from typing import Any
 
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
-from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role
+from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role, plugins
 
 from .tools import tools
 
@@ -42,6 +42,9 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
         return f"it is a command; type omninav {command} …; `omninav {command} --help` shows what it takes"
     if group in config_file() and not is_group(group):
         return f"a folder {group} in the --config-dir makes a group of this setting; move or rename that folder"
+    for entry in plugins():
+        if entry.name.partition(".")[2] == option:
+            return f"OMNINAV_STAGES or a package names it '{entry.name}'; here it must be '{group}.{option}'"
     return replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
 
 

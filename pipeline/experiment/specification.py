@@ -110,10 +110,10 @@ class Claim:
 class PageLayout:
     """Layout of the results on the page."""
 
-    rows: tuple[str, ...]
-    """Factors of the table's rows."""
     columns: str
-    """The factor of its columns."""
+    """The factor of the table's columns."""
+    rows: tuple[str, ...] = ()
+    """Factors of its rows."""
     along: str | None = None
     """A numeric factor: plots are lines along it. None: bars."""
     panels: str | None = None

@@ -220,6 +220,6 @@ def convert_fields(
         problems += found
     for name, parameter in known.items():
         if parameter.default is dataclasses.MISSING and name not in given:
-            what = f"{expected.__name__} needs '{name}' ({type_name(parameter.type)})"
+            what = f"missing, expected {type_name(parameter.type)}"
             problems.append(Problem(f"{above}{name}", what, f"type {above}{name}=…"))
     return arguments, problems

@@ -63,8 +63,9 @@ def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
     table = TerminalTable(title="Means over seeds" if sweep.seeds else None, title_justify="left", header_style="bold")
     rows = sweep.conditions
     for number, name in enumerate(sweep.settings):
-        table.add_column(name, overflow="fold")
-        width -= max(len(name), *(len(row.settings[number]) for row in rows)) + COLUMN_EDGE
+        head = name.replace(".", ".\n")  # else a long key would be broken inside a word
+        table.add_column(head, overflow="fold")
+        width -= max(*map(len, head.split()), *(len(row.settings[number]) for row in rows)) + COLUMN_EDGE
     fitting = 0
     for number, head in enumerate(sweep.heads):
         cells = max(len(row.cells[number]) for row in rows)

@@ -168,7 +168,7 @@ def test_what_is_no_result_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     for content, message in (
         (None, "no result is in it"),
         ("nothing", "is no result of an experiment"),
-        ('{"name": "one"}', "needs 'verdicts'"),
+        ('{"name": "one"}', "verdicts: missing"),
         (json.dumps(plain), "there is no 'one'"),
         (json.dumps(plain | {"command": "omninav match=l2"}), "is not of the experiment 'one'"),
         (json.dumps(plain | {"command": "omninav +experiment=light/lamps"}), "is not of the experiment 'one'"),

@@ -42,7 +42,7 @@ class Drawn:
         ([1], tuple[int, int], "p: [1] (list), expected [int, int]"),
         ({"a": "x"}, dict[str, int], "p.a: 'x' (str), expected int"),
         ({"kind": "drwan"}, Fixed | Drawn, "p.kind: 'drwan' (str), expected 'fixed' | 'drawn'"),
-        ({"kind": "drawn"}, Fixed | Drawn, "p.speeds: Drawn needs 'speeds' ([float, float])"),
+        ({"kind": "drawn"}, Fixed | Drawn, "p.speeds: missing, expected [float, float]"),
         ("x", Sequence[Any] | None, "p: 'x' (str), expected list of anything"),
     ],
 )
