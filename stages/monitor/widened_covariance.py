@@ -39,9 +39,9 @@ class WidenCovariance(Stage):
     that is off by a share of the appearance length scale, which no particle shows. So that share of the map's length
     scale, squared, is added to both variances of the position. While the estimate is more probably wrong than right,
     the robot may be anywhere in the map: the covariance is that of the map's references about the estimate, and of any
-    heading. Where landmarks gave the pose, the filter's covariance is correct, and nothing is added. From there on,
-    odometry's drift since that pose is added, until it exceeds the share. The variances of the nearest reference's own
-    pose are added always: where odometry measured the map, it is bent, which neither landmarks nor particles show.
+    heading. Where landmarks gave the pose, no share is added; from there on, odometry's drift since that pose
+    is, until it exceeds the share. The variances of the nearest reference's own pose are added always: where odometry
+    measured the map, it is bent, which neither landmarks nor particles show.
     Evaluation and choice of the share: docs/experiments/confidence.md.
     """
 
