@@ -119,7 +119,7 @@ class Run:
     def values(self, origin: str) -> Sequence[Any]:
         """Values of an output (`match.similarities`) in every frame, None where it gave none; read when looked at.
 
-        It was kept where the run was told to: `record=[match.similarities]`.
+        A run keeps it on request: `record=[match.similarities]`.
         """
         file = self.folder / recorded_name(origin)
         if not file.is_file():

@@ -128,7 +128,7 @@ class Session(AbstractContextManager["Session"]):
 
     @contextmanager
     def _alone(self, wait: bool = False) -> Iterator[None]:
-        """Keep other threads out for as long as the block runs; one that comes meanwhile waits, or is refused.
+        """Keep other threads out for as long as the block runs; another one waits, or is refused.
 
         Raises `BadInput` then, and for a process that was forked from the session's.
         """

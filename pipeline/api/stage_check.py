@@ -96,7 +96,7 @@ def _checked_steps(
 def _steps(
     stage: Stage, read: Signature, frames: Sequence[Mapping[str, Any]], seed: int, again_at: int | None = None
 ) -> list[dict[str, Any]]:
-    """The outputs for all frames; with `again_at` another copy of the stage goes on there with what was saved."""
+    """The outputs for all frames; with `again_at` another copy of the stage continues there from what was saved."""
     ctx = _context(seed)
     stage, state = _copy_of(stage, read, ctx)
     outputs = []

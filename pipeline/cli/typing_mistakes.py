@@ -1,6 +1,6 @@
 """Words of a command line that were meant otherwise: flags before a command, spaces around `=`, typographic dashes.
 
-A shell takes such words apart or hands them on as they are; what is said of them otherwise is about something else.
+A shell splits such words or passes them on unchanged; without this, errors would be about something else.
 """
 
 from collections.abc import Sequence

@@ -55,7 +55,7 @@ class Cache:
 
     @contextmanager
     def unless_full(self) -> Iterator[None]:
-        """Around what puts a result there that is at hand: a full disk is said, and no fault of the run."""
+        """Around code that stores a result: a full disk is reported, and does not fail the run."""
         try:
             yield
         except OSError as error:

@@ -86,7 +86,7 @@ def _decoded(content: bytes | memoryview, restore: Callable[[Any, memoryview], A
 
 
 def _describe_all(things: Sequence[Any], arrays: _Arrays) -> Any:
-    # what all have in common is said once; things that differ are described one by one
+    # what all have in common is stated once; things that differ are described one by one
     kinds = set(map(type, things))
     if kinds <= _PLAIN_TYPES:
         return ["plain", *things]

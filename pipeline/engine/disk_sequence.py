@@ -26,7 +26,7 @@ _BLOCK = 1 << 18
 class DiskSequence(Sequence[Any]):
     """Values in the order they came, some at a time in a record: its length, its checksum, and their bytes.
 
-    `append` adds one; it is encoded with those after it, at the latest when somebody asks for `size` or a value.
+    `append` adds one; it is encoded with those after it, at the latest when `size` or a value is read.
     Reading decodes on demand, and holds a block of the file, the values of one record, and 16 bytes for each record.
     `cut(size)` drops everything behind a byte length that a checkpoint remembers, so that a resumed run continues
     exactly where the checkpoint was. `verify` reads all of it.

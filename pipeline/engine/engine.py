@@ -45,7 +45,7 @@ class EngineOptions:
     on_tick: Callable[[int, int | None], None] = lambda done, total: None
     """Called after every tick, and by stages whose one step takes long."""
     on_status: Callable[[str], None] = lambda words: None
-    """Called with what such a stage does meanwhile, in words."""
+    """Called with what such a stage is doing, in words."""
     validate: bool = False
     """Whether every output of every tick is checked against what its type states, and not the first ones alone."""
 

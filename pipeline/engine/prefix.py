@@ -33,7 +33,7 @@ class CachedPrefix:
     key: str = ""
     """Cache key; '' where there is nothing to keep, or too much."""
     reason: str = "not cached: nothing in this graph follows from its log alone"
-    """Why it was found, or why not."""
+    """Why it was found or not."""
     replay: PrefixReplay | None = None
 
     def recorded(self) -> dict[str, Sequence[str]]:
@@ -107,7 +107,7 @@ def prefix_key(graph: Graph, nodes: frozenset[str]) -> str:
 def cached_prefix(graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()) -> Iterator[CachedPrefix]:
     """The prefix of a graph, found in the cache or to be recorded, without nodes where there is none to keep.
 
-    Others who want the same one wait meanwhile. `wanted`: outputs that are wanted of the graph's run.
+    Other runs that need the same one wait. `wanted`: outputs that the graph's run needs.
     """
     nodes = prefix_nodes(graph)
     if cache is None or not nodes or graph.source is None:

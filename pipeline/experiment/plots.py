@@ -53,7 +53,7 @@ def measure_plot(experiment: Experiment, result: ExperimentResult, name: str, fi
     measure, page = experiment.measures[name], experiment.page
     if page.along:
         content = _lines(experiment, result, name, page.along, page.panels)
-    else:  # of more rows than there are colours bars cannot be told apart
+    else:  # of more rows than there are colours bars cannot be distinguished
         content = (_bars if len(rows_of(experiment)) <= len(PALETTE) else _points)(experiment, result, name)
     what = "mean, and standard deviation over" if measure.over_runs == "mean" else f"{measure.over_runs} of"
     caption = f"{measure.title}: {what} the repetitions"

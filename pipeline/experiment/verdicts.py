@@ -47,7 +47,7 @@ class Case:
     repetitions: int = 0
     ratio: bool = False
     scenarios: int = 0
-    """Independent ones among the judged; 0 in files of before there were six."""
+    """Independent ones among the judged; 0 in files written before there were six."""
     kept: int | None = None
     """Repetitions that keep to the limit, of a claim about the worst of them; None of other claims."""
 

@@ -162,7 +162,7 @@ def _convert_union(value: Any, expected: Any, where: str) -> Any:
 
 
 def _by_kind(value: Any, options: Sequence[Any], where: str) -> Any:
-    """The option of a union that a mapping means by its `kind`, where options are dataclasses told apart by that."""
+    """The option of a union that a mapping means by its `kind`, where options are dataclasses that differ in it."""
     if not isinstance(value, Mapping) or "kind" not in value:
         return None
     groups = [option for option in options if dataclasses.is_dataclass(option) and isinstance(option, type)]

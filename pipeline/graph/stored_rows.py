@@ -12,13 +12,13 @@ T = TypeVar("T", bound=np.generic)
 Rows = npt.NDArray[np.int64]
 
 _STEP = 1 << 22
-"""Bytes that are read at once, about."""
+"""About how many bytes are read at once."""
 
 
 class StoredRows(Generic[T]):
-    """An array of which `rows[…]` gives the part that is named, and no other part is read.
+    """An array whose `rows[…]` reads only the part that is indexed.
 
-    It takes any index that numpy takes; the first index picks rows. What is given is an array of its own.
+    It takes any index that numpy takes; the first index picks rows. The result is a copy.
     `np.asarray(rows)` reads everything.
     """
 
@@ -31,7 +31,7 @@ class StoredRows(Generic[T]):
 
     @property
     def ndim(self) -> int:
-        """As of the array."""
+        """Number of axes."""
         return len(self.shape)
 
     @property

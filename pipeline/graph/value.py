@@ -14,7 +14,7 @@ class Value:
     """Base of everything that travels on a wire. A subclass becomes a frozen dataclass by itself.
 
     Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
-    `codec.py` can write. A field that files of before do not have comes last and has a default. `in_place` marks a
+    `codec.py` can write. A field that older files lack comes last and has a default. `in_place` marks a
     large value that one stage updates in place; it is then not frozen, and the engine sees to it that nobody reads it
     too late. `grows` names array fields of such a value to which rows are added and nothing else is done: a checkpoint
     writes the new ones only. `bulky` marks what is too large to be kept over a whole log: it is never cached. `costly`

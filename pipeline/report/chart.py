@@ -163,7 +163,7 @@ class Layer:
         self.marks.append(f'<polygon points="{corners}" style="{look}"/>')
 
     def ellipses(self, means: Array, covariances: Array, opacities: Array, colour: Colour, sigmas: float = 2.0) -> None:
-        """Gaussians (K, ≥2), (K, ≥2, ≥2) as ellipses of `sigmas` standard deviations, lines as opaque as said."""
+        """Gaussians (K, ≥2), (K, ≥2, ≥2) as ellipses of `sigmas` standard deviations, lines as opaque as given."""
         spread, axes = np.linalg.eigh(covariances[:, :2, :2])
         radii = sigmas * self.x.per_unit * np.sqrt(np.maximum(spread, 0.0))
         turns = -np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))

@@ -1,4 +1,4 @@
-"""Headlines: the few metrics of a run that one looks for first, each on one line."""
+"""Headlines: the few metrics of a run that are read first, each on one line."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -21,7 +21,7 @@ SUFFIX = ".value"
 def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, str], seed: int) -> Iterator[None]:
     """Around `engine.begin`: what it would take long to make is found in the cache, and what it makes is put there.
 
-    `artifacts`: the content hash of each artifact. Others who want the same value wait until it is there.
+    `artifacts`: the content hash of each artifact. Other runs that need the same value wait until it is there.
     """
     if cache is None:
         yield

@@ -35,7 +35,7 @@ def _is_drawn(node: Node, plots: str) -> bool:
 
 
 def _only_for(graph: Graph, name: str, unwanted: set[str]) -> bool:
-    """Tells whether somebody reads a node's outputs, and only those that are not wanted."""
+    """Tells whether any node reads a node's outputs, and only those that are not wanted."""
     node = graph.nodes[name]
     readers = {reader for origin in node.origins for reader in graph.readers_of(origin)}
     return bool(readers) and readers <= unwanted and not node.signature.is_source and not graph.reported([name])

@@ -122,7 +122,7 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
 
 
 def _unreadable_inputs(graph: Graph | None) -> Iterator[Problem]:
-    """Problems of inputs that a graph with other problems cannot read: a name that is misspelled is said first."""
+    """Problems of inputs that a graph with other problems cannot read: a misspelled name is reported first."""
     try:
         if graph is not None and graph.source is not None:
             graph.source.stage.inputs_digest()

@@ -24,13 +24,13 @@ WINDOW_PX = 15
 PYRAMID_LEVELS = 3
 """Times that the image is halved for large displacements."""
 MAX_FORWARD_BACKWARD_PX = 1.0
-"""Largest distance from where it began of a point that is tracked forward and backward again, pixels."""
+"""Largest forward-backward error of a tracked point, pixels."""
 SEARCH_RADIUS_PX = 8.0
 """Radius around its expected position in which a lost point is searched, pixels."""
 PATCH_RADIUS_PX = 5
 """Radius of the disc whose intensity histogram describes a point, pixels."""
 MAX_HISTOGRAM_DIFFERENCE = 0.25
-"""Half the sum of absolute differences up to which a lost point is recognised."""
+"""Largest difference of histograms at which a lost point is recognised: half the sum of absolute differences."""
 MIN_TRACKABILITY = 0.01
 """Smallest trackability at which a lost point is searched, as a share of the image's largest."""
 
@@ -102,7 +102,7 @@ def find_again(
 ) -> tuple[Array, Bools]:
     """Lost points (N, 2) around where they are `expected` (N, 2), and which were found (N,).
 
-    Of the local maxima of trackability around it, the one whose histogram differs least from `histograms_before`
+    Each is the local maximum of trackability around it whose histogram differs least from `histograms_before`
     (N, 16), if by little enough.
     """
     points, found = np.full_like(expected, np.nan), np.zeros(len(expected), np.bool_)

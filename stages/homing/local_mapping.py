@@ -56,7 +56,7 @@ MIN_VERIFIED_INLIERS = 14
 behind walls has this many, but 13 of 2,420 of places with the same walls do (docs/experiments/
 topological_nav_homing_vectors.md)."""
 MIN_BASELINE_M = 0.2
-"""Distance between the two images by odometry, metres: the same image twice would bear out the same false matches."""
+"""Distance between the two images by odometry, metres: the same image twice would confirm the same false matches."""
 MAX_DOUBTFUL_M = 0.6
 """Way after which a doubtful map that no image has shown again, and a witness, are forgotten, metres."""
 MAX_JUMP_M = 0.2
@@ -70,7 +70,7 @@ LEANING_GAIN, LEVEL_SHARE = 1.5, 0.5
 """Factor by which more matches must agree with a pose of a camera that leans than with one of an upright camera, and
 the share of all matches that may agree with the latter: from there on nothing is asked."""
 SAME_VERTICAL_DEG, MAX_VERTICALS = 1.0, 20
-"""Largest angle between two verticals that bear each other out, degrees, and how many are remembered."""
+"""Largest angle between two verticals that confirm each other, degrees, and how many are remembered."""
 
 
 class Matches(NamedTuple):
@@ -144,12 +144,12 @@ class LocalMapping(Stage):
     A relative pose with few inliers may be one of another place that looks the same. The map is `doubtful` until
     `MIN_VERIFIED_INLIERS` features agree in two images that were taken `MIN_BASELINE_M` from each other or more, and
     both give the target the same heading. Of doubtful maps the one with the most inliers is kept for a short way. A
-    target that was borne out needs one such image to be found again a short way on.
+    target that was confirmed needs one such image to be found again a short way on.
 
     Where far more matches agree with a pose of a camera that leans, in two images, the planar solver works upright.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, the unit in
-    metres is not known, and any two images bear each other out, those of a stationary robot too: the camera is the
+    metres is not known, and any two images confirm each other, those of a stationary robot too: the camera is the
     only sensor. The map has the places of the `camera`, which may sit beside the robot's axis. Raises BadInput for
     correspondences of other features.
     """
@@ -166,7 +166,7 @@ class LocalMapping(Stage):
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
     verify: bool = True
-    """Asks a second image to bear out a new map, and the target's look an arrival; the paper asks for neither."""
+    """Requires a second image to confirm a new map, and the target's look an arrival; the paper requires neither."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map knows of them."""
@@ -336,7 +336,7 @@ class LocalMapping(Stage):
         return self.verify and shown_sectors(matches.there @ turn.T, turned[same], matches.here) < SHOWN_SECTORS
 
     def _verified(self, state: LocalMappingState, new: LocalMap, with_odometry: bool) -> bool:
-        # Whether this image and one before bear each other out; without odometry place and heading do not count.
+        # Whether this image and one before confirm each other; without odometry place and heading do not count.
         if new.inliers < MIN_VERIFIED_INLIERS:
             return False
         heading = yaw_of(new.goal_rotation)

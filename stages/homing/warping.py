@@ -36,7 +36,7 @@ class MinWarping(Stage):
     of the other, each at the place and magnification in which a robot that has moved so would see it, at a distance of
     its own? Columns count by how rare as good a match is. Where enough features agree, the local map's own vector
     is given on, a doubtful one too: it is the more accurate one. The vector of whole images is `new`: no second image
-    has to bear it out. The camera moves on a plane and is upright.
+    has to confirm it. The camera moves on a plane and is upright.
 
     `ratio` is over the depth ratio at the target's first vector, `distance` the same; metres are not known. Raises
     BadInput for an image without its camera, and a camera that does not see the full circle.

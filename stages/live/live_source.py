@@ -80,7 +80,7 @@ class LiveSource(Source):
     Or a camera that is plugged into this computer: it gives images alone. Without odometry, turns are those that a
     visual compass sees, and the speed is a guess (`speed_m_s`), as of a video.
 
-    Images that were overtaken meanwhile are counted and never queued. Whatever a tick was made of is written to
+    Images that were overtaken are counted and never queued. Whatever a tick was made of is written to
     `live.mcap` in the run's folder, as it came: the same graph over that file (`log=live.mcap`) gives the same bytes.
     A run that was killed and is resumed first makes the ticks again that its record holds, then joins the robot.
 
@@ -256,9 +256,9 @@ class LiveSource(Source):
         disconnect()
 
     def _why_not(self) -> str:
-        """Inputs that were missing, as the terminal said it meanwhile."""
+        """Inputs that were missing, as the terminal reported."""
         troubles = sorted(self._transport.status.troubles.values())
-        return "; ".join(troubles) or "it was ended before the first image; let it run until the robot has been heard"
+        return "; ".join(troubles) or "it was ended before the first image; let it run until the robot sends"
 
     def _write(self, synchronizer: TimeSynchronizer, messages: list[Any]) -> None:
         if self._path is None or not isinstance(synchronizer.camera, Camera) or not synchronizer.camera.complete:

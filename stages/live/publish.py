@@ -63,8 +63,8 @@ class Publish(Publisher, Stage):
 
     The command is published as it was computed in this tick, zero where there was none, once more zero when the run
     ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
-    published; one whose type the transport does not have is left out and said in diagnostics, as are inputs that do not
-    fit each other, for as long as they do not. A robot that searches or is lost has no pose: none is published, and
+    published; one whose type the transport does not have is left out and reported in diagnostics, as are inputs that do
+    not fit each other, for as long as they do not. A robot that searches or is lost has no pose: none is published, and
     with the old transform a navigation stack stops.
     """
 

@@ -99,7 +99,7 @@ class Transport(ABC):
         """Topics that others publish now, with their types."""
 
     def mismatched(self) -> dict[str, str]:
-        """Topics of ours whose other end asks for or offers another QoS: topic -> which policy."""
+        """Topics of ours whose other end requests or offers another QoS: topic -> which policy."""
         return {}
 
     def unseen(self) -> str:

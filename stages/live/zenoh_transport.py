@@ -32,7 +32,7 @@ class ZenohTransport(Transport):
     """A zenoh session that passes CDR as nodes with `RMW_IMPLEMENTATION=rmw_zenoh_cpp` do (Jazzy and later).
 
     Data has the key `domain/topic/type/hash`; a liveliness token of each node, publisher and subscription tells the
-    others what there is; an attachment holds number, time (ns) and sender of a message. It obeys what rmw_zenoh does:
+    others what there is; an attachment holds number, time (ns) and sender of a message. It follows rmw_zenoh:
     `ZENOH_SESSION_CONFIG_URI`, a file, and `ZENOH_CONFIG_OVERRIDE`, as `key=value;key=value`. Every QoS fits.
     """
 

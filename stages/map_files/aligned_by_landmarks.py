@@ -14,13 +14,13 @@ from omninav.stages.values.maps import ReferenceGraph
 from .aligned import Alignment
 
 MAX_COMPARED = 8_000
-"""Landmarks of a map that are compared, evenly spaced: of more, enough are the same among these."""
+"""Landmarks of a map that are compared, evenly spaced: among these, two maps share enough."""
 RATIO = 0.8
 """Largest ratio of a match's distance to that of the second nearest elsewhere."""
 TOLERANCE_M = 0.15
 """Distance within which two landmarks are one: far ones are not known better, and maps are bent."""
 SAMPLES, ROUNDS = 1000, 5
-"""Pairs of matches that a motion is tried by, and rounds of least squares on those that agree with the best."""
+"""Pairs of matches from which a motion is computed, and rounds of least squares on those that agree with the best."""
 MIN_AGREEING = 50
 """Landmarks that must agree on the motion between two maps: of two houses at most a few do by chance."""
 

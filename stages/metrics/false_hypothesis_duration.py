@@ -17,7 +17,7 @@ POINTS = 30
 
 
 class FalseHypothesisDuration(MetricStage):
-    """Measures how many updates wrong hypotheses stay in a belief of Gaussians, and how their weight falls meanwhile.
+    """Measures how many updates wrong hypotheses stay in a belief of Gaussians, and how their weight falls until then.
 
     Gross, Koenig & Müller 2005, section 2.1: "the weights of all unsupported components will be reduced passively …
     after a number of update cycles they can be deleted". A hypothesis is followed along odometry from the frame in

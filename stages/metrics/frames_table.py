@@ -22,7 +22,7 @@ PLANE = (("xx", 0, 0), ("xy", 0, 1), ("xh", 0, 2), ("yy", 1, 1), ("yh", 1, 2), (
 class FramesTable(Stage):
     """Writes `frames.csv` and `frames.parquet`: a row for every frame, with estimate, truth, odometry and best match.
 
-    Poses are in metres and radians in the map frame. What there is none of is an empty cell. `runs/README.md` states
+    Poses are in metres and radians in the map frame. Missing values are empty cells. `runs/README.md` states
     what the columns are.
     """
 

@@ -24,9 +24,9 @@ SPECS = {
 class MapHistory(MetricStage):
     """Counts references added and removed, and measures the odometry drift while the first of them were learned.
 
-    A reference comes in the frame in which it was seen, however much later it is learned, and goes in the frame in
-    which it is removed; `references` and `components` are those the map has after a frame. What is learned once the
-    last log has ended, `after_last`, counts to the last frame.
+    A reference is added in the frame in which it was seen, however much later it is learned, and removed in the frame
+    in which the map forgets it; `references` and `components` are those the map has after a frame. What is learned once
+    the last log has ended, `after_last`, counts to the last frame.
 
     Under `map`: `inserted`, `removed`; `new_after_first_lap_rate`, what came after the first lap over what had come by
     its end. `map_over_steps`: lists over the frames of all logs: `step`, and `references`, `components`, `inserted`,

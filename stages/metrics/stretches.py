@@ -33,7 +33,7 @@ scales."""
 GAP_M, GAP_SHARE = 0.5, 0.1
 """Distance (m, plus a share of the metres driven) from odometry's prediction that working odometry never exceeds."""
 MAX_HEADING_ERROR_DEG = 10.0
-"""Median error of the heading of sure estimates from which it is said, degrees."""
+"""Median error of the heading of sure estimates from which on it is reported, degrees."""
 NOT_RECORDED = (
     "What single images show was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
     "particle filter in a map has, as variant=omninav."
@@ -107,7 +107,7 @@ class Log:
 
     @cached_property
     def agrees(self) -> Bools:
-        """Sure estimates that the image bears out, by landmarks or else by its best match, where these are known."""
+        """Sure estimates that the image confirms, by landmarks or else by its best match, where these are known."""
         by_match = self["match_away_m"] < self.gate if self.known("match_away_m") else np.ones(len(self), np.bool_)
         near = np.where(np.isfinite(self["landmarks_away_m"]), self["landmarks_away_m"] < NEAR_M, by_match)
         return np.asarray(self.sure & ~self.blind & near)

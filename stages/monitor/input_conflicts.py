@@ -31,7 +31,7 @@ INTERVAL_S = 0.25
 WINDOW = 128
 """Images that are remembered."""
 EVERY = 8
-"""Images between two judgements; a finding is said once two in a row agree."""
+"""Images between two judgements; a finding is reported once two in a row agree."""
 STANDS = 2
 """Judgements in a row that do not find it again, after which a finding holds no longer."""
 COLUMNS = 11
@@ -259,7 +259,7 @@ MIN_BLIND, BLIND_CORRELATION = 16, 0.15
 SURE_CORRELATION, SURE_TURN = 0.4, math.radians(3.0)
 """Turns are seen where images correlate so much, and above what parallax looks like (rad)."""
 MIN_SEEN_TURN = math.pi / 2.0
-"""Least turning of the images, to either side, before anything is said of turns (rad)."""
+"""Least turning of the images, to either side, before turns are judged (rad)."""
 STILL_M, STILL_RAD = 1e-3, 1e-3
 """Odometry that stays below these over all images stands still (m, rad)."""
 NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
@@ -284,7 +284,7 @@ NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
 """A match is at the estimate within this many length scales, turned by less than this (rad)."""
 SCATTERED, ELSEWHERE = 0.05, 0.1
 """Largest shares, over a whole window, of pairs of matches that agree with odometry and of matches at the estimate,
-with which images are said to fit no place of the map."""
+with which images count as fitting no place of the map."""
 
 
 def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
@@ -355,7 +355,7 @@ def turned(watched: Watched, length_scale_m: float) -> str:
 
 
 def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> str:
-    """Images that show turns when odometry does not measure them; the robot drives at least so far meanwhile (m)."""
+    """Images that show turns when odometry does not measure them; the robot drives at least this far (m)."""
     seen = watched.sure_turns
     if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_SEEN_TURN or watched.radians == 0.0:
         return ""

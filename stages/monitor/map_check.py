@@ -15,7 +15,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from .turn_fit import explained
 
 MIN_REFERENCES = 20
-"""References without which nothing is said."""
+"""References without which nothing is judged."""
 MAX_COMPARED = 1000
 """References of a larger map that an image is compared with, evenly spaced, beside its neighbours."""
 NEIGHBOURS = 4

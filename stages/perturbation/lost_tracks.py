@@ -12,7 +12,7 @@ from omninav.stages.values.homing import LOST, TrackedFeatures
 class LoseTracks(Stage):
     """Loses a random share of the tracked points, different ones at every tick, to imitate people who walk by.
 
-    The tracker then knows no more of where they are: the local map has to find them again (Goedemé et al. 2007, section
+    The tracker no longer knows where they are: the local map has to find them again (Goedemé et al. 2007, section
     7.2.2).
     """
 

@@ -22,13 +22,13 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
 
 MIN_PROBABILITY = 0.5
-"""Least confidence in the estimate with which the robot drives, and probability of a pose that tells of an arrival."""
+"""Least confidence in the estimate with which the robot drives, and probability of a pose that proves an arrival."""
 MIN_GOAL_PROBABILITY, SURE_GOAL_PROBABILITY = 0.2, 0.95
 """Least probability of a pose of the goal's image that the robot drives to, and the one below which it compares images
 there: of 168 goals in rooms' middles 21 have less than 0.9, 16 of them a right pose (docs/experiments/landmarks.md)."""
 UNLIKE_IMAGES = 5
 """Images in a row that do not look like a doubtful goal's, at its place, after which it is given up: a person may be
-before the camera."""
+in front of it."""
 LOOKAHEAD_M = 0.8
 """Distance along the path of the point that the robot drives towards, metres."""
 LEG_M = 2.0
@@ -53,7 +53,7 @@ class RoadmapPlannerState(State):
     """The goal and the path there.
 
     `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `rivals` (K, 3): where else its image
-    may have been taken; `doubtful`: whether the look of the place has to bear it out. `metres`, `next` (R,): of the
+    may have been taken; `doubtful`: whether the look of the place has to confirm it. `metres`, `next` (R,): of the
     shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, and
     `retry`: from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
     None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
@@ -89,11 +89,11 @@ class RoadmapPlanner(Stage):
     The roadmap's points are the references, joined along the drive and wherever two are closer than the robot is wide,
     so that no wall is between them. The goal's pose is that of its image by landmarks. While the confidence in its own
     pose is high enough, the robot drives towards a point a short way ahead (pure pursuit); else it is lost, until
-    landmarks tell. It has arrived where landmarks in its present image show so. Where they are not sure of the goal,
-    few are seen there: then its estimate tells too, and its image must show what the goal's does; else it continues to
-    the other place that they name. Where a path is blocked, ways around are preferred; where none leads past that
-    place, it gives up. Blocked within its own radius of the goal, it ends there. Raises BadInput for a goal that the
-    map's landmarks cannot place.
+    landmarks locate it. It has arrived where landmarks in its present image show so. Where they are not sure of the
+    goal, few are seen there: then its estimate counts too, and its image must show what the goal's does; else it
+    continues to the other place that they name. Where a path is blocked, ways around are preferred; where none leads
+    past that place, it gives up. Blocked within its own radius of the goal, it ends there. Raises BadInput for a goal
+    that the map's landmarks cannot place.
     """
 
     goal: str | int | None = None
@@ -123,7 +123,7 @@ class RoadmapPlanner(Stage):
         status: DrivingStatus | None = None,
         point: GoalPoint | None = None,
     ) -> Out:
-        """Say where to drive; `status` is that of the tick before, `point` where a running robot is asked to go."""
+        """Give the vector to drive along; `status` is that of the tick before, `point` a new goal of a running robot."""
         if point is not None:
             self._set_out(state, map, np.array([point.x, point.y, math.nan]))
             state.rivals, state.doubtful, state.asked = np.zeros((0, 3)), False, state.asked + 1
@@ -273,7 +273,7 @@ def goal_poses(
     goal: str | int | None, fix: LandmarkFix | None, features: LocalFeatures | None, map: ReferenceGraph
 ) -> tuple[Array, bool]:
     """The poses (K, 3) from which the goal's image may have been taken, the likeliest first; and whether it is doubtful
-    that the first is right. Raises BadInput where landmarks tell none."""
+    that the first is right. Raises BadInput where landmarks give none."""
     if map.landmarks is None:
         raise BadInput("goal: the map was saved without landmarks; learn it again from its tour with landmarks=sift")
     if fix is not None and fix.probabilities[0] >= MIN_GOAL_PROBABILITY:

@@ -34,7 +34,7 @@ class ShortestPathPlannerState(State):
     `planned`: routes so far; `waiting_since` (ns): since when there has been reason to plan, None: there is none.
     `failed_links` (F, 2): the links on which routes have failed, a place with itself for its own medoid, with which a
     route begins; `failures` (F,): how often. `why`: the last reason to plan, `blocked`: the last reason why the way was
-    blocked; `ended`: how the route ended, "" if it has not. `asked`: the place that somebody has named since (-1:
+    blocked; `ended`: how the route ended, "" if it has not. `asked`: the place that was named since (-1:
     none has), and whether that is still to be planned for (`renewed`).
     """
 

@@ -1,4 +1,4 @@
-"""Keeps the few numbers of a tick from which its messages can be made whenever somebody wants them."""
+"""Keeps the few numbers of a tick from which its messages can be made on demand."""
 
 from dataclasses import replace
 from typing import Annotated, Any

@@ -306,7 +306,7 @@ class Sensor:
     exposure_period: Positive = 23.0
     """Period (s) of that change."""
     shutter: Spread = 0.0
-    """Exposure time (s): whatever moves meanwhile is blurred."""
+    """Exposure time (s): motion during it is blurred."""
     sub_exposures: Annotated[int, Bounds(ge=1)] = 6
     """Instants within the exposure time that are rendered and averaged."""
     exposure_jumps: Spread = 0.0

@@ -16,7 +16,7 @@ from .world import World
 class OtherDay(Stage):
     """Renders the image at the robot's true pose on another day, in that day's light and without people.
 
-    For what is said to stay the same as the light changes: of no two drives are images taken from the same places.
+    For claims that nothing changes with the light: no two drives have images from the same places.
     Noise is drawn for each image.
     """
 

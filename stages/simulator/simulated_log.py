@@ -34,7 +34,7 @@ def record(
     Topics as every recording has them: JPEG images, camera information, odometry, truth, ranges (`/scan`); what was
     done to the robot is on `/ground_truth/event` as JSON; camera.yaml is attached, and rooms.yaml where rooms have
     names. Odometry, truth and ranges come at their own rates. Log times run behind header stamps as a camera's, a
-    wheel's and a ring's do. `progress` hears of every image: how many are written, of how many.
+    wheel's and a ring's do. `progress` is called for every image: how many are written, of how many.
     """
     drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
     total = sum(len(drive.sent) for drive in drives)

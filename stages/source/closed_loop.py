@@ -75,10 +75,10 @@ class ClosedLoop(Source):
     """Pose from which it starts instead: x, y (m), heading (rad); `drawn`: anywhere on the free floor, another
     place for every seed."""
     carried_m: Annotated[float, Bounds(ge=0)] = 0.0
-    """With a drawn start: how far away (m) somebody puts it down after half a second, where the straight way back is
+    """With a drawn start: how far away (m) it is put down after half a second, where the straight way back is
     free."""
     kidnapped_every_m: Annotated[float, Bounds(ge=0)] = 0.0
-    """Metres that it drives until somebody puts it down elsewhere, anywhere on the free floor, again and again; 0:
+    """Metres that it drives until it is put down elsewhere, anywhere on the free floor, again and again; 0:
     never."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     """Longest drive, s."""
@@ -89,7 +89,7 @@ class ClosedLoop(Source):
     goals: tuple[tuple[float, float], ...] = ()
     """Points that it is asked to drive on to, x, y (m), each once its route has ended: it has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
-    """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
+    """When and how it is lifted: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
     class Out(Outputs):
         tick: Tick

@@ -1,4 +1,4 @@
-"""A log whose middle is cut out: to the robot it is as if somebody had carried it over that part of its way."""
+"""A log whose middle is cut out: to the robot it is as if it were carried over that part."""
 
 from collections.abc import Sequence
 
@@ -50,7 +50,7 @@ def crossed(cuts: Sequence[Cut], frames: Ints) -> Bools:
 
 
 def as_if_driven(poses: Array, cuts: Sequence[Cut]) -> Array:
-    """Poses (N, 3) as an odometry gives them that knows nothing of the cuts.
+    """Poses (N, 3) as odometry that does not know of the cuts gives them.
 
     What was measured on the way from image `to - 1` to image `to` is measured from the last one before the cut.
     """

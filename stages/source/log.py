@@ -40,7 +40,7 @@ class LogSource(Playback):
 
     A log without odometry and positions (a video, images alone) is driven by a guess: `speed_m_s` straight ahead, and
     the turns that a visual compass finds (`odometry: guessed`). A graph that reads its motion tick by tick is refused
-    (`UnreadableRecording`) until somebody states that speed.
+    (`UnreadableRecording`) until that speed is stated.
     """
 
     log: str | tuple[str, ...] | None = None

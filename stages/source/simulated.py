@@ -30,7 +30,7 @@ class SimulatedSource(Playback):
     day: int | tuple[int, ...] = 1
     """On which day of the world, or one after the other on several."""
     kidnappings: tuple[Kidnapping, ...] = ()
-    """When and how somebody lifts the robot: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
+    """When and how the robot is lifted: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
     def recordings(self) -> list[Recording]:
         """Plan the drives, one for each day."""

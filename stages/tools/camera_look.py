@@ -26,7 +26,7 @@ class LookThroughCamera(Tool):
     """Writes one image of a log, unwarped, as a PNG with azimuths and, where they are known, elevations.
 
     Upright things are upright in it, the horizon is level, and what is ahead of the robot is at 0 degrees, or the
-    camera is not what it is said to be. Raises BadInput where the log cannot be read.
+    camera is not as described. Raises BadInput where the log cannot be read.
     """
 
     example = "log=drive.mp4 camera=camera.yaml out=look.png"

@@ -7,7 +7,7 @@ from omninav.stages.recordings.description import DataSet, known_layouts, read_d
 class ListData(Tool):
     """Prints the data sets read without conversion: where to get them, and how to run them.
 
-    Raises BadInput for a name of which there is none.
+    Raises BadInput for an unknown name.
     """
 
     example = "cold"

@@ -30,7 +30,7 @@ class JoinMaps(Tool):
     maps: str | tuple[str, ...]
     """The maps (.omap), at least two."""
     same_frame: bool = False
-    """States that the poses of all maps are in one frame, so that they stay. It need not be said of poses from ground
+    """States that the poses of all maps are in one frame, so that they stay. It is not needed for poses from ground
     truth; those from odometry start again with every tour, and are aligned by what looks alike."""
     out: str = "joined.omap"
     """The file to write."""

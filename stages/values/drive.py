@@ -57,11 +57,11 @@ class Drive(Value):
     reference_turn: Array
     """Turn of the robot against it (rad, counter-clockwise); NaN where there is none."""
     confidence: Array
-    """Probability that the estimate is right, as a monitor tells it; NaN where there is none."""
+    """Probability that the estimate is right, by a monitor; NaN where there is none."""
     evidence: Array
     """Evidence of each image on the estimate (N, `EVIDENCE`); NaN where there is none."""
     state: Ints
-    """Which of `TRACKING_STATES` it is in, as a monitor tells it; -1 where there is none."""
+    """Which of `TRACKING_STATES` it is in, by a monitor; -1 where there is none."""
     conflict: Ints
     """Which of `conflicts` held first at each image; -1 where none did."""
     conflicts: tuple[str, ...]

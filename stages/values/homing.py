@@ -46,8 +46,8 @@ class HomingVector(Value):
     towards this target began, the same unless the map was made again. `depth_ratio`: the distance over a typical
     feature's, small where the two views hardly differ. `metres`: the distance, where odometry has told the unit.
     `inliers`: features that agree with it. `state`: `new` (from two views), `tracking` (from the local map), `doubtful`
-    (from two views, and no other image has borne out yet that they show one place), or `lost`; of the last two `why`.
-    What is said of a lost target is what was known last, moved on by odometry where there is any.
+    (from two views, and no other image has confirmed yet that they show one place), or `lost`; of the last two `why`.
+    Values of a lost target are those known last, moved on by odometry where there is any.
     """
 
     number: int

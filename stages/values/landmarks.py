@@ -23,7 +23,7 @@ class Landmarks(Value):
     sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a bearing, as the map's
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
     `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
-    `camera`: the text of the `camera.yaml` that the map's images ask for, empty where it is as it was described.
+    `camera`: the text of the `camera.yaml` that fits the map's images, empty where it is as it was described.
     `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings imply.
     `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description states and as
     its images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).

@@ -25,7 +25,7 @@ class Similarities(Value):
     * `colour_scale` alone: S = 1 - |difference of the whole views| / `colour_scale`;
     * neither: otherwise, as no other stage can.
 
-    `last_view`: similarity to the view before, at the best heading; None at the first, and where nobody asks for it.
+    `last_view`: similarity to the view before, at the best heading; None at the first, and where it is not requested.
     """
 
     values: Annotated[Floats, Shape("references", "headings"), Bounds(ge=0, le=1)]

@@ -33,7 +33,7 @@ class Stretch(Value):
     evidence: str
     """The same with the numbers that support it, a sentence; with ground truth how far the estimate was off."""
     advice: str
-    """Advice: a line to type, or a thing to check; empty where there is none."""
+    """Advice: a line to type, or a thing to check; or empty."""
 
 
 class Stretches(Value):

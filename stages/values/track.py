@@ -4,10 +4,10 @@ from omninav.pipeline import Value
 
 
 class Track(Value):
-    """Continuity since landmarks surely told where the robot was: `unbroken` while each image continues the last.
+    """Continuity since landmarks last surely located the robot: `unbroken` while each image continues the last.
 
     `carried`: this image shows other surroundings than the one before, though by odometry they are not far apart, so
-    that somebody carried the robot, and nothing from before that tells where it is.
+    that the robot was carried, and nothing from before that shows where it is.
     """
 
     unbroken: bool

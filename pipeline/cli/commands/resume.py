@@ -26,7 +26,7 @@ class ExperimentState:
 
 
 def command(arguments: list[str]) -> int:
-    """Go on with the run in a folder, from where it was stopped.
+    """Continue the run in a folder from where it was stopped.
 
     Of the stages that the folder names, those that `omninav stages` lists are run; others only where their module or
     file is typed after the folder, and programs (`command=`) only where they are.
@@ -72,7 +72,7 @@ def _resume_experiment(folder: Path) -> int:
         raise BadInput(f"{file}: it does not state how the experiment was started; type its command again")
     words, place = list(state["argv"][1:]), Path(state["cwd"])
     refuse_unreadable(words)
-    if read_flags(words).multirun:  # whose jobs would know nothing of what was typed
+    if read_flags(words).multirun:  # whose jobs would not know what was typed
         raise BadInput(f"{file}: it is of a sweep, not of an experiment; type the sweep's command again")
     print(f"{one_line(shlex.join(['omninav', *words]))}   (in {place})", flush=True)
     os.chdir(place)
