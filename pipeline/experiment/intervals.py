@@ -46,7 +46,7 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
 
 
 def share_interval(met: int, of: int) -> tuple[float, float]:
-    """95 % interval (Wilson's) of the share of runs of which `met` of `of` did something."""
+    """95 % interval (Wilson's) of a share of runs: `met` of `of`."""
     from scipy.stats import binomtest  # type: ignore[attr-defined]
 
     interval = binomtest(met, of).proportion_ci(CONFIDENCE, method="wilson")

@@ -34,7 +34,7 @@ class WaypointImagesState(State):
 
 
 class WaypointImages(Stage):
-    """Goes on to the next view of a path as soon as one is close enough, and stops at the last with its heading.
+    """Moves on to the next view of a path as soon as one is close enough, and stops at the last with its heading.
 
     Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it is behind and less than half of the
     way to it is left. At the last view the robot only turns, until it has the view's heading. A lost target's vector

@@ -28,14 +28,14 @@ class LiveStatus:
         self._ended: deque[float] = deque(maxlen=100)
 
     def note(self, what: str, trouble: str) -> None:
-        """Say what is wrong with something, "" once it is well."""
+        """Report what is wrong with something, "" once it is right."""
         if trouble:
             self.troubles[what] = trouble
         else:
             self.troubles.pop(what, None)
 
     def news(self) -> list[str]:
-        """Why something is left out, of what has not been said yet."""
+        """Reasons why something is left out that were not reported yet."""
         unsaid = [why for what, why in sorted(self.left_out.items()) if what not in self._reported]
         self._reported |= self.left_out.keys()
         return unsaid

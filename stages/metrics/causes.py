@@ -156,7 +156,7 @@ def not_recorded(part: Part) -> Verdict | None:
 
 
 def off_the_map(part: Part) -> Verdict | None:
-    """The estimate is beside all that the map shows."""
+    """The estimate is off the map."""
     if part.state != "unsure" or part.log.off_map[part.first : part.last + 1].mean() < 0.5:
         return None
     words = (

@@ -21,7 +21,7 @@ SPECS = {
 class DriveSummary(MetricStage):
     """Measures how long and how far a robot drove by itself, and in a simulated world its collisions.
 
-    `stopped_share`: of the time from its first move to its last, in which it made no way. Of a real robot nobody
+    `stopped_share`: of the time from its first move to its last, in which it did not move. Of a real robot nobody
     tallies contacts, and the distance is that of its odometry.
     """
 

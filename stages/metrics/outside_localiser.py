@@ -62,7 +62,7 @@ SPECS = {
 
 
 class OutsideLocaliser(Stage):
-    """Gives a program the images of a map and of a drive as files, and takes its poses for the drive's estimates.
+    """Gives a program the images of a map and of a drive as files, and uses its poses as the drive's estimates.
 
     It is called as `COMMAND FOLDER` after the last image, and reads and writes what `recordings/localiser_folder.py`
     says. Under `peer`: its processor time with that of its children, in all (`cpu_s`), and where its `poses.csv` says

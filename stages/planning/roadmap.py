@@ -123,7 +123,7 @@ class RoadmapPlanner(Stage):
         status: DrivingStatus | None = None,
         point: GoalPoint | None = None,
     ) -> Out:
-        """Give the vector to drive along; `status` is that of the tick before, `point` a new goal of a running robot."""
+        """Give the vector to drive along; `status`: of the tick before, `point` a new goal of a robot that runs."""
         if point is not None:
             self._set_out(state, map, np.array([point.x, point.y, math.nan]))
             state.rivals, state.doubtful, state.asked = np.zeros((0, 3)), False, state.asked + 1

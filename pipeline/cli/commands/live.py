@@ -23,7 +23,7 @@ def live_words(arguments: list[str]) -> list[str]:
     """Gives the words of `omninav` or `omninav check` that replace those typed behind `omninav live`."""
     typed = dict(word.split("=", 1) for word in arguments if "=" in word)
     if typed.get("log", "live") != "live":
-        typed.setdefault("publish", "")  # what is plugged into this computer has nobody to tell it to
+        typed.setdefault("publish", "")  # a device of this computer has no subscriber
     return [*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments]
 
 
