@@ -27,7 +27,7 @@ class StageFailed(Exception):
 
 
 class Call:
-    """A node made ready to run: where its inputs lie and where its outputs go."""
+    """A node made ready to run: where its inputs are and where its outputs go."""
 
     def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str], validate: bool = False) -> None:
         self.node, self.ctx = node, ctx
@@ -113,7 +113,7 @@ class Call:
                 raise StageFailed(one_line(f"{self._place()}: its output '{name}' {wrong}"))
 
     def _failed(self, error: BaseException, place: str) -> Exception:
-        """The error that says which stage failed, and when."""
+        """The error that states which stage failed, and when."""
         message = f"{place}: {type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno in DISK:
             return BadInput(f"{message}; {HINTS[error.errno]}")

@@ -17,7 +17,7 @@ class Problem:
     """One thing that is wrong.
 
     `where`: the config path (`nodes.smoothing.gain`) or file; `what`: what was found and what was expected;
-    `hint`: what to type or where to look, '' where there is nothing useful to say.
+    `hint`: what to type or where to look, '' where there is nothing useful.
     """
 
     where: str
@@ -69,8 +69,8 @@ def cut(value: Any) -> str:
 
 
 HINTS = {
-    errno.ENOSPC: "free some space; a run that had begun goes on by `omninav resume`",
-    errno.EDQUOT: "free some space; a run that had begun goes on by `omninav resume`",
+    errno.ENOSPC: "free some space; `omninav resume` continues a run that had begun",
+    errno.EDQUOT: "free some space; `omninav resume` continues a run that had begun",
     errno.EFBIG: "a file may not grow so large; raise the limit (`ulimit -f`), or name another disk",
     errno.EROFS: "nothing can be written there; name another place, of a run: runs=FOLDER cache=FOLDER/.cache",
     errno.EACCES: "it cannot be read or written by you; name another, of a run: runs=FOLDER cache=null",
@@ -94,9 +94,9 @@ def as_bad_input(error: BaseException) -> BadInput | None:
         file = error.filename if error.filename2 is None else error.filename2  # of a copy, the file that it makes
         where = "" if file is None else f"{file}: "
         number = error.errno or 0
-        if error.strerror != os.strerror(number):  # words of ours, which say what to do
+        if error.strerror != os.strerror(number):  # words of ours on what to do
             return BadInput(f"{where}{error.strerror or error}")
-        hint = HINTS.get(number, "name another" if where else "nothing says which file")
+        hint = HINTS.get(number, "name another" if where else "the system does not name the file")
         return BadInput(f"{where}{error.strerror}; {hint}")
     if isinstance(error, MemoryError):
         return BadInput("there is no memory left; close other programs, or raise the limit (`ulimit -v`)")

@@ -47,7 +47,7 @@ SETTING = re.compile(r"[+~]*[\w./]+=")
 
 
 class UnknownStage(Exception):
-    """A name behind which there is no stage class. The message says what is there instead."""
+    """A name behind which there is no stage class. The message states what is there instead."""
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ def offered(role: str) -> list[Entry]:
 
 
 def _imported(entry: Entry) -> Entry:
-    """A plugin with what its class says of itself, or with its problem."""
+    """A plugin with its class's description, or with its problem."""
     if entry.problem:
         return entry
     try:

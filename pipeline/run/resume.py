@@ -25,7 +25,7 @@ from .run_folder import CONFIG, STEPS, RunFolder
 
 @dataclass(frozen=True)
 class Manifest:
-    """State that a run goes on from."""
+    """State from which a run continues."""
 
     status: str
     argv: tuple[str, ...]
@@ -105,7 +105,7 @@ def complete_run(folder: Path) -> tuple[RunFolder, str]:
     began, config = _beginning(run, folder)
     if began.status != "complete":
         raise BadInput(
-            f"{folder}: the run is {began.status:.40}; `omninav resume {shlex.quote(str(folder))}` goes on with it"
+            f"{folder}: the run is {began.status:.40}; `omninav resume {shlex.quote(str(folder))}` continues it"
         )
     return run, config
 

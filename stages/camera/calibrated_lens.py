@@ -37,7 +37,7 @@ def smallest_root(polynomial: np.polynomial.Polynomial) -> float:
 
 
 class CalibratedLens(IntrinsicMatrix, Camera):
-    """A camera whose optical axis is the robot's z; a subclass says how its lens or mirror projects.
+    """A camera whose optical axis is the robot's z; a subclass defines how its lens or mirror projects.
 
     u runs along the camera's x and v along its y, so a pixel's bearing is atan2(v - cy, u - cx) + yaw.
     """

@@ -48,7 +48,7 @@ class Donut(Camera, projection="donut"):
         return self.ring is not None
 
     def found_in(self, pixels: Pixels) -> Self | None:
-        """The donut with the numbers that it leaves open as an image shows them; None where no ring stands out."""
+        """The donut with the numbers that it leaves open as an image shows them; None where no ring is found."""
         if self.complete:
             return self
         try:

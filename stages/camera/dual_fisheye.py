@@ -1,4 +1,4 @@
-"""Two fisheye lenses back to back, whose images lie side by side in one, as 360-degree cameras record them."""
+"""Two fisheye lenses back to back, whose images are side by side in one, as 360-degree cameras record them."""
 
 import math
 from typing import Annotated, Self
@@ -48,7 +48,7 @@ class DualFisheye(Camera, projection="dual_fisheye"):
         return math.pi / 2, -math.pi / 2
 
     def shows(self, pixels: Array) -> Bools:
-        """Which pixels lie in the image and show what the other lens's axis is not nearer to."""
+        """Which pixels are in the image and show what the other lens's axis is not nearer to."""
         radius = min(self.outer_radius_px, self.focal_px * math.pi / 2 + 1e-6)
         inside: Bools = super().shows(pixels) & (self._away(pixels).min(axis=0) <= radius)
         return inside

@@ -31,7 +31,7 @@ class Equirectangular(Strip, projection="equirectangular"):
 
 
 def panorama_camera(panorama: Panorama) -> Equirectangular:
-    """The camera that would have taken a panorama; its elevations are a guess where the panorama does not say them."""
+    """The camera that would have taken a panorama; its elevations are a guess where the panorama has none stated."""
     rows, columns = panorama.pixels.shape[:2]
     top, bottom = panorama.elevation_top, panorama.elevation_bottom
     return Equirectangular(columns, rows, columns / 2, elevation_top=top, elevation_bottom=bottom)

@@ -12,7 +12,7 @@ from .model import Ring
 
 
 class RingNotFound(ValueError):
-    """No ring stands out in the image."""
+    """No ring is found in the image."""
 
 
 MIN_SCORE = 1.0
@@ -41,7 +41,7 @@ def radial_edges(grey: Floats, centre: tuple[float, float], radii: int, rays: in
 
 
 def find_ring(pixels: Pixels) -> Ring:
-    """Centre and radii of the mirror's ring in an image; raises RingNotFound where no ring stands out.
+    """Centre and radii of the mirror's ring in an image; raises RingNotFound where there is none.
 
     The ring is the pair of circles around one centre near the image's middle that are edges over most of their
     length: the mirror's rim, and, within 45 percent of it, the camera's own reflection. That they share a centre is
@@ -74,7 +74,7 @@ def find_ring(pixels: Pixels) -> Ring:
                     inner = low + int(np.argmax(edges[low : high[at] + 1]))
         span, step = 1.5 * step, step / 3
     if best < MIN_SCORE:
-        raise RingNotFound("no ring stands out")
+        raise RingNotFound("no ring is found")
     # Half a pixel of the small image within the rim, and outside of the camera's reflection.
     return Ring(
         (centre[0] + 0.5) * scale - 0.5, (centre[1] + 0.5) * scale - 0.5, (inner + 1.5) * scale, (outer - 0.5) * scale

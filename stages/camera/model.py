@@ -1,7 +1,7 @@
 """Interface of every camera model: where a ray is seen, where a pixel looks, and what of the image shows the world.
 
 A model is one file in this folder. Everything else (panoramas, windows, bearings, thumbnails, the simulator's rays,
-camera.yaml) follows from what it says here.
+camera.yaml) follows from what it states here.
 """
 
 import importlib
@@ -28,7 +28,7 @@ mirror, has u along x and v along y, so its bearings atan2(v, u) grow clockwise 
 class Key(NamedTuple):
     """Place of a parameter in `camera.yaml`: a section and a name in it, or the matrix K and a place in it (row-major).
 
-    A parameter without a key stands at the top under its own name. Of several keys any is accepted when the file is
+    A parameter without a key is at the top under its own name. Of several keys any is accepted when the file is
     read, and the first is used when it is written.
     """
 
@@ -62,7 +62,7 @@ class Ring(NamedTuple):
     outer: float
 
     def holds(self, u: Array, v: Array) -> Bools:
-        """Which pixels lie in it, of columns and rows of any shapes that go together."""
+        """Which pixels are in it, of columns and rows of any shapes that go together."""
         radius = np.hypot(u - self.centre_x, v - self.centre_y)
         inside: Bools = (radius >= self.inner) & (radius <= self.outer)
         return inside
@@ -76,13 +76,13 @@ class Camera(Value, ABC):
     """A camera: rays of the robot's frame (x forward, y left, z up) to pixels (column u, row v) and back.
 
     A subclass is a model and names itself: `class Fisheye(Camera, projection="fisheye")`. Its fields are what
-    camera.yaml says of it. Raises ValueError for fields that contradict each other. Integer coordinates are the
+    camera.yaml states of it. Raises ValueError for fields that contradict each other. Integer coordinates are the
     centres of pixels.
     """
 
     projection: ClassVar[str]
     wraps: ClassVar[bool] = False
-    """The image is a full circle itself: its left edge goes on at its right one."""
+    """The image is a full circle itself: its left edge continues at its right one."""
     sees_itself: ClassVar[bool] = False
     """The camera's housing is seen in the middle of its own image, as under a mirror."""
 
@@ -182,7 +182,7 @@ class Camera(Value, ABC):
         return self
 
     def shows(self, pixels: Array) -> Bools:
-        """Which pixels (..., 2), whole or not, lie in the image and, where it has one, in its ring: (...,)."""
+        """Which pixels (..., 2), whole or not, are in the image and, where it has one, in its ring: (...,)."""
         u, v = pixels[..., 0], pixels[..., 1]
         inside: Bools = (u >= 0.0) & (u <= self.width - 1.0) & (v >= 0.0) & (v <= self.height_px - 1.0)
         return inside if self.ring is None else inside & self.ring.holds(u, v)
@@ -203,7 +203,7 @@ class Camera(Value, ABC):
 
     @classmethod
     def of_size(cls, width: int, height: int) -> Self | None:
-        """The usual camera of this kind whose images are of a size (pixels); None where a size says too little."""
+        """The usual camera of this kind whose images are of a size (pixels); None where a size is not enough."""
         return None
 
     @classmethod
@@ -215,7 +215,7 @@ class Camera(Value, ABC):
 def camera_models() -> dict[str, type[Camera]]:
     """All camera models by their names in camera.yaml: those of this folder, and those that others offer (`registry`).
 
-    One that cannot be imported is missing; `omninav stages camera` says why.
+    One that cannot be imported is missing; `omninav stages camera` states why.
     """
     for file in sorted(Path(__file__).parent.glob("[a-z]*.py")):
         importlib.import_module(f"{__package__}.{file.stem}")

@@ -24,7 +24,7 @@ class Perspective(IntrinsicMatrix, Camera, projection="perspective"):
     skew: Skew = 0.0
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
-        """p ~ K (-y, -z, x); what lies behind is not shown."""
+        """p ~ K (-y, -z, x); what is behind is not shown."""
         ahead = turned(rays, -self.yaw)
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = np.where(ahead[..., 0] > 0.0, ahead[..., 0], np.nan)

@@ -22,7 +22,7 @@ AXIS = {"centre_x": math.inf, "centre_y": math.inf}
 TILT = ("roll", "pitch")
 """Parameters of a camera that leans (rad): it is turned about x by the roll, then about y by the pitch."""
 TILT_SIGMA = math.radians(3.0)
-"""Standard deviation of a camera's roll and pitch (rad) that nothing says: of what is screwed on by eye."""
+"""Standard deviation of a camera's roll and pitch (rad) that nothing states: of what is screwed on by eye."""
 STEPS = math.radians(2.5), math.radians(0.5)
 """Spacing of the horizons that are tried, of all and around the best (rad): 5 degrees off, half as many fit."""
 MIN_GAIN = 1.3
@@ -34,8 +34,8 @@ MIN_FITTING = 100
 def adjustable(camera: Camera, pixels: Array, sigmas: Mapping[str, float] = AXIS) -> Lens:
     """Fields of a camera as parameters that `adjusted` corrects, seen at `pixels` (O, 2).
 
-    `sigmas`: the fields by name, and the standard deviations of what the camera's description says of them, in their
-    own units. On a flat floor the yaw is not told from the headings unless there is odometry, and the scale of
+    `sigmas`: the fields by name, and the standard deviations of what the camera's description states, in their
+    own units. On a flat floor the yaw is not separable from the headings unless there is odometry, and the scale of
     elevations not from that of heights: a focal length, or a mirror's half axis, needs a small standard deviation. A
     pixel that looks nowhere has a bearing of zero, which agrees with no landmark. Raises BadInput for a field that the
     camera does not have, or that holds no number.
@@ -82,7 +82,7 @@ def leaning(rays: Array, roll: float, pitch: float) -> Array:
 
 def observed(camera: Camera, poses_given: bool) -> dict[str, float]:
     """The fields that a drive on a floor shows, for `adjustable`: where the axis meets the image, and the yaw too where
-    poses are given. None of a camera without a ring, whose centre is hardly told from its heading."""
+    poses are given. None of a camera without a ring, whose centre is hardly separable from its heading."""
     numbers = {each.name for each in fields(camera) if type(getattr(camera, each.name)) is float}
     if camera.ring is None or not camera.elevations_known or not numbers >= set(AXIS):
         return {}
@@ -95,7 +95,7 @@ def with_elevations_found(
     """The strip with the elevations at which most matches fit the motion between their references.
 
     `pixels` (F, 2) of all features, `poses` (R, 3) of the references. Pixels are taken to be square. None where the
-    camera is no strip or says its elevations, and where the guess, the horizon in the middle, is about as good.
+    camera is no strip or states its elevations, and where the guess, the horizon in the middle, is about as good.
     """
     if not isinstance(camera, Strip) or camera.elevations_known or not len(matches.first):
         return None

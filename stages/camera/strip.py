@@ -19,7 +19,7 @@ Bottom = Annotated[float, Key("elevation", "bottom"), Elevation]
 
 
 class Strip(Camera):
-    """Columns are azimuths at equal steps. A subclass says how rows follow from elevations."""
+    """Columns are azimuths at equal steps. A subclass defines how rows follow from elevations."""
 
     wraps = True
 

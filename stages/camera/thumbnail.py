@@ -31,7 +31,7 @@ class Thumbnail(NamedTuple):
 
 
 def thumbnail(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
-    """An image (rows, columns, 3) of at most so many columns; of a mirror's or a lens's the disc alone."""
+    """An image (rows, columns, 3) of at most this many columns; of a mirror's or a lens's the disc alone."""
     left, right, top, bottom = used_part(camera, pixels.shape)
     part = pixels[top:bottom, left:right]
     scale = min(1.0, columns / part.shape[1])

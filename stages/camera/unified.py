@@ -61,7 +61,7 @@ class Unified(CalibratedLens, projection="unified"):
         return np.concatenate([scale[..., None] * plain, (scale - self.xi)[..., None]], axis=-1)
 
     def _grows(self, points: Array) -> Bools:
-        """Which points (..., 2) lie where distortion neither folds the plane nor reverses the order of radii."""
+        """Which points (..., 2) are where distortion neither folds the plane nor reverses the order of radii."""
         k1, k2 = self.distortion[:2]
         turning = smallest_root(np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]))
         _, (xx, xy, yy) = self._distorted(points)

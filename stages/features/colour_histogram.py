@@ -59,7 +59,7 @@ def colour_histograms(
     """Histograms of a colour space's channels per segment, each segment's summing to 1: (segments, bins) float32.
 
     `bins` per channel in the space's order (rgb: red, green, blue), 0 leaves one out: equal steps of all its levels, or
-    of those from the lowest to the highest in `ranges`; what lies beyond counts in the first and the last bin.
+    of those from the lowest to the highest in `ranges`; what is beyond counts in the first and the last bin.
     `joint` False: one histogram per channel behind each other, with equal shares of the mass; True: one over all
     channels, the first slowest. `pixels` are blue-green-red.
     """
@@ -83,7 +83,7 @@ class ColourHistogram(UnderGreyWorld, Stage):
     """Describes a panorama by a histogram of a colour space's channels per segment.
 
     Gross & Koenig 2004, section 2: the authors "experimentally studied several color spaces" before they settled on HSV
-    (stage HsvHistogram, which also leaves out noisy hues). Each segment sums to 1, so that intersections lie in [0, 1].
+    (stage HsvHistogram, which also leaves out noisy hues). Each segment sums to 1, so that intersections are in [0, 1].
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
@@ -96,7 +96,7 @@ class ColourHistogram(UnderGreyWorld, Stage):
     """One histogram over all channels instead of one per channel."""
     ranges: Ranges | None = None
     """[lowest, highest] level of each channel that the bins cover; null: all levels. In seven simulated worlds 96 % of
-    Lab's a and b lie from 80 to 183."""
+    Lab's a and b are from 80 to 183."""
 
     class Out(Outputs):
         """The description of the view."""

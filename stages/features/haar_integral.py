@@ -24,7 +24,7 @@ class Binning(NamedTuple):
     """Counts values in [0, 1] of three channels.
 
     `bins` per channel; `joint`: one histogram over all channels (bins^3, the first slowest), else one for each, behind
-    one another and with equal shares of the mass. A value counts for the two bins whose middles it lies between, by its
+    one another and with equal shares of the mass. A value counts for the two bins whose middles it is between, by its
     distance from them.
     """
 

@@ -97,7 +97,7 @@ class HsvHistogram(UnderGreyWorld, Stage):
     """Describes a panorama by a histogram of hue and brightness per segment.
 
     Gross & Koenig 2004, section 2. Pixels without a hue count by their value alone. Each segment sums to 1, so that
-    intersections lie in [0, 1] (erratum 20).
+    intersections are in [0, 1] (erratum 20).
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36

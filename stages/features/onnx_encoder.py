@@ -59,9 +59,9 @@ class OnnxEncoder(Stage):
     """The .onnx file; it has to be given."""
     segments: Annotated[int, Bounds(ge=1)] = 8
     """Equal parts of the panorama, each an image of its own for the network. With 1 the whole panorama is one image,
-    and views say nothing of the robot's heading."""
+    and views show nothing of the robot's heading."""
     size: tuple[Side, Side] | None = None
-    """Rows and columns of the network's images; null: as its file says."""
+    """Rows and columns of the network's images; null: as its file states."""
     layout: Literal["nchw", "nhwc"] = "nchw"
     """Order of the input's dimensions: image, channel, row, column, as PyTorch writes them; or channels last."""
     channels: Literal["rgb", "bgr"] = "rgb"
@@ -140,7 +140,7 @@ class OnnxEncoder(Stage):
         own = None if rows is None or columns is None else (rows, columns)
         size = own or self.size
         if size is None:
-            raise BadInput(f"{self.model}: it says no size of its images; write nodes.features.size=[224,224]")
+            raise BadInput(f"{self.model}: it states no size of its images; write nodes.features.size=[224,224]")
         if max(size) > MAX_SIDE or self.segments * math.prod(size) > MAX_PIXELS:
             raise BadInput(
                 f"{self.model}: {self.segments} images of {size[0]} x {size[1]} are too large, expected {MAX_SIDE} "

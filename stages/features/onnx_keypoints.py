@@ -24,7 +24,7 @@ PARTS = {"scores": ("score",), "descriptors": ("desc", "feat"), "keypoints": ("k
 MULTIPLE = 32
 """Rows and columns of an image are filled up to a multiple of it, pixels: what networks halve up to five times."""
 MIN_SIDE, MAX_SIDE = 4 * SEAM, 4096
-"""Smallest and largest side of a network's images where its file says one, pixels."""
+"""Smallest and largest side of a network's images where its file states one, pixels."""
 DIAMETER = 8.0
 """Diameter that a point is taken to have, pixels: networks tell none."""
 MAX_LENGTH = 2048
@@ -50,7 +50,7 @@ class OnnxKeypoints(Stage):
     The network is an ONNX file with its weights in it. Its input is one image (1, 1 or 3, rows, columns), grey or RGB
     in [0, 1]; its outputs are keypoints (N, 2) in pixels, column and row, their scores (N,) and descriptors (N, D) or
     (D, N), which names or shapes tell apart, each with or without a first axis of 1. Points with a score above 0 are
-    kept. Such networks know upright images, and so a mirror's image is unwrapped for them; points lie in the image as
+    kept. Such networks know upright images, and so a mirror's image is unwrapped for them; points are in the image as
     it came. It runs on the CPU in one thread, so that the same images give the same bytes. Needs onnxruntime
     (`pip install 'omninav[onnx]'`). Raises BadInput where the file is no such network.
     """
@@ -60,7 +60,7 @@ class OnnxKeypoints(Stage):
     max_features: Annotated[int, Bounds(ge=1)] = 500
     """The strongest are kept."""
     max_pixels: Annotated[int, Bounds(ge=1024)] = 153600
-    """Larger images are made smaller, and further to what the network takes where its file says a size."""
+    """Larger images are made smaller, and further to what the network takes where its file states a size."""
 
     class Out(Outputs):
         """Points that were found, the strongest first; there may be none."""

@@ -42,7 +42,7 @@ def loaded(model: str | None) -> Any:
     path = _file(model)
     runtime, content = _runtime(), read_small(path, MAX_MODEL_BYTES)
     if WEIGHTS_ELSEWHERE in content:
-        raise BadInput(f"{path}: its weights lie in another file; save them in this one: onnx.save(onnx.load(…), …)")
+        raise BadInput(f"{path}: its weights are in another file; save them in this one: onnx.save(onnx.load(…), …)")
     found = REFUSED.search(content)
     if found is not None:
         name = found[0][2:].decode()

@@ -28,7 +28,7 @@ class PreparedImage(NamedTuple):
 
     @property
     def circle(self) -> bool:
-        """Its left edge goes on at its right one."""
+        """Its left edge continues at its right one."""
         return self.camera.wraps
 
     def bearings(self, points: Array) -> Array:

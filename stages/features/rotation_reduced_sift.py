@@ -1,4 +1,4 @@
-"""SIFT for a robot on a floor: patches are turned by where they lie, not by what they show."""
+"""SIFT for a robot on a floor: patches are turned by where they are, not by what they show."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, cast
@@ -16,11 +16,11 @@ from .colour_moments import disc_colours
 from .prepared_image import PreparedImage, prepared_image
 
 SEAM = 48
-"""Columns that are repeated beyond both edges of a full circle, so that what lies across the seam is found too."""
+"""Columns that are repeated beyond both edges of a full circle, so that what is across the seam is found too."""
 COLOUR_RADIUS = 3.0
 """Radius of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
 EDGE_RATIO = 10.0
-"""Largest ratio of principal curvatures of a feature, above which it lies on an edge: OpenCV's default."""
+"""Largest ratio of principal curvatures of a feature, above which it is on an edge: OpenCV's default."""
 
 
 class RotationReducedSift(Stage):

@@ -182,7 +182,7 @@ def _prototypes(
 def prototypes(
     found: ImageSegments, columns: int, azimuth_sigma: float, distance: float, circle: bool
 ) -> tuple[Ints, Floats]:
-    """One segment for each group of similar neighbours: rows, heaviest first, and how many each stands for.
+    """One segment for each group of similar neighbours: rows, heaviest first, and how many each represents.
 
     Neighbours overlap in height and are at most `distance` apart by the Mahalanobis distance of their descriptors,
     extended by the distance of their columns, in units of `azimuth_sigma` columns (section 3.3). Those with most

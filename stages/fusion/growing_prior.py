@@ -61,7 +61,7 @@ class ParticlesInMap(GrowingPrior, Stage):
         belief: Particles | None = None
 
     def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None) -> Out:
-        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
+        """Give the first belief, also where a running robot is to start again (`restart`)."""
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         known = self.known(map, truth, restart)
@@ -85,7 +85,7 @@ class MixtureInMap(GrowingPrior, Stage):
         belief: GaussianMixture | None = None
 
     def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Reinitialise | None = None) -> Out:
-        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
+        """Give the first belief, also where a running robot is to start again (`restart`)."""
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         known = self.known(map, truth, restart)

@@ -19,7 +19,7 @@ CELL_M = 0.25
 CELL_DEG = 10.0
 """Height of a cell in heading, degrees."""
 NARROW_M = 1.0
-"""Largest standard deviation of the position, metres, of a first belief that its particles stand for."""
+"""Largest standard deviation of the position, metres, of a first belief that its particles represent."""
 LEFT_OUT = 0.5
 """Probability of the places that no particle of a wider first belief covers."""
 

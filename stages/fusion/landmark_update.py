@@ -33,7 +33,7 @@ PLACES_ALIKE = 20.0
 """Places among which a wrong pose falls: not anywhere, but where the map looks like the image, and where the belief has
 its doubts too."""
 OUTLIER_SHARE = 1e-3
-"""Probability that a pose of sure landmarks is wrong all the same: they may stand elsewhere today."""
+"""Probability that a pose of sure landmarks is wrong all the same: they may be elsewhere today."""
 MIN_PROPOSED = 0.5
 """Probability of a pose from which on it proposes a place where the belief is not: beside the mapped way, where no pose
 is right, one in six images has one that is metres off."""
@@ -63,13 +63,13 @@ class LandmarkUpdate(Stage):
     nothing, and the belief stays. Around each Gaussian the belief is approximated by a Gaussian, and particles are
     drawn from the fusion of both, since particles decimetres apart cannot represent millimetres. The fused mean is that
     of a Kalman update. The fused covariance is that of covariance intersection, since consecutive images share the
-    errors of the same landmarks, and a robot that stands gains no information. With `kidnapping_probability` the
+    errors of the same landmarks, and a stationary robot gains no information. With `kidnapping_probability` the
     robot may be anywhere, so that a fix where the belief is not draws particles too, if it is rather right than wrong;
     they are its recovery particles until further images agree.
-    Where a log begins with a belief that may be anywhere, or once `track` says that the robot was carried, it is
+    Where a log begins with a belief that may be anywhere, or once `track` reports that the robot was carried, it is
     elsewhere with probability 0.5. Each fix multiplies this by one minus the total probability of the poses that it
     proposes. So a first pose of probability 0.1 takes half of the belief, which cannot hold all other places; the
-    confidence says how sure the robot is.
+    confidence tells how sure the robot is.
     What leads one image to a wrong place leads the next one there too, so that against the belief a fix counts by its
     novelty where it repeats the last one. Without a fix the belief stays as it is.
     """
@@ -119,7 +119,7 @@ class LandmarkUpdate(Stage):
         poses, weights, recovery, free = [belief.poses], [old], [], np.ones(len(belief.poses), np.bool_)
         for mean, covariance, probability in zip(fix.poses, fix.covariances, sure.tolist(), strict=True):
             local = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL) & free
-            free &= ~local  # where two poses lie close together, a particle counts for the better one
+            free &= ~local  # where two poses are close together, a particle counts for the better one
             share = float(np.add.reduce(belief.weights[local]))
             if share > 0.0:
                 local_mean, spread = weighted_moments(belief.poses[local], belief.weights[local])
@@ -152,7 +152,7 @@ class LandmarkUpdate(Stage):
         root = np.linalg.cholesky(0.5 * (covariance + covariance.T) + np.diag([1e-12] * 3))
         normal = ctx.rng.standard_normal((self.particles, 3))
         normal -= normal.mean(axis=0)
-        # Chance in the particles' covariance would shrink that of a robot that stands, image by image.
+        # Chance in the particles' covariance would shrink that of a stationary robot, image by image.
         normal = np.linalg.solve(np.linalg.cholesky(normal.T @ normal / self.particles), normal.T).T
         poses = mean + normal @ root.T
         poses[:, 2] = wrap(poses[:, 2])
@@ -161,7 +161,7 @@ class LandmarkUpdate(Stage):
     def _resampled(
         self, ctx: Context, poses: list[Array], weights: list[Array], recovery: list[tuple[Array, Array]]
     ) -> Particles:
-        # The old belief keeps as many particles as it deserves; a few stand for what landmarks contradict.
+        # The old belief keeps as many particles as it deserves; a few represent what landmarks contradict.
         total = sum(float(np.add.reduce(each)) for each in weights) + sum(float(np.add.reduce(w)) for _, w in recovery)
         old = float(np.add.reduce(weights[0])) / total
         kept = min(len(poses[0]), max(self.particles // 4, math.ceil(old * len(poses[0]))))

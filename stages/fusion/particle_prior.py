@@ -47,7 +47,7 @@ class ParticlePrior(Stage):
         restart: Reinitialise | None = None,
         tick: Tick | None = None,
     ) -> Out:
-        """Give the first belief, also where somebody asks a running robot to start again (`restart`).
+        """Give the first belief, also where a running robot is to start again (`restart`).
 
         `tick`: needed where no other input comes with each image, so that this is asked at each.
         """

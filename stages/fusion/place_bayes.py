@@ -12,7 +12,7 @@ from omninav.stages.values.visual_distance import VisualDistances
 
 
 class PlaceBayes(Stage):
-    """Updates the belief over places with the present view, and gives the pose that each place stands for.
+    """Updates the belief over places with the present view, and gives the pose of each place.
 
     Goedemé et al. 2007, section 5.1, equation 12: what was predicted times how likely the view is there, normalised.
     A place's pose is its medoid's, from the map, with the heading turned as the present view is against the medoid's.

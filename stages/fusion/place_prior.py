@@ -39,7 +39,7 @@ class PlacePrior(Stage):
         truth: Pose | None = None,
         restart: Reinitialise | None = None,
     ) -> Out:
-        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
+        """Give the first belief, also where a running robot is to start again (`restart`)."""
         where = self.at if restart is None else restart.at or "uniform"
         if not (
             tick.first_of_log or restart is not None or (self.restart_after and tick.index % self.restart_after == 0)

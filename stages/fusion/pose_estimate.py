@@ -1,4 +1,4 @@
-"""The pose that a belief stands for."""
+"""The pose that represents a belief."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from omninav.stages.values.length_scale import LengthScale, metres_of
 class BeliefEstimate(Stage):
     """Gives the belief's heaviest mode as one pose, with the mean of the whole belief beside it.
 
-    A split belief's mean lies where the robot is not, so the mode is what is measured and acted upon. Map frame,
+    A split belief's mean is where the robot is not, so the mode is what is measured and acted upon. Map frame,
     metres, radians.
     """
 

@@ -77,10 +77,10 @@ class UnbrokenTrack(Stage):
 
     Not in the papers. A building may have two halls that look the same, of which the map shows one: each image of the
     other agrees with it, and no threshold tells. But where landmarks have confirmed the belief, and each image since
-    then continues the one before as odometry says, the robot was not carried. So poses elsewhere are left out, and the
+    then continues the one before as by odometry, the robot was not carried. So poses elsewhere are left out, and the
     belief's recovery particles too, until they have gone on for as long a way as the belief was confirmed. Where an
     image does not continue the one before, everything counts: a robot that was carried is found at once. Where it shows
-    quite different surroundings and no sure pose confirms the track, `track` says that the robot was carried.
+    quite different surroundings and no sure pose confirms the track, `track` reports that the robot was carried.
     """
 
     class Out(Outputs):

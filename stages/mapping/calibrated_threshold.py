@@ -33,10 +33,10 @@ class CalibratedThresholdState(State):
 class CalibratedThreshold(Stage):
     """Sets the threshold to a share of the median distance between a drive's first views.
 
-    delta_y of Porta & Kröse 2004, E_max of Gross, Koenig & Müller 2005, who do not say how they chose theirs. Distances
-    between views grow with the distance driven up to that of different places, about equal in all recordings, so that
-    one share fits all (docs/experiments/cml_view_limit.md), slow robots and fast ones. Distances between successive
-    views do not (docs/experiments/cml_defaults.md).
+    delta_y of Porta & Kröse 2004, E_max of Gross, Koenig & Müller 2005, who do not state how they chose theirs.
+    Distances between views grow with the distance driven up to that of different places, about equal in all recordings,
+    so that one share fits all (docs/experiments/cml_view_limit.md), slow robots and fast ones. Distances between
+    successive views do not (docs/experiments/cml_defaults.md).
 
     Until `views` views have been seen the threshold follows from those so far and is not settled; before the first pair
     there is none. It is settled in the first log and holds for all that follow. A map keeps it: where `known` has one,

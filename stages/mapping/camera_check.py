@@ -36,11 +36,11 @@ CAMERA_SPECS = {
     ),
 }
 MAX_AXIS = math.radians(0.2)
-"""Angle by which an axis that lies beside moves a bearing, the median, above which it is said (rad)."""
+"""Angle by which an axis that is off moves a bearing, the median, above which it is reported (rad)."""
 MAX_YAW = math.radians(1.0)
-"""Angle by which the camera is turned, above which it is said (rad): one of true headings alone would be as large."""
+"""Angle by which the camera is turned, above which it is reported (rad): of true headings it would be as large."""
 MAX_TILT = math.radians(1.0)
-"""Angle by which the camera leans, above which it is said (rad)."""
+"""Angle by which the camera leans, above which it is reported (rad)."""
 SAME_RAY = 1e-6
 """Difference of unit vectors up to which a bearing is that of its pixel."""
 
@@ -113,7 +113,7 @@ class CameraCheck(NamedTuple):
         """Say what is wrong with the description, and give the `camera.yaml` that has it right; empty where it is.
 
         `mount` (3,), `late_s`: how the camera sits on the robot, and how late its images are, otherwise than described
-        (m, m, rad; s). Nothing in a camera.yaml says that a camera leans.
+        (m, m, rad; s). A camera.yaml cannot state that a camera leans.
         """
         if camera is None:
             return ""
@@ -126,7 +126,7 @@ class CameraCheck(NamedTuple):
                 right = moved
                 beside = math.hypot(by["centre_x"], by["centre_y"])
                 at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
-                parts.append(f"its axis lies {beside:.1f} px beside, at {at}")
+                parts.append(f"its axis is off by {beside:.1f} px, at {at}")
         harm = "The map is less exact by it" if parts else "Landmarks allow for it, colours are compared less exactly"
         if mount[2]:
             right = replace(right, yaw=right.yaw + float(mount[2]))
@@ -145,7 +145,7 @@ class CameraCheck(NamedTuple):
     def elevations_told(
         self, ctx: Context, camera: Camera | None, views: LocalViews, matches: PairMatches, poses: Array
     ) -> str:
-        """Say where the horizon of a strip lies that does not say its elevations, as `told`."""
+        """Report the horizon of a strip that does not state its elevations, as `told`."""
         if camera is None or camera.elevations_known or not len(self.pixels):
             return ""
         if np.abs(camera.unproject(self.pixels)[0] - self.bearings).max() > SAME_RAY:
@@ -155,7 +155,7 @@ class CameraCheck(NamedTuple):
         if right is None:
             return ""
         top, bottom = (math.degrees(each) for each in right.elevations)
-        found = f"its rows go from {top:.1f} to {bottom:.1f} degrees above the horizon, which camera.yaml does not say"
+        found = f"its rows go from {top:.1f} to {bottom:.1f} degrees above the horizon, not stated in camera.yaml"
         return _told(ctx, found, "The map is less exact by it", right)
 
     def _named(self, corrections: Array) -> dict[str, float]:

@@ -11,7 +11,7 @@ from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.views import WholeView
 
 MAX_WAITING = 500
-"""Views that wait, however long the robot stands."""
+"""Views that wait, however long the robot stops."""
 
 
 class DelayedByDistanceState(State):

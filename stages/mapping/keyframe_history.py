@@ -27,7 +27,7 @@ class KeyframeHistory(Stage):
     A map of views holds what its drives taught, and no more the drives themselves; with them it can be straightened
     (`StraightenSessions`) and learned again. Views of a robot that stands still are left out. A known map that was
     saved without its drives, as one of stated poses is, would be forgotten where it is learned again: with one none are
-    kept. Manifest fact `map_straightened` says so.
+    kept. Manifest fact `map_straightened` records it.
     """
 
     class Out(Outputs):

@@ -52,7 +52,7 @@ class LearnLandmarks(Stage):
     `camera` wired, the camera's axis, tilt and mount are adjusted together: given poses may be exact or off by
     decimetres and degrees; those of odometry alone are straightened first by the places that the tour came back to, and
     scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Where too
-    little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as it is described is said, and
+    little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as described is reported, and
     kept with the landmarks; points are those of a level camera, and poses those of the robot under it.
     There are none where images are too small for local features, and the map is used without them.
     """

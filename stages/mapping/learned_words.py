@@ -50,7 +50,7 @@ class LearnVisualWords(Stage):
 
 
 def vocabulary_and_words(views: Sequence[Bytes], words: int) -> VisualWords:
-    """A vocabulary of so many words, learned from the views' own descriptors (N, D), and the words of each view."""
+    """A vocabulary of a number of words, learned from the views' own descriptors (N, D), and the words of each view."""
     together = np.concatenate([view for view in views if len(view)] or [np.empty((0, 128), np.uint8)])
     rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * DESCRIPTORS_PER_WORD)).astype(np.int64)
     return words_of(views, learned_words(root_descriptors(together[rows]), words))

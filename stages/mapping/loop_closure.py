@@ -23,7 +23,7 @@ class LoopClosure(Stage):
 
     Goedemé et al. 2007, section 4.4. Views that are all close to each other make a cluster; its parts along the drive
     are subclusters, and each two subclusters of a cluster a hypothesis: they are one place. A hypothesis starts with
-    the similarity of the two views that stand for its subclusters (erratum 28 in docs/papers.md), and neighbours along
+    the similarity of the two views that represent its subclusters (erratum 28 in docs/papers.md), and neighbours along
     the drive add evidence in one pass (erratum 31). It is accepted where its support is large enough and some neighbour
     has spoken: nothing can be decided of an isolated one (section 4.4.3). Places of a known map stay together.
     """
@@ -31,7 +31,7 @@ class LoopClosure(Stage):
     place_size: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest visual distance between two views of a cluster."""
     between: Literal["nearest", "medoids"] = "nearest"
-    """Which views stand for two subclusters: the `nearest` two, or the paper's `medoids`, which lie apart where a drive
+    """Which views represent two subclusters: the `nearest` two, or the paper's `medoids`, distant where a drive
     returns between its images."""
     min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
     """Share of the features that match, for two views to be similar: a wall that repeats itself matches exactly, but

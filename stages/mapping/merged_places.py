@@ -1,4 +1,4 @@
-"""Places where two passes lie side by side become one."""
+"""Places where two passes are side by side become one."""
 
 import dataclasses
 from typing import Annotated
@@ -24,7 +24,7 @@ NOTHING_IN_COMMON = 1.0
 
 
 class MergePlaces(Stage):
-    """Merges places that stand side by side, and gives each view to the place whose medoid is nearest along the drive.
+    """Merges places that are side by side, and gives each view to the place whose medoid is nearest along the drive.
 
     Goedemé et al. 2007, section 4.5, merge the subclusters of an accepted hypothesis. Where clusters of two passes
     begin and end at different points, some of each have no partner of the same cluster to be merged with, and stay as

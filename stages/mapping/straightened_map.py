@@ -22,7 +22,7 @@ SPECS = {
 class StraightenMap(Stage):
     """Corrects the references' poses in a map made by odometry so that loop closures become consistent.
 
-    References that look alike although the drive lies between them close a loop; a pose graph of odometry and closures
+    References that look alike although the drive is between them close a loop; a pose graph of odometry and closures
     gives the poses, with Cauchy's loss on closures, since some are wrong. The first reference stays. Poses that are
     ground truth, views of one direction and drives that come back to no place are left as they are: without a crossing
     nothing tells how odometry bent them. Manifest fact `map_straightened`.

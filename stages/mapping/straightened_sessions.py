@@ -123,7 +123,7 @@ class StraightenSessions(Stage):
 def closures_between(sessions: Sessions, max_distance: float, min_gap_m: float, samples: int) -> Closures:
     """For each view the most alike of each earlier drive, and of its own at least `min_gap_m` metres back.
 
-    A pair counts up to `max_distance`, in the views' unit. Of more than `samples` views so many, evenly spaced, look
+    A pair counts up to `max_distance`, in the views' unit. Of more than `samples` views that many, evenly spaced, look
     for partners.
     """
     values, drives, driven = sessions.values, sessions.drives, sessions.driven

@@ -30,7 +30,7 @@ def ready_updates(
 
 
 def start_over(updates: MapUpdates | None, map: ViewMixtures, pending: PendingUpdates) -> None:
-    """Forget all where the updates say so, and keep the drives that they come with."""
+    """Forget all where the updates state it, and keep the drives that they come with."""
     if updates is not None and updates.relearn:
         map.forget_all()
         pending.waiting = []

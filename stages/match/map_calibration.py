@@ -1,4 +1,4 @@
-"""Learns what a similarity says of the place on the views of a map, each left out in turn."""
+"""Learns what a similarity shows of the place on the views of a map, each left out in turn."""
 
 import math
 from collections.abc import Callable
@@ -21,7 +21,7 @@ IMAGES, MAX_COMPARED = 200, 1000
 near it."""
 MIN_IMAGES = 10
 SPACINGS, WRONG_DISTANCES = 1.5, 3.0
-"""A reference within so many spacings of the map, or one appearance length scale, is the right place; one beyond so
+"""A reference within this many spacings of the map, or one appearance length scale, is the right place; one beyond so
 many times that distance is a wrong one."""
 RIGHT_TURN, WRONG_TURN = math.radians(30.0), math.radians(60.0)
 """Headings, of views compared at one only, that are the right one and a wrong one."""
@@ -122,7 +122,7 @@ class MapCalibration:
     def of(
         self, ctx: Context, map: ReferenceGraph, compare: Compare, length_scale: LengthScale | None
     ) -> SimilarityCalibration | None:
-        """Calibration as `calibrated` gives it; its result stands in the manifest."""
+        """Calibration as `calibrated` gives it; its result is in the manifest."""
         if map is not self._map or len(map) != self._length:
             self._map, self._length = map, len(map)
             found = self._found = calibrated(map, compare, 0.0 if length_scale is None else length_scale.metres)

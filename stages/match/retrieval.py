@@ -91,8 +91,8 @@ def window_turns(directions: Array) -> Ints:
     if np.abs(turns - nearest).max() > 0.01 * number or len(np.unique(columns)) < number:
         shown = ", ".join(f"{math.degrees(d):g}" for d in directions)
         raise BadInput(
-            f"match: images that look towards {shown} deg; they must lie evenly around the robot, one straight "
-            "ahead, to be told from its turns; use an ordinary camera with yaw: 0, or an omnidirectional one"
+            f"match: images that look towards {shown} deg; they must be spaced evenly around the robot, one straight "
+            "ahead, to be distinguished from its turns; use an ordinary camera with yaw: 0, or an omnidirectional one"
         )
     windows = np.empty(number, np.int64)
     windows[columns] = np.arange(number)
@@ -112,7 +112,7 @@ class Retrieval(Stage):
     """Headings at which each reference is compared, evenly spaced over the circle."""
 
     class Out(Outputs):
-        """Similarities of view and references, the most similar references, and what similarities say of the place."""
+        """Similarities of view and references, the most similar references, and what similarities show of the place."""
 
         similarities: Similarities
         answers: RetrievedReferences | None = None

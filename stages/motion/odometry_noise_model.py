@@ -17,7 +17,7 @@ class OdometryNoiseModel:
     Variances are proportional to distance and turn, so that many small motions are as uncertain as their sum, whatever
     the camera's rate. Each rotation has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 distance +
     rotation_floor^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
-    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). Seconds that odometry says nothing of add
+    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). Seconds without odometry add
     (unmeasured_turn t)^2 / 2 and (unmeasured_speed t)^2, and a guessed motion its own. `turn` is the sum of both
     rotations, so that wheel jitter sideways is no turn.
     """
@@ -31,9 +31,9 @@ class OdometryNoiseModel:
     translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.01
     """Standard deviation (m) of the distance after a turn by 1 rad."""
     rotation_floor: Annotated[float, Bounds(ge=0)] = 0.001
-    """Standard deviation (rad) added at each image, also where the robot stands."""
+    """Standard deviation (rad) added at each image, also of a stationary robot."""
     translation_floor: Annotated[float, Bounds(ge=0)] = 0.001
-    """Standard deviation (m) added at each image, also where the robot stands."""
+    """Standard deviation (m) added at each image, also of a stationary robot."""
     unmeasured_turn: Annotated[float, Bounds(ge=0)] = 0.5
     """Standard deviation (rad) of the heading for each second about which no odometry is believed: half a slow turn."""
     unmeasured_speed: Annotated[float, Bounds(ge=0)] = 0.5

@@ -27,12 +27,12 @@ MEMORY = 100.0
 """Stretches that are remembered: floors and loads change."""
 MAX_SQUARE = 16.0
 """Largest square of an error, in variances of the stated noise, that a stretch counts with: a robot that was carried
-says nothing of its wheels."""
+shows nothing of its wheels."""
 
 
 class MeasuredNoise(State):
     """Squared errors of odometry in variances of its stated noise, of turns and of lengths: `squares` (2,), summed over
-    so many `stretches`. `anchor` (3,): the last sure pose; `since` (3,): odometry from there; `driven`: its way (m);
+    as many `stretches`. `anchor` (3,): the last sure pose; `since` (3,): odometry from there; `driven`: its way (m);
     `expected` (2,): variances of its turn and length by the stated noise."""
 
     squares: Array = field(default_factory=lambda: np.full(2, PRIOR))
@@ -48,7 +48,7 @@ class MeasuredNoise(State):
 
     def move(self, motion: Motion, stated: UncertainMotion) -> None:
         """Drive on by a motion with its stated noise."""
-        if type(motion) is not Motion:  # bridged or guessed, so that it says nothing of odometry
+        if type(motion) is not Motion:  # bridged or guessed, so that it shows nothing of odometry
             self.start(None)
             return
         self.since = compose(self.since, np.array([motion.x, motion.y, motion.turn]))

@@ -18,7 +18,7 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
 MAX_LOST = 5
-"""Images in a row that show no motion, from which on each begins anew."""
+"""Images in a row that show no motion, from which on each begins again."""
 SCALE_SIGMAS = (0.03, 0.5)
 """Standard deviation of a length, as a part of it: where the scale is known, and where it is a guess."""
 ESTIMATES = 9
@@ -78,12 +78,12 @@ class VisualOdometry(Stage):
     """Sees the motion that a source could only guess in the bearings of points around.
 
     Not in the papers. An image's pose follows from points that the last keyframes have triangulated, so that lengths
-    are kept from image to image, and where the camera stands or turns on the spot nothing is made up. Once the points
+    are kept from image to image, and where the camera stops or turns on the spot no motion is invented. Once the points
     have moved by a few degrees the image becomes a keyframe, and the last ones are adjusted with all that they see.
     The true length comes from the distance of two poses by the map's landmarks (`fix`), else from the camera's height
-    over a floor that is seen; else from the guess of the source at the first motion, and the run says so. Images whose
-    motion is not seen are counted (`motion_not_seen`) and go on by the usual step with the guessed turn, as uncertain
-    as a guess; the next one that is seen corrects it. Motions that were measured go through as they are.
+    over a floor that is seen; else from the guess of the source at the first motion, and the run reports it. Images
+    whose motion is not seen are counted (`motion_not_seen`) and continue by the usual step with the guessed turn, as
+    uncertain as a guess; the next one that is seen corrects it. Motions that were measured go through as they are.
     """
 
     speed_m_s: Annotated[float, Bounds(ge=0, le=100)] | None = None
@@ -106,7 +106,7 @@ class VisualOdometry(Stage):
         state: VisualOdometryState,
         fix: LandmarkFix | None = None,
     ) -> Out:
-        """See the motion to one image; `fix`: what the map said of the image before."""
+        """See the motion to one image; `fix`: the map's pose of the image before."""
         if motion is not None and not isinstance(motion, AssumedMotion):
             return self.Out(motion=motion, odometry=odometry)
         descriptors = features.descriptors

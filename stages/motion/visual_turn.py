@@ -50,7 +50,7 @@ class VisualTurn(OdometryNoiseModel, Stage):
     Not in the papers. What bends a path is the heading, and what a camera sees ahead and behind tells turns far better
     than wheels do: to 0.15 degrees a step in the house, odometry to 0.6 (docs/experiments/cml_straightened.md).
     Of translation nothing is learned, but that half of the correction turns it. A gap between the two that odometry's
-    noise (`OdometryNoiseModel`'s) does not explain counts as vision's, so that the farther a visual turn lies from the
+    noise (`OdometryNoiseModel`'s) does not explain counts as vision's, so that the farther a visual turn is from the
     measured one the less it is believed. Panoramas made of fewer columns than they have see turns that are none and
     are not asked.
     """

@@ -86,7 +86,7 @@ def camera_section(camera: Camera) -> dict[str, Any]:
 
 
 UNSAID_BY_INFO = (
-    "neither CameraInfo nor /tf_static says where the camera sits: yaw and position are 0 "
+    "neither CameraInfo nor /tf_static states where the camera sits: yaw and position are 0 "
     "(else give camera=PATH/camera.yaml)"
 )
 """Sentence on a camera that a CameraInfo message alone describes."""
@@ -95,7 +95,7 @@ UNSAID_BY_INFO = (
 def camera_from_info(info: Any, where: str) -> Camera:
     """A camera from a CameraInfo message, where there is no camera.yaml, by the first model that knows its distortion.
 
-    Nothing is said in it of mask, height and yaw. Raises `UnreadableRecording` where no model knows it.
+    It holds nothing of mask, height and yaw. Raises `UnreadableRecording` where no model knows it.
     """
     k = [float(number) for number in (info.k if hasattr(info, "k") else info.K)]
     d = [float(number) for number in (info.d if hasattr(info, "d") else info.D)]

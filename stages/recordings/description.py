@@ -78,7 +78,7 @@ class Frames:
     csv: str | None = None
     header: bool = True
     """False: columns have numbers, from 0, and lines that begin with # are comments. A .json has no header, whatever is
-    said here: it maps names, column 0, to rows or matrices of numbers."""
+    stated here: it maps names, column 0, to rows or matrices of numbers."""
     delimiter: Delimiter = ","
     file: str | int | None = None
     """A column, or a name made of columns: '{0}.png', or '{0:010}.png' for a number with zeros to 10 digits."""
@@ -180,7 +180,7 @@ class DataSet:
 
 @dataclass(frozen=True)
 class Description:
-    """A folder of images, described. `which` fills `{which}` in file names; by default it stands for anything.
+    """A folder of images, described. `which` fills `{which}` in file names; by default it matches anything.
 
     `positions` null: the images are all there is. `camera`: what a camera.yaml holds (the image's size may be left
     out); null: the folder's camera.yaml; a projection's name: used where there is no camera.yaml.

@@ -34,7 +34,7 @@ MAX_DIGITS = 10
 class ImageFolder(Recording):
     """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
-    Images are turned as the EXIF orientation of JPEG files says (`turned`).
+    Images are turned as the EXIF orientation of JPEG files states (`turned`).
     Counted in `dropped`: `missing_image`, `impossible_motion`, `no_position`, `no_time`, `duplicate_frame`,
     `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.
@@ -65,7 +65,7 @@ class ImageFolder(Recording):
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
         self.turned = sum(map(_is_turned, self._paths_kept))
-        """Number of its images that are turned as their EXIF orientation says."""
+        """Number of its images that are turned as their EXIF orientation states."""
         self._images = DecodeAhead(lambda frame: partial(self._read, self._paths_kept[frame]))
         self.stamps = times[keep]
         self.truth = None if truth is None else truth[keep]
@@ -92,11 +92,11 @@ class ImageFolder(Recording):
         found = sorted(self._matching(pattern, kind))
         if not found:
             what = "file" if kind is Path.is_file else "folder"
-            raise UnreadableRecording(f"{self._folder}: no {what} {pattern} ({self._where} asks for it)")
+            raise UnreadableRecording(f"{self._folder}: no {what} {pattern} ({self._where} names it)")
         if len(found) > 1:
             names = ", ".join(str(path.relative_to(self._folder)) for path in found)
             raise UnreadableRecording(
-                f"{self._folder}: {pattern} fits several files ({names}); say which: LAYOUT:FOLDER:WHICH"
+                f"{self._folder}: {pattern} fits several files ({names}); type which: LAYOUT:FOLDER:WHICH"
             )
         return found[0]
 
@@ -319,7 +319,7 @@ class DescribedFolder(Format):
     names = "LAYOUT:FOLDER, a description .yaml, or a folder with recording.yaml"
 
     def opens(self, log: str) -> bool:
-        """True where a description is named, or lies in the folder."""
+        """True where a description is named, or is in the folder."""
         path = user_path(log)
         if path.is_dir():
             return (path / "recording.yaml").is_file()
@@ -327,7 +327,7 @@ class DescribedFolder(Format):
 
     def open(self, log: str, options: OpenOptions) -> ImageFolder:
         """`LAYOUT:FOLDER` or `LAYOUT:FOLDER:WHICH`: LAYOUT is a built-in one, one in the options' folders, or a path to
-        a .yaml; WHICH stands for `{which}` in its file names. A description alone has a `folder` relative to its file.
+        a .yaml; WHICH replaces `{which}` in its file names. A description alone has a `folder` relative to its file.
         """
         path = user_path(log)
         if path.exists():

@@ -1,4 +1,4 @@
-"""Recording of what a live run consumed: an image in it is a tick, made of what lies before it in the file."""
+"""Recording of what a live run consumed: an image in it is a tick, made of what is before it in the file."""
 
 import json
 from collections import deque
@@ -26,7 +26,7 @@ from .topic_recording import STALE, Feed, TopicRecording
 
 Role = Literal["image", "odometry", "truth", "scan", "initial_pose", "goal", "restart"]
 HEADER, HEADER_TYPE = "/omninav/live", "std_msgs/msg/String"
-"""The topic that makes a file a live record: its one message says what the others are."""
+"""The topic that makes a file a live record: its one message states what the others are."""
 CAMERA = "camera.yaml"
 SCANS = 64
 """Range readings that are kept for images that come late."""
@@ -60,7 +60,7 @@ def read_header(feed: Feed, name: str) -> LiveHeader:
 
 
 class Frame(NamedTuple):
-    """All but the image of a tick. Poses are (3,), NaN where `truth` is not known. `odometry` goes on over jumps,
+    """All but the image of a tick. Poses are (3,), NaN where `truth` is not known. `odometry` continues over jumps,
     `reported_odometry` is in the frame that the robot's odometry has now."""
 
     odometry: Array | None
@@ -87,7 +87,7 @@ class OdometryBuffer:
     def add(self, role: Role, stamp: int, message: Any, item: Any = None) -> list[Any]:
         """Take a decoded message. Returns the items of messages that are now used: a replay needs them, in that order.
 
-        Raises ValueError or AttributeError where the message cannot be what its role says, and for a goal or an initial
+        Raises ValueError or AttributeError where the message cannot be of its role, and for a goal or an initial
         pose in a frame of the robot.
         """
         if role in ("goal", "initial_pose") and (frame := message.header.frame_id.lstrip("/")) in self._robots_frames:

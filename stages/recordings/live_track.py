@@ -26,9 +26,9 @@ class _Pose(NamedTuple):
 class LiveTrack:
     """Poses (x, y, heading) at ascending stamps (ns), as far as they have come.
 
-    What no robot can have driven, and what lies before the last stamp or long after it, is doubted: dropped where the
-    track goes on as before, and believed once it has gone on for `EXCURSION_S` by itself. Then odometry is joined to
-    where it was (`jumps` false), or the truth starts again there; where stamps went back, all before is forgotten.
+    What no robot can have driven, and what is before the last stamp or long after it, is doubted: dropped where the
+    track continues as before, and believed once it has continued for `EXCURSION_S` by itself. Then odometry is joined
+    to where it was (`jumps` false), or the truth starts again there; where stamps went back, all before is forgotten.
     `dropped` counts by kind what was left out. What comes of it depends on what was kept alone: fed with that, another
     track gives the same.
     """
@@ -118,7 +118,7 @@ class LiveTrack:
         return [one.item for one in believed]
 
     def _step(self, stamp: int) -> Array:
-        """As far as the robot goes until a stamp if it goes on as before, or by one step where that is shorter."""
+        """As far as the robot goes until a stamp if it continues as before, or by one step where that is shorter."""
         if len(self._known) < 2:
             return np.zeros(3)
         one, last = self._known[-2], self._known[-1]

@@ -46,7 +46,7 @@ _AS_BGR = {
 
 
 class ImpossiblePose(ValueError):
-    """A pose that nothing on Earth has; the message says why."""
+    """A pose that nothing on Earth has; the message states why."""
 
 
 def pose_of(message: Any) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""The camera of images that do not say it: named by a user, or assumed where they look like one."""
+"""The camera of images that do not state it: named by a user, or assumed where they look like one."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,11 +14,11 @@ from .camera_yaml import read_camera
 from .recording import UnreadableRecording
 
 DARK = 24
-"""Mean grey level of what lies outside the circles of two fisheyes; JPEG and video compression let no black be 0."""
+"""Mean grey level of what is outside the circles of two fisheyes; JPEG and video compression let no black be 0."""
 
 
 def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera, list[Path]]:
-    """The camera of a camera.yaml, or of a projection of which an image's size says enough, and the files it is from.
+    """The camera of a camera.yaml, or of a projection of which an image's size is enough, and the files it is from.
 
     `size`: gives width and height of an image (pixels). Raises `UnreadableRecording` for a projection that needs more.
     """
@@ -36,14 +36,14 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
 
 
 def assumed_camera(name: str, pixels: Pixels) -> tuple[Camera, str]:
-    """The camera of a log's images where nobody says it, by one of them, and a sentence on what was assumed.
+    """The camera of a log's images where nobody states it, by one of them, and a sentence on what was assumed.
 
     Raises `UnreadableRecording` saying what to type, where they are not twice as wide as high.
     """
     height, width = pixels.shape[:2]
     if width != 2 * height:
         raise UnreadableRecording(
-            f"{name}: nothing says how its images of {width} x {height} are to be read; type "
+            f"{name}: nothing states how its images of {width} x {height} are to be read; type "
             "camera=PATH/camera.yaml, or camera=perspective (an ordinary camera), donut (a mirror), fisheye, "
             "dual_fisheye or equirectangular (from straight up to straight down); a panorama strip needs a camera.yaml "
             "(projection: cylindrical, or equirectangular with its elevations)"

@@ -57,8 +57,8 @@ def grid_beside(logs: str | Sequence[str] | None) -> Path | None:
 def read_occupancy(file: Path) -> OccupancyGrid:
     """The grid in a map_server pair (`map.yaml`, which names its image). Raises BadInput where it cannot be read.
 
-    Occupied is what is darker than `occupied_thresh` says (lighter with `negate`), free what is lighter than
-    `free_thresh`, and what lies between is unknown, in the modes `trinary` and `scale`. In the mode `raw` levels are
+    Occupied is what is darker than `occupied_thresh` (lighter with `negate`), free what is lighter than
+    `free_thresh`, and what is between is unknown, in the modes `trinary` and `scale`. In the mode `raw` levels are
     per cent, and those above 100 unknown. A turned origin is refused.
     """
     about = _described(file)
@@ -141,7 +141,7 @@ def read_grid(file: Path) -> FloorPlan:
 def boxes(occupied: Bools) -> Ints:
     """Occupied cells (rows, columns) as few boxes: (B, 4) first column, first row, column and row after the last.
 
-    Runs of a row that stand in the next row as well are one box.
+    Runs of a row that occur in the next row as well are one box.
     """
     edges = np.diff(occupied.astype(np.int8), axis=1, prepend=0, append=0)
     found: list[tuple[int, int, int, int]] = []

@@ -26,8 +26,8 @@ def open_recording(
     """Open what `log` names: a file, a folder, or a layout and a folder (see each format's `open`).
 
     `camera`: a camera.yaml that replaces the recording's own, or a projection (equirectangular, …) of which the size of
-    an image says enough; `layout_folders`: where else descriptions of folders of images lie; `limits`: what the robot
-    can do; `rate`: images per second of a folder of images that says no times. Raises
+    an image is enough; `layout_folders`: where else descriptions of folders of images are; `limits`: what the robot
+    can do; `rate`: images per second of a folder of images without times. Raises
     `UnreadableRecording` (or another `BadInput`) with one line: file, what is wrong, what to type.
     """
     options = OpenOptions(topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate)
@@ -63,7 +63,7 @@ def log_formats() -> list[Format]:
 
 
 def _with_whole_camera(recording: Recording) -> Recording:
-    """The recording, its camera with what it leaves open as the first image that shows it says (a mirror's ring)."""
+    """The recording, its camera with what it leaves open by the first image that shows it (a mirror's ring)."""
     if recording.camera.complete:
         return recording
     counted, details = recording.dropped.copy(), dict(recording.details)
@@ -78,7 +78,7 @@ def _with_whole_camera(recording: Recording) -> Recording:
             break
     if images and not recording.camera.complete:
         raise UnreadableRecording(
-            f"{recording.name}: no ring of a mirror stands out in its first {images} images; is it another camera "
+            f"{recording.name}: no ring of a mirror is found in its first {images} images; is it another camera "
             "(camera=…)? If not, give centre and mask in a camera.yaml"
         )
     recording.dropped.clear()  # what is wrong with these images is counted when they are read in their turn

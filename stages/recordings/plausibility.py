@@ -101,7 +101,7 @@ def _kept(stamps: Stamps, poses: Array, torn: Bools, limits: MotionLimits) -> tu
 def without_jumps(stamps: Stamps, poses: Array, jumps: Ints) -> Array:
     """Poses (N, 3) as they would be had the track gone on: over each jump with the step from before it, at most.
 
-    Of `believed`: before each jump lie two poses or more.
+    Of `believed`: before each jump are two poses or more.
     """
     if not len(jumps):
         return poses

@@ -74,7 +74,7 @@ class PoseTopic:
     def _drop(
         self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Ints, limits: MotionLimits
     ) -> str:
-        """Count some rows of a track, and say of the first what it would need of the robot, by its neighbour."""
+        """Count some rows of a track, and report of the first what it would need of the robot, by its neighbour."""
         if not len(rows):
             return ""
         row = int(rows[0])

@@ -33,7 +33,7 @@ def frame_poses(
     """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none, and which rows are not believed.
 
     `frames` and `own`: the tables of the frames and of the positions alone, as far as there are any. Raises
-    `UnreadableRecording`, naming `where` the description stands.
+    `UnreadableRecording`, naming `where` the description is.
     """
     positions = description.positions
     assert positions is not None
@@ -52,7 +52,7 @@ def frame_poses(
     rows = known[ascending_rows(track_times[known])]
     stamps, ascending = track_times[rows], len(rows)
     likely = np.arange(len(rows))
-    if own is not None or description.frames.time is not None:  # else nothing says how fast the robot was
+    if own is not None or description.frames.time is not None:  # else nothing states how fast the robot was
         likely = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits).rows
     said = [f"{table.path.name}: row {row}: no robot gets to its position" for row in np.delete(rows, likely)]
     rows, stamps = rows[likely], stamps[likely]

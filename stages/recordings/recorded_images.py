@@ -9,7 +9,7 @@ from omninav.stages.geometry.arrays import Array, Bytes, Ints
 class RecordedImages(Value):
     """N images in the order of their times, all of one camera, with what is known of each.
 
-    `camera`: its camera.yaml. `pngs`: their PNG bytes one after the other; image n lies from `ends[n]` to `ends[n +
+    `camera`: its camera.yaml. `pngs`: their PNG bytes one after the other; image n is from `ends[n]` to `ends[n +
     1]`. `stamps`: ns. `odometry` in its own frame and `truth` in the map's: x, y (m), heading (rad), a row of NaN
     where it is not known.
     """

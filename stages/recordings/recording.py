@@ -31,7 +31,7 @@ class Recording(Losses, ABC):
     `odometry`: (N, 3) odometry pose at each stamp in the odometry's own frame, or None. `truth`: (N, 3) true pose in
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
     `details`: the first case of each kind in words. `unmeasured_s`: (N,) seconds of the way to each frame about which
-    no odometry is believed, or None where there are none. `assumed`: what nothing in it says and was taken for granted.
+    no odometry is believed, or None where there are none. `assumed`: what nothing in it states and was assumed.
     """
 
     name: str
@@ -103,7 +103,7 @@ class OpenOptions:
     limits: MotionLimits = field(default_factory=MotionLimits)
     """Limits of the robot's motion."""
     rate: float | None = None
-    """Images per second of a folder of images that says no times."""
+    """Images per second of a folder of images without times."""
 
 
 FORMATS: list[type["Format"]] = []
@@ -139,8 +139,8 @@ class DecodeAhead:
     """Decodes the images that will be asked for next while the caller works on the present one.
 
     `fetch` reads an image and returns what decodes it. It runs in the caller's thread, for a file has one reader at a
-    time; what it returns runs in another, where OpenCV lets Python go on. An image, or the error that it raises, is the
-    same whether or not it was expected, and comes when it is asked for.
+    time; what it returns runs in another, where OpenCV lets Python continue. An image, or the error that it raises, is
+    the same whether or not it was expected, and comes when it is asked for.
     """
 
     def __init__(self, fetch: Callable[[int], Callable[[], Pixels]]) -> None:

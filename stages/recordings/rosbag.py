@@ -57,7 +57,7 @@ class _Limits:
         self.begin()
 
     def begin(self) -> None:
-        """From now on the bag is gone through anew, or another message is looked up."""
+        """From now on the bag is read again from its beginning, or another message is looked up."""
         self.allowance = Allowance(self._size)
         self._steps = MIN_STEPS + STEPS_PER_BYTE * self._size
 
@@ -185,7 +185,7 @@ class BagFeed(Losses):
                 parts = sorted(path.glob("*.db3")) if path.is_dir() else []
                 self._reader = self._open(parts)  # each part can be read without the folder's metadata
             except Exception as last:
-                if parts and not self._stated:  # else the first error says more
+                if parts and not self._stated:  # else the first error tells more
                     said = " ".join(str(last).split())[:160] or said
                 repair = "rosbag reindex" if path.suffix == ".bag" else "ros2 bag reindex"
                 raise UnreadableRecording(
@@ -243,7 +243,7 @@ class BagFeed(Losses):
         except Exception as error:
             self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split()):.160})")
         for topic in {connection.topic for connection in wanted}:
-            stated = self._stated.pop(topic, 0)  # said once, however often it is read
+            stated = self._stated.pop(topic, 0)  # reported once, however often it is read
             if stated > found[topic]:
                 lost = stated - found[topic]
                 self.drop("missing_message", f"{self.path}: messages are missing: {lost} of {stated} on {topic}", lost)

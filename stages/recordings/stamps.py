@@ -74,13 +74,13 @@ def ascending_rows(stamps: Stamps) -> Stamps:
 
 
 def within(stamps: Stamps, times: Stamps) -> Bools:
-    """Which stamps lie in the range of `times`."""
+    """Which stamps are in the range of `times`."""
     inside: Bools = (stamps >= times[0]) & (stamps <= times[-1])
     return inside
 
 
 def lone(stamps: Stamps) -> Bools:
-    """Which of ascending stamps (N,) in ns lie more than `LONE_S` from all others: none where that is common."""
+    """Which of ascending stamps (N,) in ns are more than `LONE_S` from all others: none where that is common."""
     if len(stamps) < 3:
         return np.zeros(len(stamps), np.bool_)
     far = np.concatenate([[True], np.diff(stamps) > LONE_S * 1e9, [True]])

@@ -31,7 +31,7 @@ MOVED = 0.01
 
 
 class Mounted(NamedTuple):
-    """A camera, what transforms say of it in words (empty: nothing), and a warning where that does not fit."""
+    """A camera, what transforms state of it in words (empty: nothing), and a warning where that does not fit."""
 
     camera: Camera
     in_words: str = ""

@@ -60,7 +60,7 @@ _BLOCK = 1_000_000
 """Characters and cells that are kept as Python's texts, before they are packed."""
 _TOO_LONG = f"a row of more than {MAX_ROW:,} characters; is this a table?"
 NO_TIME = np.iinfo(np.int64).min
-"""Nanoseconds that stand for no time at all."""
+"""Nanoseconds that mean no time at all."""
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
 _CELL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*$")
 _SPELLINGS = {
@@ -105,7 +105,7 @@ class Angle:
 
 
 class OutOfProportion(UnreadableRecording):
-    """A number that is too large for what it stands for: it may be of another unit."""
+    """A number that is too large for what it means: it may be of another unit."""
 
 
 class RowBlock(NamedTuple):
@@ -288,7 +288,7 @@ def _json_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def unit_named(written: str) -> str:
-    """The unit that a spelling stands for; the spelling itself where it stands for none."""
+    """The unit that a spelling means; the spelling itself where it means none."""
     return _SPELLINGS.get(written, written)
 
 

@@ -21,7 +21,7 @@ from .recording import DecodeAhead, Recording, UnreadableRecording, checked_imag
 from .stamps import Stamps, ascending, lone
 
 STALE = 1_000_000_000
-"""Nanoseconds after which range readings say nothing any more."""
+"""Nanoseconds after which range readings are outdated."""
 UNSTAMPED = 0.9
 """Share of a topic's messages with one stamp in common from which on its driver counts as one that sets none."""
 
@@ -96,7 +96,7 @@ class TopicRecording(Recording):
     ) -> None:
         self.unmeasured_s = unmeasured_s
         self.mounted = ""
-        """Position of its camera by `/tf_static`, in words; empty where that says nothing new."""
+        """Position of its camera by `/tf_static`, in words; empty where that is not new."""
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
         self._feed, self._images, self._files, self._scans = feed, DecodeAhead(fetch_image), files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)

@@ -26,7 +26,7 @@ from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 
 SET_BACK_S = 10.0
-"""Records of one topic that lie in a file earlier than what comes before them by so much tell of a clock set back."""
+"""Time by which a record is earlier than those before it in the file where the clock was set back."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
@@ -154,7 +154,7 @@ def _camera(
     if infos:
         return camera_from_info(infos[0], f"{name}: camera_info"), []
     raise UnreadableRecording(
-        f"{name}: nothing says how its images are to be read: no camera.yaml is attached or lies beside it; "
+        f"{name}: nothing states how its images are to be read: no camera.yaml is attached or is beside it; "
         "give camera=PATH/camera.yaml"
     )
 
@@ -171,7 +171,7 @@ def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
 
 def _add_transforms(feed: Feed, name: str, add: Callable[[Any], None], record: Record) -> None:
     if feed.topics.get(record.topic) != TRANSFORMS_TYPE:
-        return  # where it is needed, that is said once the log has been gone through
+        return  # where it is needed, that is reported once the log has been gone through
     try:
         add(feed.decode(record.topic, record.data))
     except (ValueError, AttributeError, TypeError) as error:  # a log may define the type otherwise
@@ -261,7 +261,7 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
 
 
 def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps, topic: str | None) -> Bools:
-    """Which images lie in the time of a topic; the others are counted as lost. Raises `UnreadableRecording` if all."""
+    """Which images are in the time of a topic; the others are counted as lost. Raises `UnreadableRecording` if all."""
     keep, kind = within(stamps, times), {"odometry": "outside_odometry", "truth": "no_position"}[role]
     span = "from {:.3f} to {:.3f} s".format(*times[[0, -1]] / 1e9)
     for stamp in stamps[~keep]:

@@ -124,7 +124,7 @@ def read_trajectory(file: Path) -> Trajectory:
 
 
 def trajectory_rows(file: Path) -> Rows:
-    """The rows of a file as they stand, in TUM's format or a CSV table. Raises `BadInput`."""
+    """The rows of a file as they are, in TUM's format or a CSV table. Raises `BadInput`."""
     head = read_small(file, tables.MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
     lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     tum = lines and "," not in lines[0] and len(lines[0].split()) == 8
@@ -228,7 +228,7 @@ def _poses(table: tables.CsvTable, columns: dict[str, int], units: dict[str, Any
         tilted = float((upright < math.cos(math.radians(MAX_TILT_DEG))).mean()) if len(upright) else 0.0
         if tilted > MAX_TILTED:
             how = f"{tilted:.0%} of its orientations are tilted by more than {MAX_TILT_DEG:g} degrees"
-            doubts.append(f"{how}: a robot lies on its side, or a camera's frame; is w the first of their quaternions?")
+            doubts.append(f"{how}: a robot is on its side, or a camera's frame; is w the first of their quaternions?")
     return times, np.column_stack([x, y, heading]), impossible, doubts
 
 

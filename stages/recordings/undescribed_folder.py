@@ -11,7 +11,7 @@ from .recording import Format, OpenOptions
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".ppm")
 DEFAULT_RATE_HZ = 1.0
-"""Images per second where nobody says: then most stages take every image."""
+"""Images per second where nobody states them: then most stages take every image."""
 
 
 class UndescribedFolder(Format):

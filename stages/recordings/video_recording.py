@@ -72,7 +72,7 @@ class VideoRecording(Recording):
         return hashlib.sha256((digest_file(self._path) + write_camera(self.camera)).encode()).hexdigest()
 
     def _decoded(self, frame: int) -> Pixels:
-        """The frame at a stamp, by going on until the decoder is there; `Undecodable` where it passes over it."""
+        """The frame at a stamp, by reading on until the decoder is there; `Undecodable` where it passes over it."""
         target = int(self.stamps[frame])
         if frame < self._next:
             self._capture, self._ahead = _opened(self._path), None
@@ -142,7 +142,7 @@ def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
         raise UnreadableRecording(f"{path}: {error.strerror}; name a video that can be read") from None
     if not CONTAINERS.match(head):
         raise UnreadableRecording(f"{path}: this is no video, expected MP4, MOV, AVI, MKV, WebM, MPEG or Ogg")
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what it says of each broken packet is counted here
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its messages on broken packets are counted here
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
     if not capture.isOpened():

@@ -26,7 +26,7 @@ offices, three of 600 on recordings."""
 
 
 def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibration) -> Floats:
-    """The ratio for each compared reference and heading: (references, headings) float32, 1 says nothing."""
+    """The ratio for each compared reference and heading: (references, headings) float32, 1 shows nothing."""
     scores = standard_scores(similarities.values, similarities.sampling_weight)
     return saturated_ratios(scores, calibration.slope, calibration.middle, OUTLIERS, calibration.images)
 

@@ -39,14 +39,14 @@ SECTOR = math.radians(15.0)
 """Width of a sector of the view (rad)."""
 ODDS_PER_SECTOR, EVEN_SECTORS, MAX_LOG_ODDS = 0.75, 7.5, 8.0
 """Log odds (nats) that a pose is right, by the sectors in which landmarks agree: what misleads is one wall or one shelf
-that repeats itself, so that of 40 landmarks that agree on a wrong pose all lie in three to seven sectors of 24, and 16
+that repeats itself, so that of 40 landmarks that agree on a wrong pose all are in three to seven sectors of 24, and 16
 that agree on a right one in seven to ten (docs/experiments/landmarks.md)."""
 SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 SURE = 0.95
 """Probability of a pose from which on it tells how much stamps jitter."""
 SAID_JITTER_S = 0.01
-"""Standard deviation of stamps from which on the run is told of it, s."""
+"""Standard deviation of stamps from which on the run reports it, s."""
 MAX_MOTIONS = 5.0
 """Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
@@ -57,7 +57,7 @@ WITHOUT_LANDMARKS = (
 
 
 class LandmarkPoseState(State):
-    """Stamp of the last image (ns), and the fields of `jitter`; `told`: whether the run was told of it."""
+    """Stamp of the last image (ns), and the fields of `jitter`; `told`: whether the run reported it."""
 
     stamp: int = 0
     pose: Array = field(default_factory=lambda: StampJitter.unknown().pose)
@@ -85,7 +85,7 @@ class LandmarkPose(Stage):
     references are looked at, and the likelier round counts. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
-    sectors of the view its inliers lie in. An image with too few inliers says nothing, and so does a map without
+    sectors of the view its inliers are in. An image with too few inliers gives no pose, and so does a map without
     landmarks. Where the tour showed that images are stamped late, the pose is moved on by the robot's motion over that
     time; where stamps jitter, its covariance allows for the motion over their standard deviation. Raises BadInput for
     features of another kind than the map's.
@@ -219,12 +219,12 @@ def covariance_of(pose: BearingPose, sigma: float, factor: float) -> Array:
 
 
 def sectors_of(bearings: Array) -> int:
-    """The number of sectors of the view in which some bearings (M, 3) lie."""
+    """The number of sectors of the view in which some bearings (M, 3) are."""
     return len(distinct(np.floor(np.arctan2(bearings[:, 1], bearings[:, 0]) / SECTOR).astype(np.int64)))
 
 
 def probabilities_of(sectors: Ints) -> Array:
-    """Probabilities (K,) that each of rival poses is right, whose landmarks lie in so many sectors of the view (K,).
+    """Probabilities (K,) that each of rival poses is right, whose landmarks are in that many sectors of the view (K,).
 
     The odds grow by `ODDS_PER_SECTOR` (nats) with each sector, and are even at `EVEN_SECTORS`.
     """

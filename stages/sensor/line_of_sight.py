@@ -71,7 +71,7 @@ def first_occupied(cells: Cells, starts: Array, directions: Array) -> tuple[Ints
 
 @compiled(nogil=True)
 def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) -> bool:
-    # Whether the line from a cell's middle to a point crosses free cells only. The point lies in a free cell.
+    # Whether the line from a cell's middle to a point crosses free cells only. The point is in a free cell.
     last_row, last_column = math.floor(to_row), math.floor(to_column)
     steps = abs(last_row - row) + abs(last_column - column)
     if steps == 0:

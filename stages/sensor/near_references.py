@@ -192,9 +192,9 @@ def similarity_field(similarities: Similarities, floor: float, top: float, power
 class NearReferences(Stage):
     """Weights particles by their expected similarity, interpolated between the nearest references, to a power.
 
-    Gross & Koenig 2004, section 2, do not say how S becomes a weight (erratum 23a in docs/papers.md): w = S^power. The
-    expected similarity is interpolated between references and compared headings and, with a `fade_distance`, fades to
-    that of background references. With a `background_quantile` lower values count as background too, so that a robot
+    Gross & Koenig 2004, section 2, do not state how S becomes a weight (erratum 23a in docs/papers.md): w = S^power.
+    The expected similarity is interpolated between references and compared headings and, with a `fade_distance`, fades
+    to that of background references. With a `background_quantile` lower values count as background too, so that a robot
     off the mapped paths, which resembles no reference, is not pulled to the least dissimilar one. Images taken at one
     place are not independent evidence: the power is scaled by the novelty of the image. Distances are in appearance
     length scales, so that one configuration serves a room, a field and a lawn. Where only some references were

@@ -79,7 +79,7 @@ def _look_up(
     new: Ints,
 ) -> tuple[int, bool]:
     # The list of each pose's cell; list 0 is empty. Cells without a list get the numbers from `known` on, and lists of
-    # these points, which the tree has to make where distances are too equal to say which comes first.
+    # these points, which the tree has to make where distances are too equal to decide which comes first.
     number, sure, per_cell = 0, True, 1.0 / cell
     empty, nearest, squares = lists[0], np.empty(lists.shape[1] + 1, np.int64), np.empty(lists.shape[1] + 1)
     for n in range(len(poses)):
@@ -104,7 +104,7 @@ def _look_up(
 def _nearest_of_few(
     x: float, y: float, points: Array, radius: float, nearest: Ints, squares: Array, found: Shorts
 ) -> bool:
-    # As the tree's search gives them; False where distances are too equal to say which comes first.
+    # As the tree's search gives them; False where distances are too equal to decide which comes first.
     number, k, limit, sure = 0, len(found), radius * radius, True
     for n in range(len(points)):
         dx, dy = points[n, 0] - x, points[n, 1] - y

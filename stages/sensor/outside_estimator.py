@@ -31,8 +31,8 @@ class OutsideEstimator(Stage):
     """Simulates an external estimator: a noisy pose every few metres, sometimes a wrong one.
 
     Gross, Koenig & Müller 2005, sections 1 and 2.1: "state hypotheses from other sources of information" are fused as
-    motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement lies `WRONG_M` away
-    from it in any direction, and says that it is as exact as the others. Absent between statements and without truth.
+    motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement is `WRONG_M` away
+    from it in any direction, and claims to be as exact as the others. Absent between statements and without truth.
     """
 
     wrong: Annotated[float, Bounds(ge=0, le=1)] = 0.0

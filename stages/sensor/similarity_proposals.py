@@ -56,7 +56,7 @@ class SimilarityProposals(Stage):
 
 
 def draw_cells(field: SimilarityField, rng: np.random.Generator, number: int) -> tuple[Ints, Array]:
-    """Cells of a field, (number,) flat indices, and weights (number,) with which they stand for draws by weight.
+    """Cells of a field, (number,) flat indices, and weights (number,) with which they represent draws by weight.
 
     Cells at the floor are drawn evenly.
     """

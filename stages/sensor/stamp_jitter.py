@@ -29,7 +29,7 @@ class StampJitter(NamedTuple):
     """Likelihoods of standard deviations of stamps, by consecutive images whose poses were measured one by one.
 
     `pose` (3,), `covariance` (3, 3): of the last image, NaN where it has none. `velocity` (3,): of the last motion, in
-    the map's frame, and `along` (3,), factors by which its error gave a time; NaN where it told none. `hypotheses`
+    the map's frame, and `along` (3,), factors by which its error gave a time; NaN where it gave none. `hypotheses`
     (3, J, O): log likelihood, last residual and its variance, by `JITTERS_S` and `ODOMETRY_S`.
     """
 

@@ -1,4 +1,4 @@
-"""Weights particles by the views whose visibility areas they lie in."""
+"""Weights particles by the views whose visibility areas they are in."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,7 @@ WINDOW_DEG = 5.0
 
 
 class Visibility(Stage):
-    """Weights particles by the mean similarity of the views whose visibility areas they lie in.
+    """Weights particles by the mean similarity of the views whose visibility areas they are in.
 
     Wolf, Burgard & Burkhardt 2005, section V, equations 6 to 8. With a forward-looking camera the particle's heading
     must also deviate from the direction to the view's point lambda by at most `WINDOW_DEG`. Where no view is left
@@ -117,7 +117,7 @@ class Visibility(Stage):
         return self.Out(likelihood=likelihood, field=similarity_field(weighed, floor, 1.0, 1.0))
 
     def _raised(self, similarities: Similarities, calibration: SimilarityCalibration | None) -> tuple[Array, float]:
-        # What is averaged, 1 at most, and up to where it says nothing.
+        # What is averaged, 1 at most, and up to where it shows nothing.
         if calibration is not None:
             ratios = likelihood_ratios(similarities, calibration).astype(np.float64)
             top = max(float(ratios.max()), 1.0)

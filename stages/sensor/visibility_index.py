@@ -46,7 +46,7 @@ class Cells(NamedTuple):
     """The groups seen from each cell of a grid: from cell n (row by row) `items[starts[n] : starts[n + 1]]`.
 
     `origin` x, y (m) of the lower left corner; `resolution` (m); `rows`, `columns`. `places` (G, 5) float32: where each
-    group's point and its views lie from the origin (m), and its bearing (turns). `most`: groups seen from any cell.
+    group's point and its views are from the origin (m), and its bearing (turns). `most`: groups seen from any cell.
     """
 
     starts: Ints
@@ -81,7 +81,7 @@ def looks_at(areas: VisibilityAreas, poses: Array, each_view: bool = False) -> L
 
 def seen_from(areas: VisibilityAreas, looks: Looks, within: float = math.inf) -> Cells:
     """Index the groups seen from each cell: those whose point is visible, taken `within` metres of any spot of it."""
-    radius = within / areas.resolution + math.sqrt(0.5)  # in cells, from the middle of one: its corners lie so far out
+    radius = within / areas.resolution + math.sqrt(0.5)  # in cells, from the middle of one to its corners
     middle = (looks.place - areas.origin) / areas.resolution - 0.5
     starts, items = _by_cell(areas.starts, areas.runs, *areas.shape, looks.target, middle, radius)
     turns = looks.bearing / (2 * math.pi) % 1.0

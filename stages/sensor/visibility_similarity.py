@@ -26,7 +26,7 @@ def sums_by_turn(looks: Looks, groups: Ints, rows: Ints, values: Array, each: Ar
     """Sums of the views of some `groups` (S,) over the robot's turn: (S, headings + 1), (S,).
 
     Entry (s, h) is the sum of the `values` (R, headings) of all views of group s for a robot that sees their point
-    2 pi h / headings farther to its right than the robot of the first view did, wherever it has moved meanwhile: the
+    2 pi h / headings farther to its right than the robot of the first view did, wherever it has moved since: the
     first is compared at that turn, the others at what they are `turned` more. Between the compared headings values are
     linear. The last column repeats the first. The second result is the number of views. `rows` (references,): a
     reference's row in `values`, -1 where it was not compared; `each` (R,): its sampling weight.
@@ -175,7 +175,7 @@ def _gaussian(square: Single) -> Single:
 def _turned_past(
     right: Floats, up: Floats, turn: Floats, number: int, headings: Single, whole: Shorts, part: Floats
 ) -> None:
-    # How far angles (in turns) are past the directions to points, as columns of so many headings: vector instructions.
+    # How far angles (in turns) are past the directions to points, as columns of the headings: vector instructions.
     # The arc tangent is a polynomial of the smaller over the larger of two sides.
     c1, c3, c5, c7 = (
         np.float32(ARC_TANGENT[0]),

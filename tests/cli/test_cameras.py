@@ -132,7 +132,7 @@ def test_a_donut_is_refused_where_no_ring_stands_out(tmp_path: Path, capsys: pyt
         noise = np.random.default_rng(number).integers(0, 256, (120, 160, 3), dtype=np.uint8)
         cv2.imwrite(str(tmp_path / f"{number}.png"), noise)
     assert main(["camera", "look", f"log={tmp_path}", "camera=donut"]) == 2
-    assert "no ring of a mirror stands out in its first 2 images; is it another camera (camera=…)? If not, give" in (
+    assert "no ring of a mirror is found in its first 2 images; is it another camera (camera=…)? If not, give" in (
         capsys.readouterr().err
     )
 

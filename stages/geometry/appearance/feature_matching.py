@@ -77,8 +77,8 @@ def _mutual(
 def mutual_nearest(squares: Floats, ratio: float, points: Array = NOWHERE) -> Pairs:
     """Pairs of which each is the other's nearest, and by `ratio` nearer than the second nearest of either.
 
-    `squares` (N, M) float32: squared distances. `points` (M, 3): where the second view's features lie (m), where it is
-    known; then the second nearest is one that lies elsewhere. A row or column without a second nearest passes the
+    `squares` (N, M) float32: squared distances. `points` (M, 3): where the second view's features are (m), where it is
+    known; then the second nearest is one that is elsewhere. A row or column without a second nearest passes the
     ratio. (Goedemé et al. 2007, section 3.4.)
     """
     rows, columns = squares.shape

@@ -21,7 +21,7 @@ def circle_taps(radius: float, angles: int, turn: float, stride: int, channels: 
     """Positions of a factor of the kernel at `angles` equal steps around a circle of `radius` pixels.
 
     At each four pixels, as offsets from the one that the kernel turns around in an image with `stride` values in a row,
-    and their bilinear weights: (angles, 4) each. The first lies at `turn` radians; angles run from the direction of
+    and their bilinear weights: (angles, 4) each. The first is at `turn` radians; angles run from the direction of
     growing columns to that of growing rows.
     """
     angle = 2.0 * math.pi * np.arange(angles) / angles + turn

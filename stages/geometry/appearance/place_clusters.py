@@ -103,7 +103,7 @@ def waypoint_views(matches: Callable[[int, int], int], path: Ints, min_matches: 
 
     `matches`: of one view with another one further along. `path`: views in the order of the drive; the first and the
     last are given and are not part of the answer. No two are more than `max_step` views apart, however similar: along
-    a wall that repeats itself similarity says nothing.
+    a wall that repeats itself similarity shows nothing.
     """
     views = path.tolist()
     chosen: list[int] = []

@@ -7,7 +7,7 @@ from omninav.stages.geometry.arrays import Array, Ints
 
 
 def links_between(links: Ints, places: int) -> Array:
-    """Number of links of the shortest path between any two of so many places: (P, P), inf where there is none.
+    """Number of links of the shortest path between any two places: (P, P), inf where there is none.
 
     `links` (L, 2): neighbouring places, whichever way round.
     """

@@ -42,7 +42,7 @@ def turns_of_nearest(turned: Floats, kept: Floats) -> Array:
     """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot
-    stands turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.
+    is turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.
     """
     if len(turned) < 3:
         return np.zeros(len(kept))

@@ -27,7 +27,7 @@ def spectral_distances(values: Floats, kept: Floats, channels: int, segments: in
     """Euclidean distance between the magnitudes of two spectra's coefficients, (D,) and (R, D): (R,).
 
     In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
-    these magnitudes (Parseval; each frequency but the lowest and the half of an even number of segments stands for
+    these magnitudes (Parseval; each frequency but the lowest and the half of an even number of segments represents
     two).
     """
     half = values.shape[-1] // 2
@@ -69,7 +69,7 @@ def best_turns(values: Floats, kept: Floats, channels: int, segments: int, steps
 
 
 def _share(frequencies: int, segments: int) -> Array:
-    # How much of the signal's energy a coefficient stands for, for a spectrum divided by sqrt(segments).
+    # How much of the signal's energy a coefficient represents, for a spectrum divided by sqrt(segments).
     share = np.full(frequencies, 2.0)
     share[0] = 1.0
     if segments % 2 == 0 and frequencies == segments // 2 + 1:

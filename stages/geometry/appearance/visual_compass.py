@@ -15,7 +15,7 @@ def turn_between(before: Floats, after: Floats) -> float:
     The shift of the columns at which they correlate best around the full circle, summed over rows; between columns by
     a parabola through the three highest. Each row counts from its mean, so that light which changes evenly does not
     matter. Zeil, Hofmann & Chahl 2003, "Catchment areas of panoramic snapshots in outdoor scenes", JOSA A 20(3),
-    section 3 use the same image difference; for what is far away the turn is exact, whatever the robot drove meanwhile.
+    section 3 use the same image difference; for what is far away the turn is exact, however far the robot drove.
     """
     return turns_and_correlations(np.stack([before, after]))[0][0]
 

@@ -23,7 +23,7 @@ from .feature_matching import (
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
 MIN_MATCHES = 8
-"""Fewest matches of views that have something in common, where nothing else is said."""
+"""Fewest matches of views that have something in common, unless another number is given."""
 PatchDistance = Literal["euclidean", "mahalanobis"]
 """Distance of two patches' descriptors: as they are, or each element by its spread over both views (equation 2 of
 Goedemé et al. 2007)."""
@@ -107,8 +107,8 @@ def local_distance(angles: Array, first: int, second: int, by: ComparisonOptions
 
     D = (n1 + n2) sum |theta_i| / (2 N^2) (Goedemé et al. 2007, equations 3 and 4; erratum 27 in docs/papers.md): the
     mean number of features over that of matches, times the mean angle between matches once both views are aligned by
-    the circular mean. The paper does not say its unit; here it is the full turn, in which 0.5 makes places of about the
-    paper's size (in radians they would be a metre wide). `angles` (N,): azimuth in the second view less that in the
+    the circular mean. The paper does not state its unit; here it is the full turn, in which 0.5 makes places of about
+    the paper's size (in radians they would be a metre wide). `angles` (N,): azimuth in the second view less that in the
     first. `first`, `second`: n1 and n2. A single match would be a perfect one, so D is inf below `min_matches`, and the
     mean angle is at least `min_angle`.
     """

@@ -48,7 +48,7 @@ def word_counts(descriptors: Floats, centres: Floats) -> tuple[Ints, Floats]:
 
 
 def rarity(document_frequency: npt.NDArray[np.integer], documents: int) -> Floats:
-    """Weight (K,) of each word by in how many of so many views it is: log(1 + views / its views), 0 for none.
+    """Weight (K,) of each word by the number of views that have it: log(1 + views / its views), 0 for none.
 
     The inverse document frequency of text retrieval (Sivic & Zisserman 2003), with a 1 so that a map of one view has
     weights too.

@@ -91,7 +91,7 @@ def adjusted(
     in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
     (R, 3 or 5): standard deviations of the poses as they are `given`, 0 for one that stays and infinite for one that is
     free; None: the first stays, and all others are free. `given` (R, 3 or 5): None for `poses`, where it begins.
-    Bearings alone say nothing of the scale: it is that of `motions`, or of poses of finite sigma.
+    Bearings alone do not show the scale: it is that of `motions`, or of poses of finite sigma.
 
     Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
     dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale

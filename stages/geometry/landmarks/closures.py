@@ -28,7 +28,7 @@ MAX_FALSE_ALARMS = 1e-6
 TURN_SIGMA = math.radians(0.5)
 """Standard deviation of a pair's turn (rad)."""
 DISTANCE_SIGMAS_M = (2.0, 0.3, 0.3)
-"""Standard deviations (m) of where the second reference of a pair lies, round by round: the first does not know how far
+"""Standard deviations (m) of where the second reference of a pair is, round by round: the first does not know how far
 away it is, the next have the distance of the round before."""
 MAX_DISTANCE_M = 4.0
 """Distance of a pair, m, beyond which it is not believed."""
@@ -38,7 +38,7 @@ class VerifiedPairs(NamedTuple):
     """Pairs of references and the motion between them, its length aside, and the matches that agree with it.
 
     `pairs` (P, 2), the earlier first; `turns` (P,): heading of the later in the frame of the earlier, and `directions`
-    (P,): where it lies in that frame (rad). `first`, `second` (M,): matched rows of features, of all pairs, with
+    (P,): where it is in that frame (rad). `first`, `second` (M,): matched rows of features, of all pairs, with
     `ratio` (M,): the clearer, the smaller; `owners` (M,): the pair of each.
     """
 

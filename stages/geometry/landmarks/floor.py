@@ -5,7 +5,7 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array, Ints
 
 RANGE = 0.25
-"""Part of the camera's height by which the floor may seem to lie higher or lower: odometry is off by less."""
+"""Part of the camera's height by which the floor may seem higher or lower: odometry is off by less."""
 NEAR = 1.7
 """Horizontal distance of a landmark from the nearest reference that sees it, as a part of the camera's height, beyond
 which it is left out: the floor is then seen at less than 30 degrees below the horizon, and its depth is uncertain."""
@@ -22,14 +22,14 @@ MIN_STEEP = 40
 LOG_STEP = 0.01
 """Step of the logarithm of the depth there."""
 LOW_PEAK = 0.7
-"""Density of a depth below the densest one, as a part of its density, from which the floor lies there: a table may hold
+"""Density of a depth below the densest one, as a part of its density, from which the floor is there: a table may hold
 as many landmarks as the floor, and what a polished floor mirrors holds fewer."""
 MIN_LANDMARKS = 50
 """Landmarks within about a bandwidth of the floor, at least."""
 
 
 def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, height: float) -> float | None:
-    """Metres of the floor below the cameras of a map: the depth at which most landmarks lie, near `height`.
+    """Metres of the floor below the cameras of a map: the depth at which most landmarks are, near `height`.
 
     `points` (L, 3): with z = 0 at the cameras' height, and `poses` (R, 3) of the references, both in the map's own
     scale; `references`, `landmarks` (O,): of each sighting; `height`: of the camera over the floor, as it is known. A
@@ -51,7 +51,7 @@ def floor_depth(points: Array, poses: Array, references: Ints, landmarks: Ints, 
 def lowest_plane(points: Array, poses: Array, references: Ints, landmarks: Ints) -> float | None:
     """Depth of the floor below the cameras where nothing is known of the scale, in its own unit.
 
-    Arguments as of `floor_depth`. Little is seen below a floor: of the depths at which most landmarks lie, or nearly as
+    Arguments as of `floor_depth`. Little is seen below a floor: of the depths at which most landmarks are, or nearly as
     many (`LOW_PEAK`), it is the largest. None where no depth stands out.
     """
     distances = _distances(points, poses, references, landmarks)

@@ -43,7 +43,7 @@ def left_out_poses(
     """Locates sample references by landmarks that are triangulated without them and their neighbours on the tour.
 
     Landmarks have errors too, from coarse textures and wrong poses of the map, and those of neighbouring landmarks are
-    alike: more bearings to them do not average these out, and a pose is off by more than its bearings say.
+    alike: more bearings to them do not average these out, and a pose is off by more than its bearings imply.
     Descriptors are those of all sightings, the left-out image's among them, so that rather more are found than of a
     later drive.
     `descriptors` (L, D): of the landmarks; `poses` (R, 3): of the references; `sigma` (rad): of a bearing;

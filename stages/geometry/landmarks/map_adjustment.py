@@ -46,7 +46,7 @@ MIN_SIGHTINGS, MIN_SHARE = 20, 0.5
 """Landmarks that a reference must see to tell where it is, and the part of all references that must see as many."""
 SEEN_LOOSENESS = (10.0, 10.0, 3.0)
 """Factors of the standard deviations of odometry where it was seen in the images: where these show little its lengths
-are off by a third and more, and it says what the images say anyway."""
+are off by a third and more, and it repeats what the images show."""
 MIN_CLOSURES = 3
 """Pairs of images far apart along a drive that must show one place, to tell how odometry bent it."""
 MOUNT_ROUNDS = 5
@@ -63,7 +63,7 @@ class AdjustedMap(NamedTuple):
     """Poses (R, 3) of references that agree with what their images show, and what the camera is corrected by (K,).
 
     `problem`: why nothing was adjusted; empty where it was. `closures`: how often a drive came back to a place.
-    `scale`: factor of odometry's lengths by which the floor lies where it is known to; None where that is not known.
+    `scale`: factor of odometry's lengths by which the floor is where it is known to be; None where that is not known.
     `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
     images measured any. `covariances`: a function that gives those (R, 3, 3) of the poses, 0 where images confirm given
     ones; None where nothing was adjusted. `slipped` (S,): references after which odometry had another length than the
@@ -85,9 +85,9 @@ def found_with_mount(
 ) -> tuple[AdjustedMap, Array, float]:
     """Adjusts the poses of a camera on a robot, and finds its mount (3,) and the delay of its images (s).
 
-    `described`: the mount as the camera's description says it. Where the adjusted poses show another mount or a delay,
-    those that begin with them are adjusted again. `again`: adjusts poses that tell both, where those as measured fit
-    nothing.
+    `described`: the mount as the camera's description states it. Where the adjusted poses show another mount or a
+    delay, those that begin with them are adjusted again. `again`: adjusts poses that tell both, where those as measured
+    fit nothing.
     """
     found, mount, delay = adjust(camera_poses(robot.poses, described)), described, 0.0
     for _ in range(MOUNT_ROUNDS):
@@ -134,7 +134,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     given, agreed = (_fitting(looking, matches, each) for each in (poses, found.poses))
     away = np.hypot(*(found.poses - poses)[:, :2].T)
     confirmed = np.median(away) < CONFIRMED_M or agreed.sum() < MIN_GAIN * given.sum()
-    # A single pose is off where its own matches say so by three standard deviations of their number.
+    # A single pose is off where its own matches show it by three standard deviations of their number.
     exact = confirmed & ((away < OUTLYING_M) | (agreed < MIN_GAIN * given + 3.0 * np.sqrt(given)))
     covariances = found.covariances
     assert covariances is not None

@@ -17,7 +17,7 @@ from .tracks import Tracks, joined_matches
 from .triangulation import triangulated_tracks
 
 NEIGHBOUR_DISTANCES = (0.2, 4.0)
-"""Least and largest distance of two references that are matched, in length scales of the map: nearer ones say nothing
+"""Least and largest distance of two references that are matched, in length scales of the map: nearer ones show nothing
 of depths, and farther ones see little that is the same."""
 NEIGHBOURS = 10
 """References that each is matched with, those that share most visual words."""
@@ -233,7 +233,7 @@ def similarity_rows(starts: Ints, words: Shorts, weights: Floats, size: int, ref
 def fit_motion(first: Array, second: Array, motion: Array, tolerance: float) -> Bools:
     """Which matched bearings (M, 3) of two images one point each may have, seen before and after a motion.
 
-    `motion` (3,): x, y (m), turn (rad) of the second robot in the frame of the first. Both bearings lie within
+    `motion` (3,): x, y (m), turn (rad) of the second robot in the frame of the first. Both bearings are within
     `tolerance` (rad) of one plane through both cameras, and meet ahead of both.
     """
     out = np.zeros(len(first), np.bool_)

@@ -35,7 +35,7 @@ LENGTH_SIGMA, LENGTH_SIGMA_M = 0.1, 0.05
 MAX_LOGARITHM, RESOLUTION = 10.0, 1e-5
 """Largest logarithm of a ratio of depths, for which larger ones count, and the steps to which it is rounded."""
 FIRST_SCALE, LAST_SCALE, ROUNDS = 100.0, 1.0, 15
-"""Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of so many rounds."""
+"""Standard deviations at which what disagrees counts by half (Cauchy), at first and in the last of the rounds."""
 FREE = 1e3
 """Standard deviation of the logarithm of a length of which nothing is known."""
 
@@ -144,7 +144,7 @@ def _ratios(bearings: Array, pairs: VerifiedPairs) -> tuple[Ints, Ints, Array, A
 
 def _depths(bearings: Array, pairs: VerifiedPairs) -> tuple[Array, Array]:
     """Distances (M,) of matched features from the first image and from the second, in lengths of the pair's motion; NaN
-    where they have too little parallax or would lie behind."""
+    where they have too little parallax or would be behind."""
     turns, directions = pairs.turns[pairs.owners], pairs.directions[pairs.owners]
     first, second = bearings[pairs.first], turned(bearings[pairs.second], turns)
     towards = np.column_stack([np.cos(directions), np.sin(directions), np.zeros(len(directions))])

@@ -30,7 +30,7 @@ def triangulated_tracks(
     `centres` (O, 3): where each sighting was taken from (m), and `bearings` (O, 3) the unit vector it looks along, in
     the map frame. The least squares of the distances to the lines, each divided by the point's distance, so that angles
     are minimised. Sightings that are off by more than `miss` (rad) are dropped. A point needs two images and
-    `min_parallax` (rad) between them, and lies within `max_distance` (m) of all.
+    `min_parallax` (rad) between them, and is within `max_distance` (m) of all.
     """
     points = np.full((len(starts) - 1, 3), np.nan)
     kept = np.zeros(len(centres), np.bool_)

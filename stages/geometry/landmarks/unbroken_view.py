@@ -23,7 +23,7 @@ SAME_PLACE_TOLERANCE = math.radians(2.0)
 days 50 fit from 2 cm apart and 49 from 8 cm, 12 from 20 cm, and none from 0.5, 1 or 2 m."""
 MIN_FITTING, MIN_SHARE = 25, 0.5
 """Matches that must fit odometry's motion, and their share, of a robot that was not carried. Of images in a row 99 %
-and more have them (a house, two offices, a store), of images 1 to 3 m from where odometry says 0 to 7 %."""
+and more have them (a house, two offices, a store), of images 1 to 3 m from where odometry has them 0 to 7 %."""
 SAME_SURROUNDINGS, SURROUNDINGS_M = 40, 5.0
 """Matches that two images of the same surroundings have, and how far off these were taken at most (m): of images in a
 row 98 % have 50 and more, also where the camera was lifted; of images more than 3 m off 98 % have fewer than 24."""
@@ -39,7 +39,7 @@ narrow aisle 21 of 31 of two images 0.45 m apart did; of 2,367 images 1.5 m and 
 
 
 class Carried(NamedTuple):
-    """A bound, `at_most`, of how far (m) from where odometry says a robot was carried, whether it `surely` was, and by
+    """A bound, `at_most`, of how far (m) from odometry's pose a robot was carried, whether it `surely` was, and by
     how much it was `turned` otherwise (rad)."""
 
     at_most: float

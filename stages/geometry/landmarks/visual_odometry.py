@@ -29,7 +29,7 @@ RELATIVE_SIGMA = 0.1
 MIN_PARALLAX = math.radians(1.0)
 """Median angle between matched bearings, both turned the same way, from which two images tell a direction (rad)."""
 STILL = math.radians(0.3)
-"""The same below which the camera is taken to stand where the keyframe was (rad)."""
+"""The same below which the camera is taken to be where the keyframe was (rad)."""
 KEYFRAME_PARALLAX = math.radians(3.0)
 """The same from which an image becomes a keyframe (rad)."""
 

@@ -63,7 +63,7 @@ def placed_drives(own: Array, drives: Ints, closures: Closures, scale_m: float) 
             if not len(seen):
                 continue
             here = compose(poses[known], np.column_stack([np.zeros((len(known), 2)), turns]))
-            starts = compose(here, between(own[seen], np.zeros(3)))  # where the drive's frame lies, each closure thinks
+            starts = compose(here, between(own[seen], np.zeros(3)))  # where the drive's frame is by each closure
             expected = compose(starts[:, None], own[seen][None])  # (hypotheses, closures)
             missed = np.hypot(expected[..., 0] - here[:, 0], expected[..., 1] - here[:, 1]) / scale_m
             turned = wrap(expected[..., 2] - here[:, 2]) / HEADING_SCALE

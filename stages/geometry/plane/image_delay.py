@@ -39,7 +39,7 @@ class RobotPath:
     times: Array = field(default_factory=lambda: np.empty(0))
 
     def before(self, delay_s: float) -> Array:
-        """Poses (R, 3) at so many seconds before the stamps, by straight steps of the drive."""
+        """Poses (R, 3) at a number of seconds before the stamps, by straight steps of the drive."""
         if not delay_s or not len(self.times):
             return self.poses
         then, now = (interpolate(self.times, self.driven, at) for at in (self.stamps - delay_s, self.stamps))

@@ -17,7 +17,7 @@ MIN_SIGMAS = 4.0
 MIN_STEPS = 20
 """Steps between poses that a mount is found from, at least."""
 MIN_TURNED = math.radians(5.0)
-"""Root of the mean squared turn of these steps, below which no distance is told (rad)."""
+"""Root of the mean squared turn of these steps, below which no distance is measured (rad)."""
 ROUNDS, LOOSE_SIGMAS = 10, 2.0
 """Rounds of least squares, and the distance (in sigmas) at which a step counts by half."""
 MEDIAN_OF_RAYLEIGH = math.sqrt(2.0 * math.log(2.0))
@@ -60,7 +60,8 @@ def found_mount(camera: Array, robot: Array, left: bool = False) -> Array | None
 
     Where a robot moves by d and turns by R, its camera moves by s B (d + (R - 1) a), of which the scale s and the turn
     of its frame B against the robot's are found too (hand-eye calibration in the plane). Steps that disagree count less
-    (Cauchy). Parts that are not told from 0 are 0; None where none is. `left`: it is what is left of one found before.
+    (Cauchy). Parts that do not differ from 0 significantly are 0; None where none is. `left`: it is what is left of one
+    found before.
     """
     driven, seen = between(robot[:-1], robot[1:]), between(camera[:-1], camera[1:])
     turned = np.exp(1j * seen[:, 2]) - 1.0
@@ -68,7 +69,7 @@ def found_mount(camera: Array, robot: Array, left: bool = False) -> Array | None
         return None
     steps, measured = (each[:, 0] + 1j * each[:, 1] for each in (driven, seen))
     rows = np.column_stack([steps, turned])
-    if np.linalg.matrix_rank(rows) < rows.shape[1]:  # a robot that stands, or odometry at rest
+    if np.linalg.matrix_rank(rows) < rows.shape[1]:  # a stationary robot, or odometry at rest
         return None
     weights, sigma, found = np.ones(len(rows)), 0.0, np.zeros(2, np.complex128)
     square = np.empty((2, 2), np.complex128)

@@ -15,7 +15,7 @@ def add_odometry_noise(motions: npt.ArrayLike, triple: Triple, drawn: npt.ArrayL
 
     Each motion is a rotation, a translation and a rotation, and each of the three gets its own error (Wolf, Burgard &
     Burkhardt 2005, section VI-D and figure 16; erratum 46a in docs/papers.md). The paper prints triples without units.
-    We read them as those of Gutmann, Burgard & Konolige (1998), whose model it says it follows: <a, b, c> are the
+    We read them as those of Gutmann, Burgard & Konolige (1998), whose model it states to follow: <a, b, c> are the
     standard deviations of the translation in mm per sqrt(m), of a turn in degrees per sqrt(360 degrees) turned, and in
     degrees per sqrt(m) driven. Both rotations share the latter two evenly. So the noise does not depend on how many
     motions a path is cut into. A motion backwards is a negative translation, not two half turns.

@@ -1,4 +1,4 @@
-"""Points of the plane by cells: which lie near some places, at a cost that does not grow with their number."""
+"""Points of the plane by cells: which are near some places, at a cost that does not grow with their number."""
 
 import math
 from typing import NamedTuple
@@ -43,7 +43,7 @@ def distinct(numbers: Ints) -> Ints:
 
 
 def within(cells: PointCells, places: Array, radius: float) -> Ints:
-    """The points that lie within `radius` metres of any place (M, >= 2), and some up to 1.36 as far: ascending indices.
+    """The points within `radius` metres of any place (M, >= 2), and some up to 1.36 as far: ascending indices.
 
     The points of cells that are near are looked at, each against places rounded to a quarter of the radius.
     """
@@ -54,7 +54,7 @@ def within(cells: PointCells, places: Array, radius: float) -> Ints:
     low = rounded.min(axis=0)
     height = int(rounded[:, 1].max() - low[1]) + 1
     numbers = distinct((rounded[:, 0] - low[0]) * height + rounded[:, 1] - low[1])
-    # A place lies within half a cell's diagonal of its cell's centre: the radius grows by that much.
+    # A place is within half a cell's diagonal of its cell's centre: the radius grows by that much.
     reach = CELLS_PER_RADIUS + math.sqrt(0.5)
     centres = (np.column_stack(np.divmod(numbers, height)) + low + 0.5) * cell
     near = _points_around(cells, centres, reach * cell)
@@ -63,7 +63,7 @@ def within(cells: PointCells, places: Array, radius: float) -> Ints:
 
 
 def have_a_point_within(cells: PointCells, places: Array, radius: float) -> Bools:
-    """Which places (M, >= 2) lie less than `radius` metres, at most the width of a cell, from any point: (M,)."""
+    """Which places (M, >= 2) are less than `radius` metres, at most the width of a cell, from any point: (M,)."""
     own = _numbers(places, cells.width)
     xy = np.ascontiguousarray(cells.points[cells.order, :2])
     found: Bools = _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)

@@ -57,7 +57,7 @@ def path_from(place: Array, points: Array, paths: Paths, reach: float, to_goal: 
 
 
 def ahead_on(line: Array, place: Array, ahead: float) -> tuple[Array, float]:
-    """The point (2,) of a line (K, 2) that lies `ahead` m on from its point closest to a place (2,), or its end.
+    """The point (2,) of a line (K, 2) `ahead` m on from its point closest to a place (2,), or its end.
 
     The closest point is looked for in the first `ahead` metres. And the metres of the line beyond the point that is
     given.

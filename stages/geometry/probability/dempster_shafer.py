@@ -1,4 +1,4 @@
-"""Dempster-Shafer evidence about one hypothesis: how much speaks for it, how much against, how much says nothing.
+"""Dempster-Shafer evidence about one hypothesis: how much speaks for it, how much against, how much for neither.
 
 Masses are arrays (..., 3): m(H), m(not H) and m(H or not H), the ignorance; they sum to 1.
 """

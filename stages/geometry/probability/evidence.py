@@ -8,7 +8,7 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 MIN_NOVELTY = 0.05
-"""Smallest novelty of an image: that of one taken where the robot stands."""
+"""Smallest novelty of an image: that of one taken while the robot stops."""
 MIN_SPREAD = 1e-6
 """Standard deviation of log S up to which similarities are alike: the rounding of 32-bit numbers."""
 

@@ -43,7 +43,7 @@ def squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) 
     """Squared Mahalanobis distances d^T (C_a + C_b)^-1 d between means (A, 3) and (B, 3): (A, B).
 
     Gross, Koenig & Mueller 2005, equations 2, 12 and 15, with the transpose that equation 2 lost and the heading's
-    difference wrapped (erratum 1 in docs/papers.md). For equal poses with three degrees of freedom 95 % lie below 7.81.
+    difference wrapped (erratum 1 in docs/papers.md). For equal poses with three degrees of freedom 95 % are below 7.81.
     """
     return _squared_distances(*(np.ascontiguousarray(a, np.float64) for a in (mean_a, cov_a, mean_b, cov_b)))
 
@@ -78,7 +78,7 @@ def merged(
     """Gaussians with the close ones merged: the closest pair first, until no pair is closer than `merge_below`.
 
     `merge_below` is a squared Mahalanobis distance (`squared_distances`); a pair becomes one Gaussian with its moments
-    (`moments`, with or without `spread`). `weights` say how much each counts in them and are added up; `shares` (K,)
+    (`moments`, with or without `spread`). `weights`: how much each counts in them and are added up; `shares` (K,)
     are added up only. Porta & Kroese 2004, section 3.2: the weights are w. Gross, Koenig & Mueller 2005, equations 12
     to 14 (erratum 7): the weights are eta and the shares w, which may come to more than 1 (erratum 8: cap them).
 
@@ -104,7 +104,7 @@ def intersected(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, alpha:
 
     C = ((1 - alpha) C_a^-1 + alpha C_b^-1)^-1, mu = C [(1 - alpha) C_a^-1 mu_a + alpha C_b^-1 mu_b'] with mu_b' = mu_a
     + wrap(mu_b - mu_a) (Gross, Koenig & Mueller 2005, equations 3 and 4; the inverses of equation 3 were lost in
-    print, erratum 2). It does not shrink where both say the same: equal covariances stay as they are (erratum 4).
+    print, erratum 2). It does not shrink where both are the same: equal covariances stay as they are (erratum 4).
     Raises ValueError where a covariance is not positive definite.
     """
     mean, covariance = np.empty(3), np.empty((3, 3))

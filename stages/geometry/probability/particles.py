@@ -97,7 +97,7 @@ def _mode_and_mean(
 ) -> float:
     start, heaviest, least = _heaviest_cell(poses, weights, radius / 2, max(1, round(2 * np.pi / angle)))
     members = _climb(poses, weights, sines, cosines, start, radius, angle)
-    if weights[members].sum() < least:  # the heaviest cell of the neighbourhood lies beyond the kernel
+    if weights[members].sum() < least:  # the heaviest cell of the neighbourhood is beyond the kernel
         members = _climb(poses, weights, sines, cosines, heaviest, radius, angle)
     means[0], mass = _mean(poses, weights, sines, cosines, members)
     covariance[:] = _covariance(poses, weights, means[0], members)

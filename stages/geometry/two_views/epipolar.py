@@ -74,7 +74,7 @@ def eight_points(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[Array, Ar
 
     `first`, `second`: (..., N, 3), unit length, which is all the scaling it needs (erratum 36). Gives E (..., 3, 3)
     with singular values (1, 1, 0), and q_e = 1 - s2/s1 of the fit before they were made equal: 0 for a true essential
-    matrix. Ill-conditioned where most features lie on the horizon of a robot on a floor (erratum 37).
+    matrix. Ill-conditioned where most features are on the horizon of a robot on a floor (erratum 37).
     """
     first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     rows = (first[..., :, None] * second[..., None, :]).reshape(*first.shape[:-1], 9)
@@ -102,10 +102,10 @@ def planar_candidates(first: Array, second: Array, samples: Ints) -> tuple[Array
 
     `samples` (S, 2): rows of `first` and `second` (N, 3). Gives rotations (K, 3, 3), translations (K, 3), and from
     which sample each is: (K,). With R a turn by phi about the vertical, t = (cos theta, sin theta, 0) and psi = theta -
-    phi, E has four entries (erratum 37) and a pair says z2 (x1 sin theta - y1 cos theta) = z1 (x2 sin psi - y2 cos
+    phi, E has four entries (erratum 37) and a pair gives z2 (x1 sin theta - y1 cos theta) = z1 (x2 sin psi - y2 cos
     psi). Two of them are A u = B w for the unit vectors u and w of theta and psi; w is taken out, |B^-1 A u| = |u| is a
-    quadratic form in u, and vanishes along up to two lines. Both senses of t fit: which is right, the depths say. None
-    where both points lie on the horizon, of which a robot on a floor learns nothing, and where noise leaves no real
+    quadratic form in u, and vanishes along up to two lines. Both senses of t fit: the depths decide. None
+    where both points are on the horizon, of which a robot on a floor learns nothing, and where noise leaves no real
     solution.
     """
     rotations, translations = np.zeros((2 * len(samples), 3, 3)), np.zeros((2 * len(samples), 3))
@@ -162,7 +162,7 @@ def decompose(matrix: Array) -> Poses:
 
 
 def in_front(poses: Poses, first: npt.ArrayLike, second: npt.ArrayLike) -> Ints:
-    """For each relative pose how many points lie in front of both cameras: (K,).
+    """For each relative pose how many points are in front of both cameras: (K,).
 
     In front is a positive depth along both bearings, wherever they look; the sign of z, which is what pinhole code
     tests, is wrong beyond 180 degrees (erratum 36).

@@ -36,7 +36,7 @@ def relative_pose(
     """Pose of view 2 seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
 
     `threshold` (rad): see `agreement`. Samples are drawn until one without a wrong pair is among them with
-    `confidence`, judged by the share that agrees, but at `most` so many. `planar`: a robot on a floor, upright.
+    `confidence`, judged by the share that agrees, at `most` that many. `planar`: a robot on a floor, upright.
     Of poses on which equally many agree, the linear one with the smaller q_e is taken, as in the paper, else the one
     with smaller residuals. `refine`: the best so far is brought to its local optimum, over the two freedoms of a robot
     on a floor or over all five, as the solver has it. None where there are fewer pairs than a sample needs, or no
@@ -76,7 +76,7 @@ def relative_pose(
 
 
 def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
-    """Expected number of poses that as many pairs agree on among wrong pairs alone: above 1 says nothing.
+    """Expected number of poses that as many pairs agree on among wrong pairs alone: above 1 proves nothing.
 
     How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
     look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,

@@ -13,7 +13,7 @@ from omninav.stages.geometry.arrays import Array
 def depths(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, translation: Array) -> tuple[Array, Array]:
     """Distances along the bearings of view 1 and view 2 at which the two lines come closest: (N,) and (N,).
 
-    `first`, `second`: (N, 3) unit bearings of the same points. A negative depth lies behind, and the pair cannot be one
+    `first`, `second`: (N, 3) unit bearings of the same points. A negative depth is behind, and the pair cannot be one
     point: this, and not a coordinate's sign, tells the right one of the poses that an essential matrix allows
     (erratum 36 in docs/papers.md). Infinite where the lines are parallel.
     """

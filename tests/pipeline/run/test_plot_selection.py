@@ -64,5 +64,5 @@ def test_a_run_that_gives_other_figures_now_is_not_drawn(tmp_path: Path) -> None
 
 def test_a_run_that_has_not_ended_is_not_drawn(tmp_path: Path) -> None:
     run = begun(CONFIG | {"runs": str(tmp_path)})
-    with pytest.raises(BadInput, match=r"omninav resume .* goes on with it"):
+    with pytest.raises(BadInput, match=r"omninav resume .* continues it"):
         redraw(run.folder, "all")

@@ -90,7 +90,7 @@ def test_pixels_are_normalised_by_channel():
     [
         (lambda path: path, {}, "there is no file"),
         (lambda path: path.write_bytes(b"no network") and path, {}, "this is no network that onnxruntime can run"),
-        (lambda path: path.write_bytes(b"\x0a\x08location\x12\x09elsewhere") and path, {}, "weights lie in another"),
+        (lambda path: path.write_bytes(b"\x0a\x08location\x12\x09elsewhere") and path, {}, "weights are in another"),
         (lambda path: network(path, last=True), {}, "write nodes.features.layout=nhwc"),
         (lambda path: network(path, sides=("h", "w")), {}, r"write nodes.features.size=\[224,224\]"),
         (network, {"size": (8, 8)}, "its images are 16 x 16; leave nodes.features.size away"),

@@ -52,7 +52,7 @@ def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
     right = parse_camera(told(ctx, check, found), "camera.yaml")
     assert (right.centre_x, right.centre_y) == pytest.approx((319.5, 239.5), abs=0.05)
     assert (right.yaw, right.height) == (0.3, 0.9)
-    assert "its axis lies 3.0 px beside, at 319.5, 239.5" in ctx.warnings[0]
+    assert "its axis is off by 3.0 px, at 319.5, 239.5" in ctx.warnings[0]
     assert check.metrics(found, np.zeros(3), 0.0)["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
 
 

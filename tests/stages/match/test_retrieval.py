@@ -97,7 +97,7 @@ def test_each_window_looks_where_the_reference_does_if_the_robot_is_turned() -> 
 
 def test_windows_that_do_not_go_around_the_robot_are_refused() -> None:
     for directions in ([0.3], [0.0, 1.0], [0.0, 0.0]):
-        with pytest.raises(BadInput, match=r"must lie evenly around the robot, one straight ahead, .* yaw: 0"):
+        with pytest.raises(BadInput, match=r"must be spaced evenly around the robot, one straight ahead, .* yaw: 0"):
             window_turns(np.array(directions))
 
 

@@ -60,7 +60,7 @@ def test_other_images_need_a_camera(tmp_path: Path) -> None:
     camera = open_recording(path, camera="perspective").camera
     assert (camera.projection, camera.width, camera.height_px) == ("perspective", 80, 64)
     for named, said in (
-        (None, "nothing says how its images of 80 x 64 are to be read; type camera="),
+        (None, "nothing states how its images of 80 x 64 are to be read; type camera="),
         ("hyperbolic", r"camera=hyperbolic: needs its numbers; .*camera.yaml"),
         ("perspektive", "camera=perspektive: there is no such file or projection; did you mean 'perspective'"),
     ):

@@ -42,7 +42,7 @@ def test_what_cannot_be_recorded_is_said(tmp_path: Path, device: str) -> None:
         (RecordCamera(device="/dev/none"), "there is no camera /dev/none; type its number"),
         (RecordCamera(device="987"), "camera 987 cannot be opened"),
         (RecordCamera(device=device, out="drive.avi"), "type out=camera.mcap"),
-        (RecordCamera(device=device, out=str(tmp_path / "x.mcap")), "nothing says how its images of 80 x 64"),
+        (RecordCamera(device=device, out=str(tmp_path / "x.mcap")), "nothing states how its images of 80 x 64"),
     ):
         with pytest.raises(BadInput, match=what):
             stage.run(Context("record"))
