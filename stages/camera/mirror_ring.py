@@ -18,9 +18,11 @@ class RingNotFound(ValueError):
 MIN_SCORE = 1.0
 """Score below which no ring was found. Over 27 images of three real and rendered mirrors rings score 1.03 to 1.37;
 parts of these images without a whole ring, panoramas and noise score 0.49 to 0.99."""
+RAYS = 90
+"""Rays from a centre along which edges are looked for."""
 
 
-def radial_edges(grey: Floats, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
+def radial_edges(grey: Floats, centre: tuple[float, float], radii: int) -> Array:
     """Share of a circle that is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
     A ray counts at a radius where the step of brightness across it is large against the steps around it (a tenth of the
@@ -28,7 +30,7 @@ def radial_edges(grey: Floats, centre: tuple[float, float], radii: int, rays: in
     as much as one before a bright window, and a crowded part of the image counts little anywhere. Circles may leave
     the image with up to 40 percent of their length.
     """
-    angle = 2 * np.pi * np.arange(rays)[:, None] / rays
+    angle = 2 * np.pi * np.arange(RAYS)[:, None] / RAYS
     u = (centre[0] + np.arange(radii) * np.cos(angle)).astype(np.float32)
     v = (centre[1] + np.arange(radii) * np.sin(angle)).astype(np.float32)
     polar_grey = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -36,7 +38,7 @@ def radial_edges(grey: Floats, centre: tuple[float, float], radii: int, rays: in
     inside = (u >= 0) & (u <= grey.shape[1] - 1) & (v >= 0) & (v <= grey.shape[0] - 1)
     around = cv2.blur(step, (max(grey.shape) // 10 | 1, 3), borderType=cv2.BORDER_REFLECT)
     strength = np.where(inside, step / (step + 2.0 * around + 0.3), 0.0)
-    score: Array = strength.sum(axis=0) / np.maximum(inside.sum(axis=0), 0.6 * rays)
+    score: Array = strength.sum(axis=0) / np.maximum(inside.sum(axis=0), 0.6 * RAYS)
     return score
 
 

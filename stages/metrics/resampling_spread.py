@@ -54,5 +54,4 @@ def agreement(particles: Particles, hypothesis: GaussianMixture) -> float:
 
 def spread(particles: Particles) -> float:
     """The root of the summed variances of x and y (m)."""
-    covariance = weighted_moments(particles.poses, particles.weights)[1]
-    return float(np.sqrt(covariance[0, 0] + covariance[1, 1]))
+    return float(np.sqrt(np.trace(weighted_moments(particles.poses, particles.weights)[1][:2, :2])))

@@ -50,12 +50,6 @@ def turned_views(view: Floats, headings: int) -> Floats:
     return _shifted(view[None], np.arange(headings) * len(view) / headings)
 
 
-def turned_view(view: Floats, turn: float) -> Floats:
-    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
-    turned: Floats = _shifted(view[None], np.array([-turn * len(view) / (2 * np.pi)]))[0]
-    return turned
-
-
 def _shifted(views: Floats, shifts: Array) -> Floats:
     # Segment j of each view (N or 1, segments, bins) from where segment j + shift was, by each of the shifts (N,).
     segments, rows = views.shape[1], np.arange(len(views))[:, None]
@@ -260,7 +254,7 @@ def cosine_similarities(references: Rows, view: Floats, headings: int, chosen: I
     return np.clip(alike, 0.0, 1.0)
 
 
-def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureKind, exponent: float = 0.5) -> Floats:
+def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureKind) -> Floats:
     """Selective similarity of a view to each reference at one heading each: (N, segments, bins), (N,) turns -> (N,).
 
     `turns`: the robot's heading less the reference's own (radians).
@@ -271,5 +265,5 @@ def similarity_at(references: Floats, view: Floats, turns: Array, kind: FeatureK
         alike = np.minimum(expected, view).sum(axis=2)
     else:
         alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=2)) / MAX_DISTANCES[kind]
-    best = np.cumsum(np.sort(alike, axis=1)[:, ::-1], axis=1) * penalties(segments, exponent)
+    best = np.cumsum(np.sort(alike, axis=1)[:, ::-1], axis=1) * penalties(segments, EXPONENTS["sqrt"])
     return np.asarray(best.max(axis=1), np.float32)

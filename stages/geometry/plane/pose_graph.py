@@ -14,11 +14,11 @@ EASING = 1.4
 """Factor by which the Cauchy scale shrinks per iteration."""
 CONVERGED = 1e-6
 """Largest change (m, rad) of a step at which it ends."""
+MAX_STEPS = 100
+"""Largest number of steps."""
 
 
-def optimised_poses(
-    poses: Array, edges: Ints, measured: Array, sigmas: Array, doubtful: Bools, max_steps: int = 100
-) -> tuple[Array, Array]:
+def optimised_poses(poses: Array, edges: Ints, measured: Array, sigmas: Array, doubtful: Bools) -> tuple[Array, Array]:
     """The poses (N, 3) that agree best with measured motions, and the weight (E,) that each measurement was left.
 
     `edges` (E, 2): from which pose to which; `measured` (E, 3): the motion between them in the first one's frame;
@@ -36,7 +36,7 @@ def optimised_poses(
     weights = np.ones(len(edges))
     scale = np.inf
     damping = sparse.diags_array(np.full(3 * len(poses) - 3, PRIOR), format="csc")
-    for _ in range(max_steps):
+    for _ in range(MAX_STEPS):
         error = between(poses[one], poses[other]) - measured
         error[:, 2] = wrap(error[:, 2])
         error /= sigmas

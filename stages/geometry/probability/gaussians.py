@@ -48,22 +48,20 @@ def squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) 
     return _squared_distances(*(np.ascontiguousarray(a, np.float64) for a in (mean_a, cov_a, mean_b, cov_b)))
 
 
-def moments(means: Array, covariances: Array, weights: Array, spread: bool = True) -> tuple[Array, Array, float]:
+def moments(means: Array, covariances: Array, weights: Array) -> tuple[Array, Array, float]:
     """Mean (3,), covariance (3, 3) and summed weight of a mixture; the heading's mean is circular.
 
-    With `spread` the covariance holds the spread of the means (Gross, Koenig & Mueller 2005, equations 13 and 14,
-    divided by the sum of weights: erratum 7); without, it is the mean of the covariances (Porta & Kroese 2004, section
-    3.2), which is over-confident (erratum 16). Where all weights are 0 all count the same.
+    Gross, Koenig & Mueller 2005, equations 13 and 14, divided by the sum of weights (erratum 7). Where all weights are
+    0 all count the same.
     """
     total = float(weights.sum())
     share = weights / total if total > 0.0 else np.full(len(weights), 1.0 / len(weights))
     mean = share @ means
     mean[2] = math.atan2(share @ np.sin(means[:, 2]), share @ np.cos(means[:, 2]))
     covariance = np.einsum("k,kij->ij", share, covariances)
-    if spread:
-        apart = means - mean
-        apart[:, 2] = wrap(apart[:, 2])
-        covariance = covariance + np.einsum("k,ki,kj->ij", share, apart, apart)
+    apart = means - mean
+    apart[:, 2] = wrap(apart[:, 2])
+    covariance = covariance + np.einsum("k,ki,kj->ij", share, apart, apart)
     return mean, 0.5 * (covariance + covariance.T), total
 
 
@@ -77,8 +75,9 @@ def merged(
 ) -> tuple[Array, ...]:
     """Gaussians with the close ones merged: the closest pair first, until no pair is closer than `merge_below`.
 
-    `merge_below` is a squared Mahalanobis distance (`squared_distances`); a pair becomes one Gaussian with its moments
-    (`moments`, with or without `spread`). `weights`: how much each counts in them and are added up; `shares` (K,)
+    `merge_below` is a squared Mahalanobis distance (`squared_distances`); a pair becomes one Gaussian with its
+    `moments`; without `spread` its covariance is the mean of theirs (Porta & Kroese 2004, section 3.2), which is
+    over-confident (erratum 16). `weights`: how much each counts in them and are added up; `shares` (K,)
     are added up only. Porta & Kroese 2004, section 3.2: the weights are w. Gross, Koenig & Mueller 2005, equations 12
     to 14 (erratum 7): the weights are eta and the shares w, which may come to more than 1 (erratum 8: cap them).
 

@@ -9,6 +9,8 @@ from omninav.stages.geometry.arrays import Array, Bools, Ints
 
 ELLIPSE_95 = -2.0 * math.log(0.05)
 """Squared error of a position, in units of its covariance, at the edge of the 95 % ellipse (chi squared, 2 degrees)."""
+BINS = 10
+"""Bins of probability."""
 
 
 class Reliability(NamedTuple):
@@ -22,12 +24,12 @@ class Reliability(NamedTuple):
     counts: Ints
 
 
-def reliability(probabilities: Array, true: Bools, bins: int = 10) -> Reliability:
+def reliability(probabilities: Array, true: Bools) -> Reliability:
     """Sorts statements (N,) into bins of probability. DeGroot & Fienberg 1983."""
-    which = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
-    counts = np.bincount(which, minlength=bins)
+    which = np.minimum((probabilities * BINS).astype(np.int64), BINS - 1)
+    counts = np.bincount(which, minlength=BINS)
     full = counts > 0
-    stated, observed = (np.bincount(which, each, minlength=bins)[full] / counts[full] for each in (probabilities, true))
+    stated, observed = (np.bincount(which, each, minlength=BINS)[full] / counts[full] for each in (probabilities, true))
     return Reliability(stated, observed, counts[full])
 
 

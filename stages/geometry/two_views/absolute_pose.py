@@ -18,21 +18,22 @@ from omninav.stages.geometry.probability.small_systems import rotated_by
 
 from .ransac import BATCH, AgreedPose, refinement, samples_needed, samples_of
 
+CONFIDENCE, MAX_SAMPLES = 0.9999, 2000
+"""Probability that a sample without a wrong point is drawn, and the largest number of samples."""
+
 
 def three_point_pose(
     bearings: npt.ArrayLike,
     points: npt.ArrayLike,
     rng: np.random.Generator,
     threshold: float = math.radians(0.5),
-    confidence: float = 0.9999,
-    max_samples: int = 2000,
     refine: bool = True,
     planar: bool = False,
 ) -> AgreedPose | None:
     """Pose of the camera that sees most of the points (N, 3) along its unit bearings (N, 3), within `threshold` (rad).
 
-    Samples of three are drawn until one without a wrong point is among them with `confidence`, but at most
-    `max_samples`. `refine`: the best is brought to its local optimum. `planar`: its height and tilt are those of the
+    Samples of three are drawn until one without a wrong point is among them with `CONFIDENCE`, but at most
+    `MAX_SAMPLES`. `refine`: the best is brought to its local optimum. `planar`: its height and tilt are those of the
     points' frame, and only x, y and the turn about the vertical are estimated. None for fewer than three points, or if
     no sample has a solution. Draws from `rng`.
     """
@@ -40,9 +41,9 @@ def three_point_pose(
     number = len(bearings)
     if number < 3:
         return None
-    found, least, best, drawn, needed = None, math.inf, (0, -math.inf), 0, float(max_samples)
+    found, least, best, drawn, needed = None, math.inf, (0, -math.inf), 0, float(MAX_SAMPLES)
     limit = 1.0 - math.cos(threshold)
-    while drawn < min(needed, max_samples):
+    while drawn < min(needed, MAX_SAMPLES):
         samples = samples_of(number, 3, rng)
         drawn += BATCH
         rotations, translations = _candidates(bearings[samples], points[samples], planar)
@@ -60,7 +61,7 @@ def three_point_pose(
         if cost < least:
             found, least = pose, cost
             agreeing = int(np.count_nonzero(sees(*found, bearings, points, threshold)))
-            needed = samples_needed(max(best[0], agreeing) / number, 3, confidence)
+            needed = samples_needed(max(best[0], agreeing) / number, 3, CONFIDENCE)
     if found is None:
         return None
     return AgreedPose(*found, sees(*found, bearings, points, threshold), drawn)

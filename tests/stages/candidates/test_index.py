@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_beliefs import scattered_around
 from made_references import references
+from turned_views import turned_view
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
@@ -13,7 +14,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.candidates.around_belief import AroundBelief
 from omninav.stages.candidates.index import IndexedCandidates
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
-from omninav.stages.geometry.appearance.segments import similarities, turned_view
+from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms

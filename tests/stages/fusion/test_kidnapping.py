@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from made_references import references
+from turned_views import turned_view
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.candidates.index import IndexedCandidates
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
-from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from made_beliefs import even
 from made_references import references
+from turned_views import turned_view
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import similarities, turned_view
+from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.geometry.probability.evidence import contrast_power
 from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.l2 import L2Match

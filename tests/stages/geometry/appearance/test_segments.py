@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from turned_views import turned_view
 
 from omninav.stages.geometry.appearance.best_segments import sorting_network
 from omninav.stages.geometry.appearance.segments import (
@@ -10,7 +11,6 @@ from omninav.stages.geometry.appearance.segments import (
     penalties,
     similarities,
     similarity_at,
-    turned_view,
     turned_views,
 )
 

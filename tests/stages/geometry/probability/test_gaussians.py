@@ -83,14 +83,14 @@ def test_places_without_doubt_are_at_no_distance_from_themselves_and_far_from_ot
 def test_moments_worked_by_hand() -> None:
     # Weights 3 and 1, x at 0 and 4: mean 1, spread (3 * 1 + 1 * 9) / 4 = 3 on top of the mean covariance (3 + 5) / 4.
     # Erratum 7: equation 13 as printed does not divide by the sum of weights, and moves the mean to 4.
-    # Erratum 16: without that spread, the merged Gaussian is more certain than what it stands for.
+    # Erratum 16: without that spread, the merged Gaussian is more certain than the pair.
     means = np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 0.0]])
     parts = np.stack([np.diag([1.0, 1.0, 1.0]), np.diag([5.0, 1.0, 1.0])])
     mean, covariance, total = moments(means, parts, np.array([3.0, 1.0]))
     assert (*mean, total) == pytest.approx((1.0, 0.5, 0.0, 4.0))
     assert covariance == pytest.approx(np.array([[5.0, 1.5, 0.0], [1.5, 1.75, 0.0], [0.0, 0.0, 1.0]]))
-    _, without, _ = moments(means, parts, np.array([3.0, 1.0]), spread=False)
-    assert without == pytest.approx(np.diag([2.0, 1.0, 1.0]))
+    _, without, _ = merged(means, parts, np.array([3.0, 1.0]), 1e9, spread=False)
+    assert without == pytest.approx(np.diag([2.0, 1.0, 1.0])[None])
 
 
 def test_the_mean_heading_of_two_beside_the_seam_is_at_the_seam() -> None:
@@ -109,6 +109,11 @@ def test_without_any_weight_all_count_alike() -> None:
 # merging
 
 
+def one_of(means: np.ndarray, covariances: np.ndarray, weights: np.ndarray, spread: bool):
+    mean, covariance, total = moments(means, covariances, weights)
+    return mean, covariance if spread else np.average(covariances, axis=0, weights=weights), total
+
+
 def merged_plainly(mixture: Mixture, limit: float, spread: bool) -> Mixture:
     """The closest pair first, by looking at all pairs each time."""
     parts = list(zip(*mixture, strict=True))
@@ -121,7 +126,7 @@ def merged_plainly(mixture: Mixture, limit: float, spread: bool) -> Mixture:
         if found[i, j] >= limit:
             break
         pair = [np.stack([parts[i][k], parts[j][k]]) for k in range(3)]
-        parts = [part for k, part in enumerate(parts) if k not in (i, j)] + [moments(*pair, spread)]
+        parts = [part for k, part in enumerate(parts) if k not in (i, j)] + [one_of(*pair, spread)]
     means, parts_covariances, weights = (np.stack(each) for each in zip(*parts, strict=True))
     return means, parts_covariances, weights
 
