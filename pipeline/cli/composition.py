@@ -158,7 +158,7 @@ def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
     elsewhere = {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open(), *_taken_over(config)}
     typed = {str(name).partition(".")[0] for name in config.get(TYPED) or ()}
     for name in sorted({*hints, *config_file()} & typed - {*read} - elsewhere):
-        yield Problem(name, "nothing of this run reads it", hints.get(name, f"leave {name}=… away"))
+        yield Problem(name, "nothing in this run reads it", hints.get(name, f"leave {name}=… out"))
 
 
 def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:
@@ -236,7 +236,7 @@ def _linked(config: Any, name: str) -> dict[str, str]:
 def _given_twice(config: Any, name: str, spec: ArtifactSpecification) -> Iterator[Problem]:
     for key, setting in _linked(config, name).items():
         if config.get(setting) is not None and spec.file is not None:
-            hint = f"leave one of them away: {name}=FILE uses a saved one, {setting}=… makes one"
+            hint = f"leave one of them out: {name}=FILE uses a saved one, {setting}=… makes one"
             yield Problem(name, f"both a file and {setting}=… to make it from are given", hint)
         elif config.get(setting) is not None and config.get(key) is None and key in config.inputs:
             yield Problem(key, f"{setting} is given, but no {key}", f"type {key}=…")
@@ -247,7 +247,7 @@ def _given_alone(
 ) -> Iterator[Problem]:
     if spec.file is not None and spec.together_with is not None and specs[spec.together_with].file is None:
         other = spec.together_with
-        hint = f"type {other}=FILE.omap too, with which it was saved; or leave {name}=FILE away, and both are made"
+        hint = f"type {other}=FILE.omap too, with which it was saved; or leave {name}=FILE out, and both are made"
         yield Problem(name, f"it is given as a file, and the {other} that it belongs to is not", hint)
 
 

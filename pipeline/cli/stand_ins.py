@@ -37,7 +37,7 @@ def contradictions(config: Any) -> Iterator[Problem]:
         if _node(config, group).get("_target_") != _stand_in(group, rule)["_target_"]:
             continue
         if config.get(setting):
-            yield Problem(setting, f"{typed} does not read it", f"leave {typed} or {setting}=… away")
+            yield Problem(setting, f"{typed} does not read it", f"leave {typed} or {setting}=… out")
             continue
         for name, hint in rule["alone"].items():
             if config.get(name) is not None:

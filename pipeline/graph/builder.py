@@ -215,7 +215,7 @@ class _Builder:
                 self._check_types(f"{where}.initial", initial, first, node, port)
         if port.collects != collect:
             what = "takes a whole sequence" if port.collects else "takes one value, not a sequence"
-            hint = "write {from: …, collect: true}" if port.collects else "leave collect away"
+            hint = "write {from: …, collect: true}" if port.collects else "leave collect out"
             self._problem(where, f"port '{port_name}' of {type(node.stage).__name__} {what}", hint)
         if collect and (delay or hold):
             self._problem(where, "a collect wire has neither delay nor hold")
@@ -347,7 +347,7 @@ class _Builder:
                 self._problem(
                     wire.where,
                     f"'{wire.to_node}' runs after the loop (something collects a sequence): no tick is before it",
-                    "leave delay away",
+                    "leave delay out",
                 )
         for name in sorted(after & tick_roots):
             if self.nodes[name].signature.is_source:

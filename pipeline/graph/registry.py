@@ -111,7 +111,7 @@ def only_listed(typed: Collection[str]) -> Iterator[None]:
     """
     for word in typed:
         if SETTING.match(word):
-            raise BadInput(f"{cut(word)}: a run that was started keeps its settings; leave it away, or start another")
+            raise BadInput(f"{cut(word)}: a run that was started keeps its settings; leave it out, or start another")
     token = _TYPED.set(typed)
     try:
         yield

@@ -86,7 +86,7 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
     """
     from rich.table import Table as TerminalTable
 
-    heads, below = [str(run["name"]) for run in runs], ["* the best of its line"]
+    heads, below = [str(run["name"]) for run in runs], ["* the best in its row"]
     if len({str(run["config"].get("log")) for run in runs}) > 1:
         below.append("these are runs of different logs")
     if max(map(len, heads)) > MAX_HEAD_LENGTH:  # folded names are hard to read: letters, and what they mean

@@ -36,7 +36,7 @@ def not_taken(config: Mapping[str, Any], settings: Iterable[str]) -> Iterator[Pr
     for name in settings:
         if config.get(name) is not None and name not in inputs:
             takes = ", ".join(inputs) or "no input at all"
-            hint = f"leave {name}=… away; its `inputs` are: {takes}"
+            hint = f"leave {name}=… out; its `inputs` are: {takes}"
             yield Problem(name, f"{config.get('variant')} does not take it", hint)
 
 

@@ -216,10 +216,10 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
         then, now = made_by.get(node), present.get(node)
         if now is None or not isinstance(then, Mapping) or not isinstance(then.get("_target_"), str):
             continue
-        again = f"or leave {name}=FILE away, and it is made again"
+        again = f"or leave {name}=FILE out, and it is made again"
         if not _is_known(then["_target_"]):
             what = f"it was made with an older omninav ({then['_target_']:.80} as '{node}')"
-            yield Problem(name, what, f"leave {name}=FILE away, and it is made again")
+            yield Problem(name, what, f"leave {name}=FILE out, and it is made again")
             continue
         before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
         if before != after:

@@ -147,7 +147,7 @@ class OnnxEncoder(Stage):
                 f"a side and {MAX_PIXELS:,} pixels in all; write fewer nodes.features.segments"
             )
         if self.size not in (None, size):
-            raise BadInput(f"{self.model}: its images are {size[0]} x {size[1]}; leave nodes.features.size away")
+            raise BadInput(f"{self.model}: its images are {size[0]} x {size[1]}; leave nodes.features.size out")
         if batch is not None and self.segments % batch:
             raise BadInput(
                 f"{self.model}: it takes {batch} images at once; write nodes.features.segments={batch} or a multiple"

@@ -170,7 +170,7 @@ def only_begun(part: Part) -> Verdict | None:
     """The first images of a drive, of which one alone shows too little."""
     if part.state != "searching" or part.last + 1 == len(part.log) or len(part) > FIRST_IMAGES:
         return None
-    return Verdict("first images", f"the robot may start anywhere; {counted(len(part), 'image')} told where")
+    return Verdict("first images", f"the robot may start anywhere; {counted(len(part), 'image')} located it")
 
 
 def other_light(part: Part) -> Verdict | None:

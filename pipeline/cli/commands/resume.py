@@ -65,7 +65,7 @@ def _resume_experiment(folder: Path) -> int:
     try:
         manifest = read_json(file)
     except Damaged as damaged:
-        raise BadInput(f"{damaged}; type the experiment's command again: what it has done is found again") from None
+        raise BadInput(f"{damaged}; type the experiment's command again: what it has done is kept") from None
     known = {name: manifest.get(name) for name in ("argv", "cwd")}
     state, problems = convert_fields(known, ExperimentState, "experiment")
     if problems or not state["argv"]:

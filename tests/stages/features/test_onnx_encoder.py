@@ -93,7 +93,7 @@ def test_pixels_are_normalised_by_channel():
         (lambda path: path.write_bytes(b"\x0a\x08location\x12\x09elsewhere") and path, {}, "weights are in another"),
         (lambda path: network(path, last=True), {}, "write nodes.features.layout=nhwc"),
         (lambda path: network(path, sides=("h", "w")), {}, r"write nodes.features.size=\[224,224\]"),
-        (network, {"size": (8, 8)}, "its images are 16 x 16; leave nodes.features.size away"),
+        (network, {"size": (8, 8)}, "its images are 16 x 16; leave nodes.features.size out"),
         (lambda path: network(path, batch=3), {}, "write nodes.features.segments=3 or a multiple"),
         (lambda path: network(path, sides=(60_000, 3000)), {}, "8 images of 60000 x 3000 are too large"),
         (lambda path: after_means(path, "Div", np.float32(0)), {}, "vectors that are not finite"),
