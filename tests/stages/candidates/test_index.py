@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_beliefs import scattered_around
 from made_references import references
-from turned_views import turned_view
+from view_at_turn import turned_view
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact

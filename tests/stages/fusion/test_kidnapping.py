@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from made_references import references
-from turned_views import turned_view
+from view_at_turn import turned_view
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.candidates.index import IndexedCandidates

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_beliefs import even
 from made_references import references
-from turned_views import turned_view
+from view_at_turn import turned_view
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput

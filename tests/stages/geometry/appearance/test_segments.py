@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from turned_views import turned_view
+from view_at_turn import turned_view
 
 from omninav.stages.geometry.appearance.best_segments import sorting_network
 from omninav.stages.geometry.appearance.segments import (
