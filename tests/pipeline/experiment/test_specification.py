@@ -31,8 +31,8 @@ def test_overrides_may_be_a_list_of_words():
     for wrong in ({"set": {"start": "truth"}}, {"set": [{"start": "truth"}]}):
         with pytest.raises(ProblemsFound, match=r"experiment\.set: .*\n.*write what one would type: set: start=truth"):
             read_experiment(FILE | wrong, "full")
-    with pytest.raises(ProblemsFound, match=r"experiment\.page\.rows: .*\n.*write it in the experiment's file"):
-        read_experiment(FILE | {"page": {"columns": "method"}}, "full")
+    with pytest.raises(ProblemsFound, match=r"experiment\.page\.columns: .*\n.*write it in the experiment's file"):
+        read_experiment(FILE | {"page": {"rows": ["data", "method"]}}, "full")
 
 
 def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
