@@ -56,7 +56,7 @@ class Call:
         given = [wire for wire in wires if not getattr(node.signature.inputs[wire.to_port].type, "in_place", False)]
         each = [wire.to_port for wire in given if wire.origin not in static]
         self.guarded = each if node.lifetime == "tick" else []
-        self.guarded_once = [wire.to_port for wire in given if wire.origin in static]  # a map may be large
+        self.guarded_once = [wire.to_port for wire in given if wire.origin in static]  # these may be large
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def set_up(self) -> None:
