@@ -30,7 +30,7 @@ def truth_misfit(drive: Drive) -> str:
     rows = known(drive.truth) & known(drive.estimate)
     truth, estimate, seconds = drive.truth[rows], drive.estimate[rows], drive.seconds[rows]
     sure = drive.confidence[rows & np.isfinite(drive.confidence)]
-    if not len(truth) or (len(sure) and np.median(sure) < MIN_SURE):
+    if not len(sure) or np.median(sure) < MIN_SURE:  # a robot that is lost may follow odometry at another place
         return ""
     off_m, off_deg = np.median(position_errors(estimate, truth)), np.median(heading_errors_deg(estimate, truth))
     if off_m < OFF_M and off_deg < OFF_DEG:

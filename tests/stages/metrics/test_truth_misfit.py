@@ -17,6 +17,7 @@ ANGLES = np.linspace(0.0, 2.0 * math.pi, 80, endpoint=False)
 X, Y = 6.0 * np.cos(ANGLES), 4.0 * np.sin(ANGLES) * (1.2 + np.cos(ANGLES))
 PATH = np.column_stack([X, Y, np.arctan2(np.gradient(Y), np.gradient(X))])
 """Poses around a bent loop, one a second."""
+SURE = [PoseConfidence(0.6, "tracking")] * len(PATH)
 
 
 @pytest.mark.parametrize(
@@ -36,12 +37,13 @@ PATH = np.column_stack([X, Y, np.arctan2(np.gradient(Y), np.gradient(X))])
 )
 def test_the_change_with_which_a_truth_fits_is_named(truth: np.ndarray, said: str) -> None:
     ctx = Context("errors")
-    TrajectoryErrors().step(ctx, made_drive(truth, PATH))
+    TrajectoryErrors().step(ctx, made_drive(truth, PATH, confidences=SURE))
     assert len(ctx.warnings) == bool(said)
     assert re.search(said, "".join(ctx.warnings))
 
 
 def test_a_robot_that_is_not_sure_of_its_place_may_be_wrong_itself() -> None:
     moved = compose(np.array([5.0, 3.0, 2.0]), PATH)
-    assert truth_misfit(made_drive(moved, PATH, confidences=[PoseConfidence(0.6, "tracking")] * 80))
+    assert truth_misfit(made_drive(moved, PATH, confidences=SURE))
+    assert not truth_misfit(made_drive(moved, PATH))
     assert not truth_misfit(made_drive(moved, PATH, confidences=[PoseConfidence(0.4, "lost")] * 80))
