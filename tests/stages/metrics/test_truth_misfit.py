@@ -26,11 +26,18 @@ SURE = [PoseConfidence(0.6, "tracking")] * len(PATH)
         (PATH * (1, -1, -1), "mirrored: check the signs of y and heading"),
         (PATH * (100, 100, 1), r"multiplied by 0\.01: check its unit"),
         (PATH + np.array([0, 0, 1.0]), r"turned by -57 degrees"),
+        (PATH + np.array([0, 0, math.radians(30.5)]), r"turned by -30 degrees"),
+        (PATH + np.array([0, 0, math.radians(29.5)]), ""),
         (PATH * (1, 1, -1), "turned the other way"),
+        (PATH * (1, 1, 0) + np.random.default_rng(0).uniform(0.0, 6.0, (80, 1)) * (0, 0, 1), ""),
+        (PATH * (1.4, 1.4, 1), r"multiplied by 0\.714: check its unit"),
         (PATH @ np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), r"turned in place by \+90 degrees"),
         (compose(np.array([5.0, 3.0, 2.0]), PATH), r"moved by 12\.07 m, as in another frame"),
         (np.roll(PATH, 3, axis=0), r"3 s earlier: check that both are stamped by one clock"),
+        (np.roll(PATH, 1, axis=0), r"1 s earlier"),
         (np.roll(PATH, -2, axis=0), r"2 s later"),
+        (np.roll(PATH, -10, axis=0), r"10 s later"),
+        (np.roll(PATH, 10, axis=0), r"10 s earlier"),
         (PATH + np.array([0.1, 0.0, 0.3]), ""),
         (PATH + np.random.default_rng(0).normal(0.0, 3.0, PATH.shape), ""),
     ],
@@ -40,6 +47,11 @@ def test_the_change_with_which_a_truth_fits_is_named(truth: np.ndarray, said: st
     TrajectoryErrors().step(ctx, made_drive(truth, PATH, confidences=SURE))
     assert len(ctx.warnings) == bool(said)
     assert re.search(said, "".join(ctx.warnings))
+
+
+def test_images_without_a_truth_are_left_out_and_half_seconds_are_told() -> None:
+    late = [None, *np.roll(PATH, -1, axis=0)[1:]]
+    assert "0.5 s later" in truth_misfit(made_drive(late, PATH, every_s=0.5, confidences=SURE))
 
 
 def test_a_robot_that_is_not_sure_of_its_place_may_be_wrong_itself() -> None:
