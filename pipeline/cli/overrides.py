@@ -117,7 +117,7 @@ def _how_to_write(word: str) -> str:
     if re.search(r"\s[\w.+~/]+=", word):
         return (
             "quotes hold several words together: type each by itself, name=value name=value; one value with = in it "
-            f"is typed in quotes within quotes:  '{word.partition('=')[0]}=\"…\"'"
+            f"is typed in quotes within quotes: '{word.partition('=')[0]}=\"…\"'"
         )
     name, _, value = word.partition("=")
     if re.fullmatch(r"\+{0,2}[\w./@]+", name) and re.fullmatch(r"[^'\"\\$[{][^'\"\\$]*", value):

@@ -239,7 +239,7 @@ def read_result(path: Path) -> ExperimentResult:
     try:
         plain = json.loads(read_small(path, MAX_BYTES))
     except ValueError as error:
-        raise BadInput(f"{path}: is no result of an experiment ({error})") from None
+        raise BadInput(f"{path}: is no result of an experiment ({error}); its experiment makes it again") from None
     result, problems = convert(plain, ExperimentResult, str(path))
     if problems:
         raise ProblemsFound(problems)
