@@ -66,7 +66,7 @@ class Metrics(Value):
     details: tuple[str, ...] = ()
     """Paths of metrics or whole groups that only the run's own page shows, no comparison and no terminal."""
     foremost: bool = False
-    """Whether they tell if the run did what it was for: their headlines come before those of other stages."""
+    """They tell whether the run reached its goal: their headlines come before those of other stages."""
 
 
 def merged(parts: Iterable[Metrics]) -> Metrics:

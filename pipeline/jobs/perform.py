@@ -102,7 +102,7 @@ class _Worker:
 
 
 class _Lease:
-    """Whether the process that started a job still waits for it: its file holds the token, and is renewed."""
+    """Tells whether the process that started a job still waits for it: its file holds the token, and is renewed."""
 
     def __init__(self, job: dict[str, Any]) -> None:
         self._file, self._token = Path(job["lease"]), job["token"]

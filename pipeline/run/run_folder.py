@@ -44,7 +44,7 @@ class RunFolder:
     folder: Path
     manifest: dict[str, Any] = field(default_factory=dict)
     complete: bool = False
-    """Whether it was complete when it was resumed: then nothing was done."""
+    """The run was complete when it was resumed: nothing was done."""
     shown_as: Path | None = None
     """The folder that its report names, where that is another one."""
     _owned: bool = False

@@ -160,8 +160,8 @@ class CovarianceIntersection(Stage):
     """
 
     weighted: bool = True
-    """Whether the second covariance's weight alpha, the ratio of determinants, takes the components' weights into
-    account (Gross, Koenig & Mueller) or not (Porta & Kroese)."""
+    """The second covariance's weight alpha, the ratio of determinants, takes the components' weights into account
+    (Gross, Koenig & Mueller); false: it does not (Porta & Kroese)."""
 
     class Out(Outputs):
         """The belief after all sources; weights sum to 1."""

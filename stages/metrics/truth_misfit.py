@@ -32,18 +32,21 @@ def truth_misfit(drive: Drive) -> str:
     sure = drive.confidence[rows & np.isfinite(drive.confidence)]
     if not len(sure) or np.median(sure) < MIN_SURE:  # a robot that is lost may follow odometry at another place
         return ""
-    off_m, off_deg = np.median(position_errors(estimate, truth)), np.median(heading_errors_deg(estimate, truth))
+    off_m = float(np.median(position_errors(estimate, truth)))
+    off_deg = float(np.median(heading_errors_deg(estimate, truth)))
     if off_m < OFF_M and off_deg < OFF_DEG:
         return ""
-    found = _late(truth, estimate, seconds) or (_turned(truth, estimate) if off_m < OFF_M else _moved(truth, estimate))
+    found = _late(truth, estimate, seconds, off_m) or (
+        _turned(truth, estimate) if off_m < OFF_M else _moved(truth, estimate)
+    )
     return f"the estimates fit the truth only once that is {found}; errors are of the truth as given" if found else ""
 
 
-def _late(truth: Array, estimate: Array, seconds: Array) -> str:
+def _late(truth: Array, estimate: Array, seconds: Array, off_m: float) -> str:
     most = min(MAX_LATE, len(truth) // 4)
     shifts = [shift for shift in range(-most, most + 1) if shift]
     left = [np.median(position_errors(*_shifted(estimate, truth, shift))) for shift in shifts]
-    if not left or min(left) * LATE_GAIN > np.median(position_errors(estimate, truth)):
+    if not left or min(left) * LATE_GAIN > off_m:
         return ""
     shift = shifts[int(np.argmin(left))]
     apart = float(np.median(np.subtract(*_shifted(seconds, seconds, shift))))

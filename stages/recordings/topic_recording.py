@@ -102,12 +102,12 @@ class TopicRecording(Recording):
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
-    def dropped(self) -> Counter[str]:  # type: ignore[override]
+    def dropped(self) -> Counter[str]:  # type: ignore[override]  # the feed counts, of all its files
         """Skipped data, by kind."""
         return self._feed.dropped
 
     @property
-    def details(self) -> dict[str, str]:  # type: ignore[override]
+    def details(self) -> dict[str, str]:  # type: ignore[override]  # likewise
         """The first case of each kind."""
         return self._feed.details
 

@@ -40,7 +40,7 @@ class Shelf:
     """Rows of compartments."""
     yaw: float = 0.0
     stock: bool = True
-    """Whether cartons are on top."""
+    """Cartons are on top."""
     department: str = ""
     """Shelves of one department hold the same assortment of goods."""
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.arguments import condition_arguments
+from omninav.pipeline.cli.arguments import condition_arguments, read_flags
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.cli.objective import check_objective
@@ -33,7 +33,7 @@ HYDRA_FOLDERS = ("hydra.run.dir", "hydra.sweep.dir")
 def command(arguments: list[str]) -> int:
     """Compose and check a configuration, open its inputs, and print what would run."""
     words, _ = read_words(arguments)
-    if {"-m", "--multirun"} & {*arguments}:
+    if read_flags(arguments).multirun:
         raise BadInput("check: it checks one run; type it without -m, with one value of each setting")
     of_conditions = condition_arguments(words)
     with composed([word for word in arguments if word not in of_conditions]) as config:

@@ -74,14 +74,14 @@ class OtherDefault(Widened):
 
 class OutOfBounds(Stage):
     gain: Annotated[float, Bounds(gt=0)] = -1.0
-    """Of something."""
+    """Factor."""
 
     def step(self, ctx: Context) -> None: ...
 
 
 class OfNoKind(Stage):
     gain: complex = 2j
-    """Of something."""
+    """Factor."""
 
     def step(self, ctx: Context) -> None: ...
 

@@ -154,7 +154,7 @@ def test_views_of_a_known_map_were_not_driven_in_their_order_those_of_a_tour_wer
 
 NUMBER = 12
 AT = np.concatenate([np.arange(NUMBER), np.arange(NUMBER) + 0.1])
-"""Where the views of two passes over one way were taken."""
+"""Places (m) of the views of two passes along one path."""
 DISTANCES = 0.05 * np.abs(AT[:, None] - AT)
 SHARES = np.where(np.abs(AT[:, None] - AT) < 0.5, 0.6, 0.1)
 PLACE = np.concatenate([np.arange(NUMBER) // 4, 3 + (np.arange(NUMBER) + 2) // 4])
