@@ -130,6 +130,19 @@ def frozen(after_s: float) -> Change:
     return change
 
 
+def of_another(log: Path) -> Change:
+    """Poses of odometry become those of another drive, one by one."""
+    others = (message.content.pose for message in LogReader(log).messages() if message.topic == ODOMETRY)
+
+    def change(message: Message, seconds: float) -> Message | None:
+        if message.topic != ODOMETRY:
+            return message
+        message.content.pose = next(others, None)
+        return None if message.content.pose is None else message
+
+    return change
+
+
 def w_first(message: Message, seconds: float) -> Message:
     """A quaternion w, x, y, z where x, y, z, w is read."""
     if message.topic == ODOMETRY:

@@ -14,6 +14,7 @@ from conflicting_logs import (
     found,
     learned,
     odometry,
+    of_another,
     said,
     without_truth,
 )
@@ -55,6 +56,13 @@ def test_what_does_not_fit_is_said_in_one_line(name: str, store: ReferenceGraph,
 def test_late_images_are_noticed_where_they_come_often(name: str, house: ReferenceGraph, tmp_path: Path) -> None:
     (one,) = found(CASES[name], house, HOUSE / "drive.mcap", tmp_path)
     assert CASES[name].said in one.sentence
+
+
+@needs_data
+def test_odometry_of_another_drive_is_noticed(house: ReferenceGraph, tmp_path: Path) -> None:
+    case = Case(of_another(HOUSE / "tour.mcap"), "of one robot and one drive")
+    (one,) = found(case, house, HOUSE / "drive.mcap", tmp_path)
+    assert case.said in one.sentence
 
 
 @needs_data
