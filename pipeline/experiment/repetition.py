@@ -98,14 +98,18 @@ def known_digests(graph: Graph) -> list[str]:
 def finished(folder: Path, key: str, seeds: Sequence[int], cache: Cache | None = None) -> dict[int, dict[str, Any]]:
     """The results of a condition by seed: those in its folder that belong to this key, and those in the cache.
 
-    Through the cache experiments share the conditions that they have in common.
+    Through the cache experiments share the conditions that they have in common. A file in the folder that is damaged,
+    or belongs to another key, is replaced by what the cache has.
     """
     found = {}
     for seed in seeds:
-        for path in _results(folder, key, seed, cache):
+        own, *others = _results(folder, key, seed, cache)
+        for path in (own, *others):
             result = _read(path)
             if result.get("key") == key and result.get("seed") == seed:
                 found[seed] = result
+                if path != own and own.exists():
+                    write_json(own, result)
                 break
     return found
 
@@ -114,7 +118,7 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         return read_json(path) if path.exists() else {}
     except Damaged as damaged:
-        report_damage(f"{damaged}; this repetition runs again")
+        report_damage(f"{damaged}; it is taken from the cache, or runs again")
         return {}
 
 

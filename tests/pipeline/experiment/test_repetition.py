@@ -36,7 +36,17 @@ def test_a_damaged_result_is_computed_again_and_this_is_said(tmp_path: Path, cap
     for damaged in (content.replace('"seed": 0', '"seed": 1'), content[:20], "[]", ""):
         (tmp_path / "seed_0.json").write_text(damaged)
         assert finished(tmp_path, "a", [0]) == {}
-    assert "this repetition runs again" in capfd.readouterr().err
+    assert "it is taken from the cache, or runs again" in capfd.readouterr().err
+
+
+def test_a_damaged_result_is_replaced_by_what_the_cache_has(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    cache, own = Cache(tmp_path / "cache"), tmp_path / "seed_0.json"
+    kept(cache.path(digest_text("repetition", "a", "0"), ".json"), "a", 0)
+    own.write_text('{"key": "a", "se')
+    result = {0: {"key": "a", "seed": 0}}
+    assert finished(tmp_path, "a", [0], cache) == result
+    assert finished(tmp_path, "a", [0]) == result
+    assert capfd.readouterr().err.count("taken from the cache") == 1
 
 
 def test_a_recording_is_whole_or_made_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
