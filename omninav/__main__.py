@@ -13,7 +13,11 @@ for threads in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     # Read as numpy is loaded. Several threads make products of small matrices five times slower, and round differently.
     os.environ.setdefault(threads, "1")
 
-from omninav.pipeline.cli.main import main  # noqa: E402
+try:
+    from omninav.pipeline.cli.main import main
+except KeyboardInterrupt:
+    print("stopped", file=sys.stderr)
+    raise SystemExit(130) from None
 
 gc.set_threshold(50_000)  # a tick makes a thousand objects and drops them: seldom are there circles among them
 
