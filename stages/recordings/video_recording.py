@@ -146,7 +146,10 @@ def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
     if not capture.isOpened():
-        raise UnreadableRecording(f"{path}: no video can be read from it; is the file whole? {_repair(path)}")
+        raise UnreadableRecording(
+            f"{path}: no video can be read from it; it holds sound alone, or was cut off before its index was written, "
+            f"which `untrunc WHOLE.mp4 {path.name}` restores from a whole video of the same camera"
+        )
     return capture
 
 

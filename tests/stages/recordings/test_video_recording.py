@@ -94,7 +94,7 @@ def test_what_is_no_video_is_refused_before_anything_is_decoded(tmp_path: Path) 
     (tmp_path / "folder.mp4").mkdir()
     for name, said in (
         ("list.mp4", "this is no video"),
-        ("cut.mp4", "is the file whole"),
+        ("cut.mp4", "restores from a whole video"),
         ("folder.mp4", "no recording is in this folder"),
         ("missing.mp4", "no such file"),
     ):
