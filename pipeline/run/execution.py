@@ -142,15 +142,16 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
         if isinstance(artifact.get("warnings"), list)  # of a file, which may hold anything
         for sentence in artifact["warnings"]
     ]
+    dropped = _dropped_before(artifacts) | notes["dropped"]
     run.manifest |= {
         "ended": datetime.now().isoformat(timespec="seconds"),
         "ticks": engine.ticks,
-        "dropped": notes["dropped"],
+        "dropped": dropped,
         "facts": facts | notes["facts"],
         "warnings": warnings + notes["warnings"],
         "prefix": prefix_reason,
     }
-    for kind, entry in notes["dropped"].items():
+    for kind, entry in dropped.items():
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
     graph_svg, config_yaml = ((run.folder / name).read_text(encoding="utf-8") for name in ("graph.svg", CONFIG))
     done = {**run.manifest, "status": "complete"}
@@ -168,6 +169,17 @@ def _with_own_notes(artifacts: dict[str, Any]) -> dict[str, Any]:
         notes = [artifact.get(key) for key in ("variant", "facts", "warnings")]
         if notes not in ([other.get(key) for key in ("variant", "facts", "warnings")] for other in found.values()):
             found[name] = artifact
+    return found
+
+
+def _dropped_before(artifacts: dict[str, Any]) -> dict[str, Any]:
+    """Counts of what was dropped as artifacts were made, each under the first that has it; without those of files,
+    which were reported as those were made."""
+    found: dict[str, Any] = {}
+    for name, artifact in artifacts.items():
+        for kind, entry in ({} if "file" in artifact else artifact.get("dropped") or {}).items():
+            if not any(key.startswith(f"{kind} (") and entry == other for key, other in found.items()):
+                found[f"{kind} ({name})"] = entry
     return found
 
 
