@@ -25,7 +25,13 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
     path, models = user_path(name), camera_models()
     if name not in models and (path.exists() or path.suffix in (".yaml", ".yml") or len(path.parts) > 1):
         return read_camera(path), [path]
-    camera = models[name].of_size(*size()) if name in models else None
+    width, height = size() if name in models else (0, 0)
+    if name == "dual_fisheye" and width < 1.5 * height:
+        raise UnreadableRecording(
+            f"camera={name}: images of {width} x {height} are no two fisheyes side by side; join a video's two tracks: "
+            "`ffmpeg -i VIDEO -filter_complex [0:v:0][0:v:1]hstack both.mp4`"
+        )
+    camera = models[name].of_size(width, height) if name in models else None
     if camera is None:
         known = [model for model, kind in models.items() if kind.of_size(64, 32) is not None]
         near = nearest(name, known)

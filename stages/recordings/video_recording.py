@@ -22,6 +22,11 @@ from .stamps import Stamps, ascending
 
 MAX_FRAMES = 2_000_000
 """Largest accepted number of frames of a video: nine hours at 60 a second."""
+MAX_HIDDEN = 1000
+"""Frames of a trimmed video that are looked through for the first one that is shown: more than between key frames."""
+COMPARED, MIN_CHANGE = 6, 0.1
+"""Frames at the beginning whose pixels are compared, and the median size of what is stored of them, as a share of the
+first one's, above which they differ: a camera at rest makes 0.001."""
 TOLERANCE_NS = 1_000_000
 """Between a frame's time as the container states it, and as the decoder does."""
 CONTAINERS = re.compile(
@@ -49,7 +54,10 @@ class VideoRecording(Recording):
         if not 0 < width * height <= MAX_PIXELS:
             raise UnreadableRecording(f"{name}: {width} x {height} pixels, at most {MAX_PIXELS:,} are read")
         stated = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        self.stamps = self._in_order(_presentation_times(path))
+        hidden = self._hidden()
+        self.stamps = self._in_order(_presentation_times(path))[hidden:]
+        self.stamps -= self.stamps[0] if len(self.stamps) else 0
+        stated -= hidden
         if stated > len(self.stamps) and stated < MAX_FRAMES and not self.dropped:
             self._drop(
                 "missing_frame",
@@ -85,6 +93,22 @@ class VideoRecording(Recording):
         if pixels is None:
             raise Undecodable("it cannot be decoded")
         return np.asarray(pixels, np.uint8)
+
+    def _hidden(self) -> int:
+        """Counts the stored frames before the first that is shown: a trimmed video begins between two key frames."""
+        is_shown, first = _opened(self._path).read()
+        if _is_unconverted(self._path):
+            raise UnreadableRecording(
+                f"{self.name}: its frames stay the same while what is stored changes: they are interlaced, or it holds "
+                "several tracks; write one that is progressive: "
+                f"`ffmpeg -i {self._path.name} -map 0:v:0 -vf yadif -c:v libx264 progressive.mp4`"
+            )
+        every = _opened(self._path, ignoring_edits=True)
+        for number in range(MAX_HIDDEN if is_shown else 0):
+            is_stored, pixels = every.read()
+            if is_stored and np.array_equal(pixels, first):
+                return number
+        return 0
 
     def _in_order(self, times: list[int]) -> Stamps:
         kept, repeated, _ = ascending(sorted(times))  # packets come in the order of decoding
@@ -131,8 +155,9 @@ class Video(Format):
         return VideoRecording(log, user_path(log), options)
 
 
-def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
-    """A video at its beginning; `packets`: as it is stored, nothing is decoded."""
+def _opened(path: Path, packets: bool = False, ignoring_edits: bool = False) -> cv2.VideoCapture:
+    """A video at its beginning; `packets`: as it is stored, nothing is decoded; `ignoring_edits`: from the first frame
+    that is stored, shown or not."""
     if not path.is_file():
         raise UnreadableRecording(f"{path}: this is a folder, a pipe or a device, expected a video")
     try:
@@ -144,6 +169,7 @@ def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
         raise UnreadableRecording(f"{path}: this is no video, expected MP4, MOV, AVI, MKV, WebM, MPEG or Ogg")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its messages on broken packets are counted here
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "ignore_editlist;1" if ignoring_edits else ""
     capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
     if not capture.isOpened():
         raise UnreadableRecording(
@@ -154,8 +180,8 @@ def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
 
 
 def _presentation_times(path: Path) -> list[int]:
-    """Times (ns) at which the packets of a video are to be shown, in the order in which they are stored."""
-    capture = _opened(path, packets=True)
+    """Times (ns) at which the frames that a video stores are to be shown, trimmed away or not, as they are stored."""
+    capture = _opened(path, packets=True, ignoring_edits=True)
     times: list[int] = []
     while capture.grab():
         times.append(_position(capture))
@@ -168,5 +194,17 @@ def _position(capture: cv2.VideoCapture) -> int:
     return round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1e6)
 
 
+def _is_unconverted(path: Path) -> bool:
+    """Tells whether the first frames are equal to the last bit, though what is stored of them is not small: FFmpeg
+    leaves interlaced ones unconverted, and what was in memory before comes instead."""
+    decoded, stored = _opened(path), _opened(path, packets=True)
+    frames = [decoded.read()[1] for _ in range(COMPARED)]
+    packets = [packet for packet in (stored.read()[1] for _ in range(COMPARED)) if packet is not None]
+    if not packets or not all(frame is not None and np.array_equal(frame, frames[0]) for frame in frames):
+        return False
+    is_large = float(np.median([packet.size for packet in packets])) > MIN_CHANGE * packets[0].size
+    return is_large and not all(np.array_equal(packet, packets[0]) for packet in packets)
+
+
 def _repair(path: Path) -> str:
-    return f"`ffmpeg -i {path.name} -c copy repaired.mp4` mends some"
+    return f"`ffmpeg -i {path.name} -c:v libx264 readable.mp4` writes what FFmpeg can decode of it"

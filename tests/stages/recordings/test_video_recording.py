@@ -1,5 +1,6 @@
 """Videos as logs: every frame at its own time, and what a video does not say."""
 
+import re
 from pathlib import Path
 
 import cv2
@@ -47,12 +48,46 @@ def test_an_image_twice_as_wide_as_high_is_a_whole_sphere_and_said_to_be_assumed
     assert "equirectangular" in recording.assumed[0]
 
 
+def test_frames_that_trimming_hid_are_left_out(tmp_path: Path) -> None:
+    path = Path(video(tmp_path / "drive.mp4", pictures()))
+    content = bytearray(path.read_bytes())
+    entry, header = content.find(b"elst") + 12, content.find(b"mdhd") + 16
+    ticks_a_frame = int.from_bytes(content[header : header + 4]) * 2 // 25
+    content[entry + 4 : entry + 8] = (3 * ticks_a_frame).to_bytes(4)
+    path.write_bytes(content)
+    recording = open_recording(str(path))
+    assert recording.stamps.tolist() == [number * 80_000_000 for number in range(len(LEVELS) - 3)]
+    for frame in (0, len(LEVELS) - 4, 2):
+        image = recording.image(frame)
+        assert image is not None
+        assert abs(image.mean() - LEVELS[frame + 3]) < 6
+    assert not recording.dropped
+
+
+def test_interlaced_frames_are_refused_and_a_camera_at_rest_is_not(tmp_path: Path) -> None:
+    path = Path(video(tmp_path / "drive.avi", pictures(), "mpg2", 25.0))
+    content = bytearray(path.read_bytes())
+    for found in re.finditer(re.escape(b"\0\0\1\xb5"), path.read_bytes()):
+        extension = found.end()
+        if content[extension] >> 4 == 1:  # of a sequence
+            content[extension + 1] &= ~0x08
+        elif content[extension] >> 4 == 8:  # of a picture
+            content[extension + 4] &= ~0x80
+    path.write_bytes(content)
+    with refused("-vf yadif"):
+        open_recording(str(path))
+    for name, code in (("rest.avi", "MJPG"), ("rest.mp4", "mp4v")):
+        assert len(open_recording(video(tmp_path / name, pictures(640, 320)[:1] * 12, code)).stamps) == 12
+
+
 def test_two_circles_side_by_side_are_no_panorama(tmp_path: Path) -> None:
     rows, columns = np.mgrid[0:64, 0:128]
     circles = np.hypot(columns % 64 - 31.5, rows - 31.5) < 32
     frames = [frame * circles[..., None].astype(np.uint8) for frame in pictures()[4:]]
     with refused("type camera=dual_fisheye"):
         open_recording(video(tmp_path / "drive.mp4", frames))
+    with refused("join a video's two tracks"):
+        open_recording(video(tmp_path / "one_lens.mp4", pictures(64, 64)), camera="dual_fisheye")
 
 
 def test_other_images_need_a_camera(tmp_path: Path) -> None:
