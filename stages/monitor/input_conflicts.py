@@ -345,11 +345,11 @@ def turned(watched: Watched, length_scale_m: float) -> str:
     turns = np.diff(watched.odometry[:, 2])[known]
     if fit.explained < EXPLAINED:
         wild = float(np.abs(turns).sum())
-        both = f"odometry turns by {math.degrees(wild):.0f} degrees {over}, the images by {images}"
+        compared = f"odometry turns by {math.degrees(wild):.0f} degrees {over}, the images by {images}"
         if wild > max(WILD_TURNS * turning, MIN_WILD_TURN):
-            return f"{both}, and not together: check the unit of its heading (radians)"
+            return f"{compared}, and not together: check the unit of its heading (radians)"
         if fit.explained < OTHER_DRIVE and turning > MIN_OTHER_TURN and 1.0 / SIMILAR < wild / turning < SIMILAR:
-            return f"{both}, and not together: check that odometry and images are of one robot and one drive"
+            return f"{compared}, and not together: check that odometry and images are of one robot and one drive"
         return ""
     if fit.sign < 0 and fit.as_is < REVERSED_AS_IS:
         both = np.stack([clipped(seen[known]), clipped(turns)])
