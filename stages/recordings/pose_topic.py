@@ -40,6 +40,11 @@ class PoseTopic:
     def __len__(self) -> int:
         return len(self._stamps)
 
+    @property
+    def times(self) -> Stamps:
+        """Stamps and log times (N, 2), ns."""
+        return np.column_stack((np.array(self._stamps, np.int64), np.array(self._log_times, np.int64)))
+
     def add(self, stamp: int, log_time: int, pose: tuple[float, float, float]) -> None:
         """One message; `NOWHERE` for one whose pose cannot be."""
         self._stamps.append(min(stamp, MAX_STAMP))

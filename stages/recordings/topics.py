@@ -16,6 +16,7 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
+from .clock_changes import camera_clock_set, set_back
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
@@ -25,8 +26,6 @@ from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 
-SET_BACK_S = 10.0
-"""Time by which a record is earlier than those before it in the file where the clock was set back."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
@@ -121,23 +120,12 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         scans=_scans(name, feed, topics.scan, records),
     )
     told = set_back(records[image_topic]) if len(files) == 1 else ""
+    if odometry is not None and not told:
+        told = camera_clock_set(_times(records[image_topic]), poses[str(topics.odometry)].times)
     unsaid = mounted.unsaid(by_info)
     recording.mounted = mounted.in_words
     recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)
     return recording
-
-
-def set_back(records: Sequence[Record]) -> str:
-    """Sentence on a clock that was set back while a file was recorded, by the order of its records; else ""."""
-    times = np.array([record.log_time for record in records], dtype=np.int64)
-    steps = np.diff(times)
-    if not len(steps) or steps.min() > -SET_BACK_S * 1e9:
-        return ""
-    at = int(steps.argmin())
-    return (
-        f"the clock was set back by {-steps[at] / 1e9:.0f} s after image {at + 1}; images are taken in the order of "
-        "their stamps"
-    )
 
 
 def _camera(
@@ -256,8 +244,13 @@ def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Recor
 
 
 def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats: str) -> list[Record]:
-    times = np.array([(each.stamp, each.log_time) for each in records], np.int64).reshape(-1, 2)
+    times = _times(records)
     return [records[row] for row in in_order(feed, name, topic, times[:, 0], times[:, 1], repeats)]
+
+
+def _times(records: list[Record]) -> Stamps:
+    """Stamps and log times (N, 2), ns."""
+    return np.array([(each.stamp, each.log_time) for each in records], np.int64).reshape(-1, 2)
 
 
 def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps, topic: str | None) -> Bools:

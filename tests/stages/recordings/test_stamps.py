@@ -3,9 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from omninav.stages.recordings.clock_changes import camera_clock_set, set_back
 from omninav.stages.recordings.stamps import lone, poses_near
-from omninav.stages.recordings.topics import set_back
 
 SECOND = 10**9
 TIMES = 1_700_000_000 * SECOND + np.array([0, 1, 4]) * SECOND
@@ -46,3 +47,30 @@ def test_a_clock_is_said_to_be_set_back_by_ten_seconds_or_more() -> None:
     assert set_back(records).startswith("the clock was set back by 10 s after image 2;")
     records[2].log_time += 1
     assert set_back(records) == set_back(records[:1]) == ""
+
+
+def times(count: int, every_s: float, late_s: float) -> np.ndarray:
+    """Stamps and log times (ns) of messages that are recorded late, with jitter."""
+    stamps = TIMES[0] + (np.arange(count) * every_s * SECOND).astype(np.int64)
+    delays = late_s + np.random.default_rng(count).exponential(0.05, count)
+    return np.column_stack((stamps, stamps + (delays * SECOND).astype(np.int64)))
+
+
+@pytest.mark.parametrize(("by_s", "what"), [(-1.5, "1.5 s slow"), (0.8, "0.8 s fast"), (0.3, ""), (0.0, "")])
+def test_a_camera_s_clock_that_is_set_is_told(by_s: float, what: str) -> None:
+    images, odometry = times(80, 0.5, 0.1), times(800, 0.05, 0.0)
+    images[40:, 0] += round(by_s * SECOND)
+    told = camera_clock_set(images, odometry)
+    assert told == "" if not what else (told.startswith("from image 40 on") and what in told)
+
+
+def test_images_that_queue_and_clocks_that_are_set_together_are_no_change_of_the_camera_s() -> None:
+    images, odometry = times(80, 0.5, 0.1), times(800, 0.05, 0.0)
+    queued, together = images.copy(), odometry.copy()
+    queued[40:, 1] += 2 * SECOND
+    assert camera_clock_set(queued, odometry) == ""
+    images[40:, 0] += 2 * SECOND
+    together[400:, 0] += 2 * SECOND
+    assert camera_clock_set(images, together) == ""
+    assert camera_clock_set(images, odometry)
+    assert camera_clock_set(images[38:42], odometry) == camera_clock_set(images, odometry[:3]) == ""
