@@ -183,7 +183,7 @@ class LiveSource(Source):
         synchronizer.watch()
         self._leave(ctx, synchronizer)
         if not position.ticks:
-            raise BadInput(f"no image became a tick: {self._why_not()}")
+            raise BadInput(f"no image became a tick: {self._why_not(synchronizer)}")
         return None
 
     def _again(self, position: LiveSourceState) -> tuple[int, Camera, Pixels, Frame] | None:
@@ -255,9 +255,11 @@ class LiveSource(Source):
         self._give_signals_back()
         disconnect()
 
-    def _why_not(self) -> str:
-        """Inputs that were missing, as the terminal reported."""
+    def _why_not(self, synchronizer: TimeSynchronizer) -> str:
+        """Inputs that were missing, as the terminal reported, and what was left out."""
         troubles = sorted(self._transport.status.troubles.values())
+        first = synchronizer.details
+        troubles += [f"{kind} {number} times ({first.get(kind, kind):.200})" for kind, number in self._counted.items()]
         return "; ".join(troubles) or "it was ended before the first image; let it run until the robot sends"
 
     def _write(self, synchronizer: TimeSynchronizer, messages: list[Any]) -> None:

@@ -46,6 +46,8 @@ SHARED = (TRANSFORMS_TYPE, "diagnostic_msgs/msg/DiagnosticArray")
 """Types of topics that many nodes publish together."""
 SILENT_S = 1.0
 """Silence after which a topic that was heard is reported, seconds."""
+MAX_BEHIND_S = 1.0
+"""Age of an image against odometry above which, once its clock was set back, odometry's was not (s)."""
 UNUSED_S = 2.0
 """Images of which none becomes a tick for so long are a trouble."""
 
@@ -344,7 +346,17 @@ class TimeSynchronizer:
             return True
         if self._earlier is None or stamp < self._earlier:
             self._earlier = stamp
-        return stamp - self._earlier >= EXCURSION_S * 1e9
+        if stamp - self._earlier < EXCURSION_S * 1e9:
+            return False
+        track = self.drive.odometry
+        behind = 0.0 if track is None or track.last is None else (track.last - stamp) / 1e9
+        if behind > MAX_BEHIND_S:
+            self.status.note(
+                "clock",
+                f"the camera's clock was set back and odometry's was not: images are {behind:.1f} s behind odometry, "
+                "and poses off by what the robot drives in that time; let one clock stamp both (chrony, PTP)",
+            )
+        return True
 
 
 def type_on(topic: str, role: Role) -> str:

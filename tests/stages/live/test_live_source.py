@@ -320,6 +320,29 @@ def test_a_run_without_a_tick_is_refused_with_what_was_missing(wire: Wire, tmp_p
         Drive(tmp_path).end()
 
 
+def test_a_run_without_a_tick_says_what_was_left_out_though_the_robot_fell_silent(wire: Wire, tmp_path: Path):
+    drive = Drive(tmp_path)
+    drive.feed(wire, [each._replace(data=each.data[:90]) if each.topic == IMAGE else each for each in said()])
+    with pytest.raises(BadInput, match=r"no image became a tick: .*bad_message \d+ times \(.*is not a valid"):
+        drive.end()
+
+
+def test_a_camera_s_clock_that_alone_is_set_back_is_noted(wire: Wire, tmp_path: Path):
+    drive, messages = Drive(tmp_path), said()
+    later = messages[len(messages) // 2 :]
+    drive.feed(wire, [*messages[: len(messages) // 2], *map(set_back, later)])
+    assert "images are 5." in wire.status.troubles["clock"]
+    assert drive.synchronizer.counts["backward_stamp"] > 0
+
+
+def set_back(message: RawMessage) -> RawMessage:
+    """An image whose stamp is 5 s earlier."""
+    if message.topic != IMAGE:
+        return message
+    seconds = int.from_bytes(message.data[4:8], "little") - 5
+    return message._replace(data=message.data[:4] + seconds.to_bytes(4, "little") + message.data[8:])
+
+
 def test_latency_is_measured_from_the_arrival_and_a_clock_that_is_off_shows_as_age():
     status = LiveStatus()
     status.taken(5, time.time_ns() - 20_000_000)
