@@ -14,6 +14,9 @@ from .recording import FORMATS, Format, OpenOptions, Recording, Topics, Unreadab
 MAX_SEARCHED = 20
 """Images of a log, from its first on, in which is looked for what its camera leaves open."""
 
+UNREAD = (".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raw")
+"""Suffixes of images that OpenCV does not read."""
+
 
 def open_recording(
     log: str,
@@ -47,7 +50,7 @@ def open_recording(
     kinds = "; ".join(one.names for one in formats)
     if path.is_dir():
         layouts = ", ".join(sorted(known_layouts(layout_folders)))
-        advice = f"for images with CSVs type log=LAYOUT:{log} (layouts: {layouts})"
+        advice = _readable(path) or f"for images with CSVs type log=LAYOUT:{log} (layouts: {layouts})"
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {advice}")
     if not path.exists() and any(path.suffix in one.suffixes for one in formats):
         raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
@@ -95,6 +98,15 @@ def ring_found_in(log: str, ring: Ring, frame: int) -> str:
         f"{ring.centre_y:.0f}, from {ring.inner:.0f} to {ring.outer:.0f} px (centre and mask in a camera.yaml say "
         "otherwise)"
     )
+
+
+def _readable(folder: Path) -> str:
+    """Where else images are, or how to make readable ones of a folder's; "" where there are none."""
+    inside = sorted(folder.iterdir())
+    if any(path.suffix.lower() in UNREAD for path in inside):
+        return "HEIC and raw images are not read; export them as JPEG or PNG"
+    below = [path for path in inside if path.is_dir() and any(one.opens(str(path)) for one in log_formats())]
+    return f"type log={below[0]}" if below else ""
 
 
 def _candidates(path: Path) -> str:

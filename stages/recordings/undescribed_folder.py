@@ -9,7 +9,9 @@ from .description import Description, Frames
 from .image_folder import ImageFolder
 from .recording import Format, OpenOptions
 
-SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff", ".ppm")
+SUFFIXES = {".jpg": ".jpg", ".jpeg": ".jpg", ".tif": ".tif", ".tiff": ".tif"}
+SUFFIXES |= {suffix: suffix for suffix in (".png", ".bmp", ".webp", ".ppm")}
+"""Suffixes of images, in small letters, and the one that stands for their kind."""
 DEFAULT_RATE_HZ = 1.0
 """Images per second where nobody states them: then most stages take every image."""
 
@@ -21,23 +23,31 @@ class UndescribedFolder(Format):
 
     def opens(self, log: str) -> bool:
         """A folder that holds images."""
-        return bool(_suffixes(user_path(log)))
+        return bool(_kinds(user_path(log)))
 
     def open(self, log: str, options: OpenOptions) -> ImageFolder:
-        """All images of the kind that most of them are of. Raises `UnreadableRecording`."""
+        """All images of the kind that most of them are of; others are counted. Raises `UnreadableRecording`."""
         folder = user_path(log)
-        (suffix, _), *_ = _suffixes(folder).most_common(1)
+        (kind, count), *others = _kinds(folder).most_common()
         rate = options.rate or DEFAULT_RATE_HZ
-        description = Description(frames=Frames(images=f"*{suffix}", period=1.0 / rate))
+        description = Description(frames=Frames(images=_pattern(kind), period=1.0 / rate))
         recording = ImageFolder(log, folder, description, str(folder), options)
+        for other, number in others:
+            recording.drop("another_kind", f"{log}: {number} {other} beside {count} {kind}", number)
         if options.rate is None:
             recording.assumed = (*recording.assumed, f"{log}: {rate:g} image per second (rate=… says otherwise)")
         return recording
 
 
-def _suffixes(folder: Path) -> Counter[str]:
+def _kinds(folder: Path) -> Counter[str]:
     """Number of images of each kind in a folder, in the order of their names."""
     if not folder.is_dir():
         return Counter()
-    shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
-    return Counter(path.suffix for path in shown if path.suffix.lower() in SUFFIXES)
+    shown = (path.suffix.lower() for path in sorted(folder.iterdir()) if not path.name.startswith("."))
+    return Counter(SUFFIXES[suffix] for suffix in shown if suffix in SUFFIXES)
+
+
+def _pattern(kind: str) -> str:
+    """The file names of a kind of images, in small letters or capitals: *.jpg also for *.JPEG."""
+    letters = [f"[{letter}{letter.upper()}]" for letter in kind[1:]]
+    return "*." + {".jpg": "{}{}*{}", ".tif": "{}{}{}*"}.get(kind, "{}" * len(letters)).format(*letters)

@@ -19,6 +19,8 @@ MAX_SCANS = 64
 """Largest number of scans of a JPEG: a progressive one has some ten, and each costs as much as decoding the whole."""
 
 
+PNG_DEPTH = 24
+"""Byte of a PNG that states its bits per channel."""
 EXIF_BYTES = 4096
 """Largest part of a JPEG's beginning in which its EXIF orientation is looked for, bytes."""
 _TURNS: dict[int, Callable[[npt.NDArray[Any]], npt.NDArray[Any]]] = {
@@ -61,6 +63,8 @@ def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS)
         raise Undecodable(" ".join(str(error.err or error).split())[:200]) from None
     if pixels is None:
         raise Undecodable(f"{len(data)} bytes that are no image OpenCV knows")
+    if data.startswith(b"\x89PNG") and data[PNG_DEPTH] == 16 and 0 < pixels.max() < 16:
+        raise Undecodable("at most 12 of its 16 bits are used; `mogrify -evaluate multiply 16 -depth 8 *.png` writes 8")
     turn = _TURNS.get(orientation_of(data))
     return np.asarray(pixels if turn is None else np.ascontiguousarray(turn(pixels)), dtype=np.uint8)
 

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import cv2
+import numpy as np
 from made_logs import write_mcap
 
 from omninav.stages.recordings.opening import log_formats, open_recording
@@ -35,9 +37,30 @@ def test_a_format_that_a_user_wrote_opens_its_names(tmp_path: Path) -> None:
         FORMATS.remove(Renamed)
 
 
+def images(folder: Path, *suffixes: str) -> Path:
+    """A folder with an image of each suffix."""
+    folder.mkdir(parents=True)
+    for number, suffix in enumerate(suffixes):
+        pixels = np.random.default_rng(number).integers(0, 255, (64, 128, 3), np.uint8)
+        assert cv2.imwrite(str(folder / f"image_{number}{suffix}"), pixels)
+    return folder
+
+
+def test_images_of_one_kind_may_spell_it_differently_and_others_are_counted(tmp_path: Path) -> None:
+    folder = images(tmp_path / "card", ".jpg", ".JPG", ".png", ".jpeg", ".JPEG", ".tif")
+    recording = open_recording(str(folder))
+    assert (len(recording.stamps), recording.dropped["another_kind"]) == (4, 2)
+    assert len(open_recording(str(images(tmp_path / "scans", ".TIF", ".tiff"))).stamps) == 2
+
+
 def test_a_name_that_nothing_opens_says_what_to_type(tmp_path: Path) -> None:
     with refused(r"no recording is in this folder .* type log=LAYOUT:.*antworld"):
         open_recording(str(tmp_path))
+    with refused(r"type log=.*/of_a_phone/day$"):
+        open_recording(str(images(tmp_path / "of_a_phone" / "day", ".jpg").parent))
+    (tmp_path / "of_a_phone" / "IMG_1.HEIC").touch()
+    with refused("HEIC and raw images are not read; export them"):
+        open_recording(str(tmp_path / "of_a_phone"))
     (tmp_path / "notes.txt").touch()
     with refused(r"notes\.txt: not a recording; name .*\.mcap"):
         open_recording(str(tmp_path / "notes.txt"))

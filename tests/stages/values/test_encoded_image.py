@@ -98,3 +98,11 @@ def test_a_png_whose_chunk_says_it_is_larger_than_the_file_is_not_decoded(chunk:
 def test_what_is_no_image_is_refused(data: bytes):
     with pytest.raises(Undecodable, match="bytes"):
         decode_image(data)
+
+
+def test_twelve_bits_in_sixteen_are_refused_and_sixteen_are_not() -> None:
+    pixels = np.random.default_rng(0).integers(0, 4096, (16, 32, 3)).astype(np.uint16)
+    with pytest.raises(Undecodable, match="at most 12 of its 16 bits are used"):
+        decode_image(cv2.imencode(".png", pixels)[1].tobytes())
+    assert decode_image(cv2.imencode(".png", pixels * 16)[1].tobytes()).max() > 250
+    assert not decode_image(cv2.imencode(".png", pixels * 0)[1].tobytes()).any()
