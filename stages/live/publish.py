@@ -25,6 +25,7 @@ from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
 
@@ -103,6 +104,7 @@ class Publish(Publisher, Stage):
         command: Command | None = None,
         conflicts: Conflicts | None = None,
         confidence: PoseConfidence | None = None,
+        route: PlannedRoute | None = None,
     ) -> None:
         """Publish what there is. Nothing while a record is made again."""
         if not self._transport.status.live:
@@ -117,6 +119,9 @@ class Publish(Publisher, Stage):
             self._publish_estimate(tick.stamp, estimate, odometry)
         if conflicts is not None:
             self._transport.status.note("conflicts", "; ".join(conflicts.standing))
+        if route is not None:
+            given_up = f"the goal was given up: {route.why}" if route.state == "gave up" else ""
+            self._transport.status.note("route", given_up)
         self._transport.status.published(tick.stamp)
 
     def _publish_estimate(self, stamp: int, estimate: PoseEstimate, odometry: Pose | None) -> None:

@@ -14,6 +14,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.live.publish import Publish
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
 
 from .conftest import ODOMETRY, Recorded, Wire, decode
@@ -84,6 +85,14 @@ def test_a_robot_that_searches_or_is_lost_publishes_no_pose_unless_it_is_asked_t
         told += [state] * len(wire.on("/tf"))
         assert wire.status.troubles.get("state", "tracking") == state
     assert sorted(told) == sorted(published)
+
+
+def test_why_a_goal_was_given_up_is_noted_until_the_next_one(wire: Wire):
+    stage, ctx = Publish(), Context("publish")
+    stage.setup(ctx)
+    for state, why in (("gave up", "no path leads to the goal"), ("under way", "")):
+        stage.step(ctx, Tick(0, 0), route=PlannedRoute(np.zeros(0, np.int64), state, 0, why))
+        assert wire.status.troubles.get("route", "") == (why and f"the goal was given up: {why}")
 
 
 @pytest.mark.parametrize(("taken", "begins_anew"), [("mode", False), ("mean", False), ("mode", True)])
