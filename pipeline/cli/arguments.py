@@ -131,12 +131,12 @@ def value_text(value: Any, depth: int = 0) -> str:
     """
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
+    if hasattr(value, "item") and getattr(value, "ndim", None) == 0:  # a number of numpy, some of which are floats
+        return value_text(value.item(), depth)
     if isinstance(value, int | float):
         if isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
             raise BadInput(f"a whole number of more than {MAX_DIGITS} digits cannot be a setting")
         return repr(value)
-    if hasattr(value, "item") and getattr(value, "ndim", None) == 0:  # a number of numpy
-        return value_text(value.item(), depth)
     if isinstance(value, str | Path):
         text = str(value)
         return text if text and all(c.isalnum() or c in "_./-" for c in text) else _quoted(text)
