@@ -24,6 +24,8 @@ MAX_FRAMES = 2_000_000
 """Largest accepted number of frames of a video: nine hours at 60 a second."""
 MAX_HIDDEN = 1000
 """Frames of a trimmed video that are looked through for the first one that is shown: more than between key frames."""
+MAX_REORDERED = 16.0
+"""Largest time by which a frame is stored after a later one, in times between frames: H.264 allows 16."""
 COMPARED, MIN_CHANGE = 6, 0.1
 """Frames at the beginning whose pixels are compared, and the median size of what is stored of them, as a share of the
 first one's, above which they differ: a camera at rest makes 0.001."""
@@ -66,8 +68,10 @@ class VideoRecording(Recording):
             )
         if not len(self.stamps):
             raise UnreadableRecording(f"{name}: no frame can be read; is the file whole? {_repair(path)}")
-        self._next = 0
+        self._next = self._grabbed = 0
         self._ahead: int | None = None
+        self._is_numbered = self._capture.grab() and abs(_position(self._capture)) > TOLERANCE_NS
+        self._capture = _opened(path)
         self.camera = self._camera(options.camera)
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
@@ -83,16 +87,23 @@ class VideoRecording(Recording):
         """The frame at a stamp, by reading on until the decoder is there; `Undecodable` where it passes over it."""
         target = int(self.stamps[frame])
         if frame < self._next:
-            self._capture, self._ahead = _opened(self._path), None
+            self._capture, self._ahead, self._grabbed = _opened(self._path), None, 0
         self._next = frame + 1
         while self._ahead is None or self._ahead < target - TOLERANCE_NS:
             if not self._capture.grab():
                 raise Undecodable("it cannot be decoded")
-            self._ahead = _position(self._capture)
+            self._ahead = self._position()
         pixels = None if self._ahead > target + TOLERANCE_NS else self._capture.retrieve()[1]
         if pixels is None:
             raise Undecodable("it cannot be decoded")
         return np.asarray(pixels, np.uint8)
+
+    def _position(self) -> int:
+        """Time (ns) of the frame that the decoder gave last. An AVI states none: there the n-th frame has the n-th."""
+        self._grabbed += 1
+        if self._is_numbered and self._grabbed <= len(self.stamps):
+            return int(self.stamps[self._grabbed - 1])
+        return _position(self._capture)
 
     def _hidden(self) -> int:
         """Counts the stored frames before the first that is shown: a trimmed video begins between two key frames."""
@@ -187,6 +198,12 @@ def _presentation_times(path: Path) -> list[int]:
         times.append(_position(capture))
         if len(times) > MAX_FRAMES:
             raise UnreadableRecording(f"{path}: more than {MAX_FRAMES:,} frames; cut it into several videos")
+    steps = np.diff(np.unique(times))
+    if len(steps) and (again := np.maximum.accumulate(times) - times > MAX_REORDERED * np.median(steps)).any():
+        raise UnreadableRecording(
+            f"{path}: its times begin again at frame {int(again.argmax())}, as of parts that were joined: "
+            "give the parts, log=[FIRST,SECOND]"
+        )
     return times
 
 

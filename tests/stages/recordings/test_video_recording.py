@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from omninav.stages.recordings import video_recording
 from omninav.stages.recordings.opening import open_recording
 
 from .conftest import refused
@@ -78,6 +79,29 @@ def test_interlaced_frames_are_refused_and_a_camera_at_rest_is_not(tmp_path: Pat
         open_recording(str(path))
     for name, code in (("rest.avi", "MJPG"), ("rest.mp4", "mp4v")):
         assert len(open_recording(video(tmp_path / name, pictures(640, 320)[:1] * 12, code)).stamps) == 12
+
+
+def test_joined_parts_whose_times_begin_again_are_refused(tmp_path: Path) -> None:
+    part = Path(video(tmp_path / "part.ts", pictures() * 2, "mpg2", 25.0))
+    assert len(open_recording(str(part)).stamps) == 2 * len(LEVELS)
+    joined = tmp_path / "joined.ts"
+    joined.write_bytes(2 * part.read_bytes())
+    with refused("its times begin again at frame 22, .* log=\\[FIRST,SECOND\\]"):
+        open_recording(str(joined))
+
+
+def test_frames_without_times_of_their_own_are_taken_by_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(capture: cv2.VideoCapture) -> int:
+        """As of an AVI with B-frames: the decoder tells when it has the frame, the container when it is shown."""
+        return position(capture) + (160_000_000 if capture.get(cv2.CAP_PROP_FORMAT) != -1 else 0)
+
+    position = video_recording._position
+    monkeypatch.setattr(video_recording, "_position", late)
+    recording = open_recording(video(tmp_path / "drive.avi", pictures(), "MJPG"))
+    for frame in (0, 7, 3, len(LEVELS) - 1):
+        image = recording.image(frame)
+        assert image is not None
+        assert abs(image.mean() - LEVELS[frame]) < 6
 
 
 def test_two_circles_side_by_side_are_no_panorama(tmp_path: Path) -> None:
