@@ -101,7 +101,7 @@ def ring_found_in(log: str, ring: Ring, frame: int) -> str:
 
 
 def _readable(folder: Path) -> str:
-    """Where else images are, or how to make readable ones of a folder's; "" where there are none."""
+    """Tells where else images are, or how to make readable ones of a folder's; "" where there are none."""
     inside = sorted(folder.iterdir())
     if any(path.suffix.lower() in UNREAD for path in inside):
         return "HEIC and raw images are not read; export them as JPEG or PNG"
