@@ -59,13 +59,14 @@ def hydra_errors() -> Iterator[None]:
         yield
     except (HydraException, OmegaConfBaseException, BadInput):
         raise
+    except RecursionError:
+        raise ConfigCompositionException("files of options include each other in their defaults") from None
     except (
         ValueError,
         LookupError,
         TypeError,
         AttributeError,
         ArithmeticError,
-        RecursionError,
         AssertionError,
     ) as error:
         raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None

@@ -52,13 +52,23 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFol
         return run, read_metrics(folder) if prepared is None else execute(run, prepared, display)
 
 
+def no_run(folder: Path) -> BadInput:
+    """The error for a folder in which no run has begun."""
+    if any(folder.glob(f"*/{MANIFEST}")):
+        return BadInput(
+            f"{folder}: a folder of runs; give one of them, and continue a sweep by its own command: omninav -m … "
+            f"hydra.sweep.dir={shlex.quote(str(folder))}"
+        )
+    return BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+
+
 def reopened(run: RunFolder, folder: Path) -> PreparedRun | None:
     """Prepares a stopped run to be executed in its folder, from the directory in which it was started.
 
     None where it is complete. Raises `BadInput` as `resume` does.
     """
     if not (folder / MANIFEST).is_file() and not run.beginning.is_file():
-        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+        raise no_run(folder)
     with run.owned():
         return _reopened(run, folder)
 
@@ -101,7 +111,7 @@ def complete_run(folder: Path) -> tuple[RunFolder, str]:
     """A run that has ended, and the text of its configuration. Raises `BadInput` where it is not a complete one."""
     run = RunFolder(Path(os.path.realpath(folder)))
     if not (folder / MANIFEST).is_file():
-        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+        raise no_run(folder)
     began, config = _beginning(run, folder)
     if began.status != "complete":
         raise BadInput(

@@ -63,10 +63,11 @@ class ImageFolder(Recording):
             for what in unlikely:
                 self._drop("impossible_motion", what)
         keep = self._usable(paths, times, truth)
-        self._paths_kept = [paths[row] for row in keep]
-        self.turned = sum(map(_is_turned, self._paths_kept))
+        self.paths = [paths[row] for row in keep]
+        """Files of its images, in their order."""
+        self.turned = sum(map(_is_turned, self.paths))
         """Number of its images that are turned as their EXIF orientation states."""
-        self._images = DecodeAhead(lambda frame: partial(self._read, self._paths_kept[frame]))
+        self._images = DecodeAhead(lambda frame: partial(self._read, self.paths[frame]))
         self.stamps = times[keep]
         self.truth = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
@@ -74,12 +75,12 @@ class ImageFolder(Recording):
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         decode = partial(self._images.image, frame, following)
-        return checked_image(decode, str(self._paths_kept[frame]), self.camera, self._drop)
+        return checked_image(decode, str(self.paths[frame]), self.camera, self._drop)
 
     def digest(self) -> str:
         """sha256 over the tables, the description and every image that is used."""
         whole = hashlib.sha256(repr(self._description).encode())
-        for file in [*self._sources, *(file for path in self._paths_kept for file in self._files(path))]:
+        for file in [*self._sources, *(file for path in self.paths for file in self._files(path))]:
             whole.update(digest_file(file).encode())
         return whole.hexdigest()
 
@@ -235,10 +236,10 @@ class ImageFolder(Recording):
         return camera_from(described, f"{self._where}: camera", first.shape[1::-1])
 
     def _first_picture(self) -> Pixels:
-        for path in self._paths_kept:
+        for path in self.paths:
             with suppress(Undecodable, BadInput):
                 return self._read(path)
-        raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
+        raise UnreadableRecording(f"{self._folder}: not one of its {len(self.paths)} images can be decoded")
 
 
 def names_table(paths: Sequence[Path], form: str) -> CsvTable:

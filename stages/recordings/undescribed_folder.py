@@ -1,5 +1,6 @@
 """Folders of images that nothing describes: in the order of their numbers, at a stated rate."""
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +13,10 @@ from .recording import Format, OpenOptions
 SUFFIXES = {".jpg": ".jpg", ".jpeg": ".jpg", ".tif": ".tif", ".tiff": ".tif"}
 SUFFIXES |= {suffix: suffix for suffix in (".png", ".bmp", ".webp", ".ppm")}
 """Suffixes of images, in small letters, and the one that stands for their kind."""
+DIGITS = re.compile(r"\d+")
+"""Part of a name that differs within a series."""
+MAX_SERIES = 4
+"""Series of images that are named."""
 DEFAULT_RATE_HZ = 1.0
 """Images per second where nobody states them: then most stages take every image."""
 
@@ -34,6 +39,13 @@ class UndescribedFolder(Format):
         recording = ImageFolder(log, folder, description, str(folder), options)
         for other, number in others:
             recording.drop("another_kind", f"{log}: {number} {other} beside {count} {kind}", number)
+        series = Counter(DIGITS.sub("#", path.stem) for path in recording.paths)
+        if len(series) > 1:
+            names = ", ".join(f"{name} ({number})" for name, number in series.most_common(MAX_SERIES))
+            told = (
+                f"{log}: images of {len(series)} series, {names}, are taken for one drive, one series after the other"
+            )
+            recording.assumed = (*recording.assumed, told)
         if options.rate is None:
             recording.assumed = (*recording.assumed, f"{log}: {rate:g} image per second (rate=… says otherwise)")
         return recording

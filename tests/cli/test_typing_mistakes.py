@@ -145,6 +145,18 @@ def test_an_own_variant_whose_inputs_cannot_be_read_is_refused(
     assert problem in capsys.readouterr().err
 
 
+def test_own_options_that_include_each_other_and_a_folder_of_runs_are_named(folder: str, capsys) -> None:
+    for name, other in (("one", "two"), ("two", "one")):
+        (Path(folder) / f"variant/{name}.yaml").write_text(f"# @package _global_\ndefaults: [{other}]\n")
+    told = said(capsys, "check", f"--config-dir={folder}", "variant=one")
+    assert "files of options include each other in their defaults" in told
+    (Path(folder) / "0").mkdir()
+    (Path(folder) / "0/manifest.json").write_text("{}")
+    assert f"continue a sweep by its own command: omninav -m … hydra.sweep.dir={folder}" in said(
+        capsys, "resume", folder
+    )
+
+
 def test_an_own_variant_is_drawn(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["graph", "variant=mine", f"tour={TOUR}", f"log={DRIVE}", f"out={tmp_path}"]
     assert main(["--config-dir", folder, *words]) == 0

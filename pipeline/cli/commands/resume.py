@@ -14,7 +14,7 @@ from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, one_line
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.resume import no_run, resume
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def command(arguments: list[str]) -> int:
     given, *typed = arguments
     here, folder = Path.cwd(), Path(os.path.realpath(given))
     if not folder.is_dir():
-        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+        raise no_run(folder)
     with only_listed(typed):
         return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, here)
 

@@ -23,7 +23,13 @@ def test_every_name_that_is_offered_is_there():
 
 
 def test_python_values_become_the_words_that_one_would_type():
-    settings = {"seed": np.int64(3), "log": Path("a b.mcap"), "grid": None, "validate": True, "cuts": [[1, np.float64(2.5)]]}
+    settings = {
+        "seed": np.int64(3),
+        "log": Path("a b.mcap"),
+        "grid": None,
+        "validate": True,
+        "cuts": [[1, np.float64(2.5)]],
+    }
     assert arguments_of(("omniview_mcl", "match=l2"), settings) == [
         "variant=omniview_mcl",
         "match=l2",

@@ -53,6 +53,13 @@ def test_images_of_one_kind_may_spell_it_differently_and_others_are_counted(tmp_
     assert len(open_recording(str(images(tmp_path / "scans", ".TIF", ".tiff"))).stamps) == 2
 
 
+def test_images_of_several_series_in_one_folder_are_told(tmp_path: Path) -> None:
+    folder = images(tmp_path / "stereo", ".jpg", ".jpg")
+    assert "images of" not in " ".join(open_recording(str(folder)).assumed)
+    (folder / "image_1.jpg").rename(folder / "right_0.jpg")
+    assert "images of 2 series, image_# (1), right_# (1)" in " ".join(open_recording(str(folder)).assumed)
+
+
 def test_a_name_that_nothing_opens_says_what_to_type(tmp_path: Path) -> None:
     with refused(r"no recording is in this folder .* type log=LAYOUT:.*antworld"):
         open_recording(str(tmp_path))
