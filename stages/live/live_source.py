@@ -102,6 +102,8 @@ class LiveSource(Source):
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
     topics: Topics = Topics()
     """Which topics are read. An image topic whose name ends with `compressed` carries compressed images."""
+    map_frame: str = "map"
+    """The map's frame: goals and poses that are given from outside in another one are refused."""
     initial_pose: str | None = "/initialpose"
     """Topic for the robot's pose, given from outside (PoseWithCovarianceStamped): the belief starts again there."""
     goal: str | None = "/goal_pose"
@@ -210,6 +212,7 @@ class LiveSource(Source):
             camera_info=None if self.topics.camera_info is None else full_name(self.topics.camera_info),
             patience_s=PATIENCE_S,
             last_stamp=position.stamp if position.ticks else None,
+            map_frame=self.map_frame,
         )
         synchronizer.subscribe()
         self._watched = time.monotonic()  # endpoints need a moment to find each other

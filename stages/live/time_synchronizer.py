@@ -81,6 +81,8 @@ class TimeSynchronizer:
     patience_s: float
     last_stamp: int | None = None
     """Stamp (ns) of the last image that was used."""
+    map_frame: str = "map"
+    """Frame of goals and initial poses."""
 
     def __post_init__(self) -> None:
         self.counts: Counter[str] = Counter()
@@ -229,6 +231,12 @@ class TimeSynchronizer:
             if role == "odometry":
                 self._base = decoded.child_frame_id
             header = getattr(decoded, "header", None)
+            if role in ("goal", "initial_pose"):
+                frame = header.frame_id.lstrip("/")
+                told = f"its frame is '{frame}', expected '{self.map_frame}'; in RViz choose it as the fixed frame"
+                self.status.note("frame", f"{message.topic}: {told}" if frame not in ("", self.map_frame) else "")
+                if frame not in ("", self.map_frame):
+                    raise ValueError(told)
             stamp = message.received if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
             items = self.drive.add(role, stamp, decoded, message)
         except BadInput:

@@ -82,19 +82,13 @@ class OdometryBuffer:
         self._scans: deque[tuple[int, Scan, Any]] = deque(maxlen=SCANS)
         self._restart: Reinitialise | None = None
         self._goal: GoalPoint | None = None
-        self._robots_frames = {"odom", "base_link"}
 
     def add(self, role: Role, stamp: int, message: Any, item: Any = None) -> list[Any]:
         """Take a decoded message. Returns the items of messages that are now used: a replay needs them, in that order.
 
-        Raises ValueError or AttributeError where the message cannot be of its role, and for a goal or an initial
-        pose in a frame of the robot.
+        Raises ValueError or AttributeError where the message cannot be of its role.
         """
-        if role in ("goal", "initial_pose") and (frame := message.header.frame_id.lstrip("/")) in self._robots_frames:
-            raise ValueError(f"its frame is '{frame}', expected the map's; in RViz choose it as the fixed frame")
         if role == "odometry" and self.odometry is not None:
-            own = {name.lstrip("/") for name in (message.header.frame_id, message.child_frame_id)}
-            self._robots_frames |= own - {"", "map"}
             return self.odometry.add(stamp, pose_of(message), item)
         if role == "truth" and self.truth is not None:
             return self.truth.add(stamp, pose_of(message), item)

@@ -132,6 +132,17 @@ def test_a_pose_and_a_goal_that_somebody_names_are_in_the_record_at_the_tick_tha
     assert drive.ctx.counts["bad_message"] == 1
 
 
+@pytest.mark.parametrize(("frame", "is_taken"), [("", True), ("/hall", True), ("map", False), ("odom", False)])
+def test_a_goal_in_another_frame_than_the_map_s_is_refused_and_noted(
+    wire: Wire, tmp_path: Path, frame: str, is_taken: bool
+):
+    goal = {"header": {"frame_id": frame}, "pose": {"position": {"x": 3.0}, "orientation": {"w": 1.0}}}
+    first, messages = RawMessage("/goal_pose", POSE_STAMPED, 0, encode(POSE_STAMPED, goal, 0)), said()
+    drive = driven(wire, tmp_path, [first, *messages[: len(messages) // 2]], map_frame="hall")
+    assert sum(out.goal is not None for out in drive.outs) == is_taken
+    assert ("frame" in wire.status.troubles) == (not is_taken)
+
+
 def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(wire: Wire, tmp_path: Path):
     messages = said()
     drive = Drive(tmp_path)

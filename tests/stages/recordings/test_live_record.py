@@ -1,6 +1,5 @@
 """Messages of a live run, as they come and as a recording."""
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,8 @@ TYPES = {
 }
 
 
-def say(drive: OdometryBuffer, role: Role, seconds: float, fields: dict[str, Any], frame: str = "map") -> list[Any]:
+def say(drive: OdometryBuffer, role: Role, seconds: float, fields: dict[str, Any]) -> list[Any]:
     message = make_message(TYPES[role], fields)
-    message.header.frame_id = frame
     return drive.add(role, round(seconds * 1e9), message, f"{role} at {seconds} s")
 
 
@@ -66,11 +64,3 @@ def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:
         covariance[35] = variance
         with pytest.raises(ValueError, match="covariance"):
             say(drive, "initial_pose", 0.3, {"pose": {"pose": pose_fields(0.0, 0.0, 0.0), "covariance": covariance}})
-
-
-@pytest.mark.parametrize(("frame", "taken"), [("", True), ("map", True), ("wheels", False), ("base_link", False)])
-def test_only_the_robots_own_frames_are_refused(frame: str, taken: bool) -> None:
-    drive = OdometryBuffer(LiveHeader({"/odom": "odometry", "/goal_pose": "goal"}))
-    say(drive, "odometry", 1.0, {"pose": {"pose": pose_fields(1.0, 0.0, 0.0)}}, "/wheels")
-    with nullcontext() if taken else pytest.raises(ValueError, match=f"its frame is '{frame}'"):
-        say(drive, "goal", 2.0, {"pose": pose_fields(1.0, 0.0, 0.0)}, frame)
