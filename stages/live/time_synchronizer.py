@@ -231,7 +231,7 @@ class TimeSynchronizer:
             if role == "odometry":
                 self._base = decoded.child_frame_id
             header = getattr(decoded, "header", None)
-            if role in ("goal", "initial_pose"):
+            if header is not None and role in ("goal", "initial_pose"):
                 frame = header.frame_id.lstrip("/")
                 told = f"its frame is '{frame}', expected '{self.map_frame}'; in RViz choose it as the fixed frame"
                 self.status.note("frame", f"{message.topic}: {told}" if frame not in ("", self.map_frame) else "")
