@@ -46,6 +46,8 @@ SHARED = (TRANSFORMS_TYPE, "diagnostic_msgs/msg/DiagnosticArray")
 """Types of topics that many nodes publish together."""
 SILENT_S = 1.0
 """Silence after which a topic that was heard is reported, seconds."""
+MAX_CLOCKS_S = 60.0
+"""Difference of the newest stamps of images and odometry beyond which they are of different clocks (s)."""
 MAX_BEHIND_S = 1.0
 """Age of an image against odometry above which, once its clock was set back, odometry's was not (s)."""
 UNUSED_S = 2.0
@@ -91,6 +93,7 @@ class TimeSynchronizer:
         self._latest: dict[str, str] = {}
         self.unrecorded: list[RawMessage] = []
         self._images: list[_Pending] = []
+        self._image_stamp = -1
         self._earlier: int | None = None
         self._without_scan = False
         self.mounted: Mounted | None = None
@@ -192,6 +195,16 @@ class TimeSynchronizer:
         unused.pop("overtaken_image", None)
         if not unused or now - self._last_used < UNUSED_S:
             return ""
+        track, stamp = self.drive.odometry, self._image_stamp
+        last = stamp if track is None or track.last is None else track.last
+        is_other = stamp >= 0 and abs(stamp - last) > MAX_CLOCKS_S * 1e9
+        if stamp == 0 or (is_other and stamp < 1e9):
+            return "images carry no time stamp (0): let the camera's driver set header.stamp"
+        if is_other:
+            return (
+                f"images and odometry are stamped by different clocks ({stamp / 1e9:.3f} s, {last / 1e9:.3f} s): "
+                "use one (chrony, PTP; use_sim_time for all nodes or for none)"
+            )
         kind, number = unused.most_common(1)[0]
         return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200})"
 
@@ -216,6 +229,7 @@ class TimeSynchronizer:
             if stamp is None:
                 self._drop("bad_message", f"{message.topic}: a message of {len(message.data)} bytes is no image")
             else:
+                self._image_stamp = stamp
                 delay = self.camera.delay_ns if isinstance(self.camera, Camera) else 0
                 self._images.append(_Pending(stamp - delay, time.monotonic(), message))
             return

@@ -289,9 +289,20 @@ def test_a_topic_for_two_things_is_refused_before_anything_runs(wire: Wire, give
         LiveSource(camera=str(CAMERA), **given).check(Context("source"))
 
 
-def test_images_that_odometry_never_reaches_are_a_trouble(wire: Wire, tmp_path: Path, now: list[float]):
+@pytest.mark.parametrize(
+    ("by_s", "said"),
+    [
+        (40, "no image is used: outside_odometry"),
+        (40, "odometry has up to"),
+        (1000, "are stamped by different clocks"),
+        (0, "images carry no time stamp (0)"),
+    ],
+)
+def test_images_that_odometry_never_reaches_are_a_trouble(
+    wire: Wire, tmp_path: Path, now: list[float], by_s: int, said: str
+):
     synchronizer = Drive(tmp_path).synchronizer
-    images = [each._replace(data=ahead(each.data)) for each in recorded(DRIVE, IMAGE)]
+    images = [each._replace(data=ahead(each.data, by_s)) for each in recorded(DRIVE, IMAGE)]
     odometry = recorded(DRIVE, ODOMETRY)
     for late in (False, True):  # both go on coming
         now[0] += 3.0 * late
@@ -299,13 +310,12 @@ def test_images_that_odometry_never_reaches_are_a_trouble(wire: Wire, tmp_path: 
             wire.queue.put(message)
         assert synchronizer.next(0.0) is None
     synchronizer.watch()
-    assert "no image is used: outside_odometry" in wire.status.troubles["ticks"]
-    assert "odometry has up to" in wire.status.troubles["ticks"]
+    assert said in wire.status.troubles["ticks"]
 
 
-def ahead(data: bytes) -> bytes:
-    """A message whose stamp is of a thousand seconds later."""
-    seconds = int.from_bytes(data[4:8], "little") + 1000
+def ahead(data: bytes, by_s: int) -> bytes:
+    """A message whose stamp is so much later; 0: whose stamp is 0."""
+    seconds = int.from_bytes(data[4:8], "little") + by_s if by_s else 0
     return data[:4] + seconds.to_bytes(4, "little") + data[8:]
 
 
@@ -439,7 +449,7 @@ def test_a_second_node_on_a_published_topic_is_noted(wire: Wire, tmp_path: Path)
 
 def test_scans_of_another_clock_than_the_cameras_are_noted(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path)
-    drive.feed(wire, [each._replace(data=ahead(each.data)) if each.topic == "/scan" else each for each in said()])
+    drive.feed(wire, [each._replace(data=ahead(each.data, 1000)) if each.topic == "/scan" else each for each in said()])
     drive.synchronizer.watch()
     assert drive.outs
     assert wire.status.troubles.keys() == {"/scan"}
