@@ -11,6 +11,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.geometry.arrays import Array, Floats
+from omninav.stages.geometry.plane.mount import found_mount
 from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
@@ -34,7 +35,7 @@ EVERY = 8
 """Images between two judgements; a finding is reported once two in a row agree."""
 STANDS = 2
 """Judgements in a row that do not find it again, after which a finding holds no longer."""
-COLUMNS = 11
+COLUMNS = 14
 """Numbers that are remembered of an image."""
 
 
@@ -42,11 +43,13 @@ class Watched:
     """The last N images, from rows of `COLUMNS` numbers: their `times` (N,) in s; `odometry` (N, 3) with a heading that
     is not wrapped, and the path that it drove (`metres`) and turned, to either side (`radians`); best `matches` (N, 3)
     in the map (NaN without one), and whether each is `at_estimate` (N,) (NaN without one). Against the image before:
-    `correlation` (N,), whether it is the `same` (N,), and `sure_turns` (N - 1,) seen (rad), NaN in images unlike it."""
+    `correlation` (N,), whether it is the `same` (N,), and `sure_turns` (N - 1,) seen (rad), NaN in images unlike it.
+    `exact` (N, 3): estimates, NaN where they are not exact to `EXACT_M`."""
 
     def __init__(self, rows: Array) -> None:
         self.times, self.odometry, self.matches = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
-        self.at_estimate, turns, self.correlation, self.same = rows[:, 7:].T
+        self.at_estimate, turns, self.correlation, self.same = rows[:, 7:11].T
+        self.exact = rows[:, 11:]
         self.sure_turns = np.where(self.correlation[1:] > SURE_CORRELATION, turns[1:], np.nan)
         self.metres, self.radians = driven(self.odometry)
 
@@ -69,7 +72,7 @@ def driven(odometry: Array) -> tuple[float, float]:
 
 
 class InputConflictsState(State):
-    """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`, and the `strips` (rows,
+    """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 14) of `Watched`, and the `strips` (rows,
     columns) of the last ones, of which all but the first are still to be compared with the one before; the kind that
     the last judgement found; what was found, by its kind, and how many judgements ago each that holds was found last.
     """
@@ -131,6 +134,8 @@ class InputConflicts(Stage):
             if similarities is not None and map is not None and min(similarities.values.shape) > 1:
                 match = best_place(similarities, map)
                 recent.rows[-1, 4:7], recent.rows[-1, 7] = match, lies_at(match, estimate, metres)
+            if estimate is not None and np.trace(estimate.covariance[:2, :2]) < EXACT_M**2:
+                recent.rows[-1, 11:] = pose_row(estimate.pose)
             if recent.rows[-1, 10] and (sentence := frozen(Watched(recent.rows), metres)):
                 self._say(ctx, recent, "frozen", sentence)  # what is equal to the last bit needs no second judgement
             recent.judged += 1
@@ -275,6 +280,13 @@ than as it is where images are late, by at least this many seconds."""
 MISPLACED_M = 0.5
 """A robot that drives this far within the delay of its images is not at the estimate: the confidence's tolerance
 (m)."""
+EXACT_M, MOUNT_IMAGES, LATER_IMAGES = 0.05, 32, 22
+"""Largest standard deviation of an estimate's position (m), how many of the last of these tell where the camera is, and
+how many of them must tell the same."""
+MOVED_M, MOVED_RAD = 0.1, math.radians(5.0)
+"""A camera that is this far (m) or turned this much (rad) from where the map has it was moved."""
+DISPLACED_M, DISPLACED_RAD = 0.4, math.radians(8.0)
+"""The same from which on poses come near the tolerances of their confidence, 0.5 m and 10 degrees."""
 TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
 """Matches must move this many length scales to count, in this many pairs, of which this share agrees on one relation
 of the tracks, and so much less on the right one where that is mirrored."""
@@ -412,6 +424,27 @@ def whose(watched: Watched, length_scale_m: float) -> str:
     )
 
 
+def moved(watched: Watched, length_scale_m: float, min_metres: float = MOVED_M, min_radians: float = MOVED_RAD) -> str:
+    """The camera's place on the robot, by exact estimates against odometry; at least so far off where it was."""
+    rows = np.flatnonzero(np.isfinite(watched.exact).all(axis=1))[-MOUNT_IMAGES:]
+    mount = found_mount(watched.exact[rows], watched.odometry[rows])
+    later = found_mount(watched.exact[rows[-LATER_IMAGES:]], watched.odometry[rows[-LATER_IMAGES:]])
+    if mount is None or later is None or np.abs((mount - later) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
+        return ""  # it was moved within these images
+    if math.hypot(*mount[:2]) < min_metres and abs(mount[2]) < min_radians:
+        return ""
+    return (
+        f"by landmarks and odometry over {len(rows)} images the camera is {mount[0]:+.2f} m forward, {mount[1]:+.2f} m "
+        f"to the left and turned by {math.degrees(mount[2]):+.0f} degrees of where the map has it: check that nothing "
+        "moved it, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
+    )
+
+
+def displaced(watched: Watched, length_scale_m: float) -> str:
+    """A camera that was moved so far that poses are not what their confidence says."""
+    return moved(watched, length_scale_m, DISPLACED_M, DISPLACED_RAD)
+
+
 def tracked(watched: Watched, length_scale_m: float) -> str:
     """The track of best matches against odometry's."""
     odometry, matches = watched.placed
@@ -475,10 +508,12 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "blind": blind,
     "turned": turned,
     "misplacing": misplacing,
+    "displaced": displaced,
     "late": late,
+    "moved": moved,
     "tracked": tracked,
     "foreign": foreign,
 }
 """In the order in which causes hide each other."""
-HARMLESS = frozenset(("leap", "late"))
-"""Kinds for which poses are right, and their stamps are not."""
+HARMLESS = frozenset(("leap", "late", "moved"))
+"""Kinds for which poses are right within the tolerances of their confidence."""

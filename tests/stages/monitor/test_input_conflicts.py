@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,11 @@ from conftest import DATA, DRIVE, TOUR, needs_data
 import omninav
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.mcap.message import Message
-from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.monitor.input_conflicts import JUDGEMENTS, InputConflicts, InputConflictsState
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.image import Strip
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -135,6 +138,45 @@ def test_images_that_fit_no_place_are_said_and_a_quarter_that_fits_is_enough(fit
         seen, scale = Similarities(values), LengthScale(0.4)
         said = watch.step(ctx, state, strip, pose, None, seen, map, scale, estimate=estimate).conflicts.sentences
     assert [sentence[:35] for sentence in said] == (["the images fit no place of the map:"] if fits == 0.0 else [])
+
+
+def of_moved_camera(mount: tuple[float, float, float], sigma_m: float) -> tuple[list[str], bool]:
+    """What holds at the end of a drive in which a camera is moved on its robot, and whether it misleads."""
+    rng, watch, state, ctx = np.random.default_rng(0), InputConflicts(), InputConflictsState(), Context("watch")
+    track, conflicts = np.zeros(3), Conflicts((), (), False)
+    covariance = np.diag([sigma_m**2 / 2, sigma_m**2 / 2, 1e-6])
+    for number in range(96):
+        track = compose(track, (0.2, 0.0, 0.3 * math.sin(number / 5)))
+        ctx.tick = Tick(number, number * 500_000_000)
+        moved = mount if number > 40 else (0.0, 0.0, 0.0)
+        seen = compose((5.0, -2.0, 1.0), compose(track, moved)) + rng.normal(0.0, 0.003, 3)
+        at = Pose(*seen.tolist())
+        strip = Strip(rng.uniform(0.0, 255.0, (8, 90)).astype(np.float32))
+        estimate = PoseEstimate(at, covariance, 1.0, at)
+        conflicts = watch.step(ctx, state, strip, Pose(*track.tolist()), estimate=estimate).conflicts
+    return [each for each in conflicts.standing if "by landmarks" in each], conflicts.misleading
+
+
+@pytest.mark.parametrize(
+    ("mount", "told", "misleads"),
+    [
+        ((0.0, 0.0, 0.0), "", False),
+        ((0.05, 0.0, math.radians(3.0)), "", False),
+        ((0.2, -0.15, 0.0), "+0.20 m forward, -0.15 m to the left and turned by +0 degrees", False),
+        ((0.0, 0.0, math.radians(6.0)), "turned by +6 degrees", False),
+        ((0.5, 0.0, 0.0), "+0.50 m forward", True),
+        ((0.0, 0.0, math.radians(-30.0)), "turned by -30 degrees", True),
+    ],
+)
+def test_a_camera_that_was_moved_on_its_robot_is_told(
+    mount: tuple[float, float, float], told: str, misleads: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(JUDGEMENTS, "blind")  # these images are noise
+    standing, misleading = of_moved_camera(mount, 0.02)
+    assert len(standing) == bool(told)
+    assert told in "".join(standing)
+    assert misleading == misleads
+    assert not of_moved_camera(mount, 0.1)[0]
 
 
 def test_odometry_that_is_not_believed_says_to_check_its_unit(tmp_path: Path) -> None:
