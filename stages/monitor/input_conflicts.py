@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import field
 from functools import cached_property
 
@@ -149,6 +149,9 @@ class InputConflicts(Stage):
 
     def _judge(self, ctx: Context, recent: InputConflictsState, length_scale_m: float) -> None:
         kind, sentence = judge(Watched(recent.rows), length_scale_m)
+        if kind in ("", "displaced", "moved") and len(recent.rows) > LATE_IMAGES:  # what began midway
+            lately = judge(Watched(recent.rows[-LATE_IMAGES:]), length_scale_m, ("misplacing", "late"))
+            kind, sentence = lately if lately[0] else (kind, sentence)
         recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
         others = set(recent.standing) - {"leap", kind}
         if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
@@ -296,6 +299,8 @@ CHANGING = 0.97
 """Images of a robot that drives correlate less with the ones before."""
 MISSCALED_OCTAVES, MISTURNED = 0.4, math.radians(20.0)
 """A relation of tracks is a wrong one beyond these."""
+LATE_IMAGES = 48
+"""Last images in which a delay is looked for where all of them show nothing."""
 NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
 """A match is at the estimate within this many length scales, turned by less than this (rad)."""
 SCATTERED, ELSEWHERE = 0.05, 0.1
@@ -303,9 +308,9 @@ SCATTERED, ELSEWHERE = 0.05, 0.1
 with which images count as fitting no place of the map."""
 
 
-def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
-    """The first conflict that is found, by its kind and in a sentence; ("", "") where there is none."""
-    found = ((kind, finding(watched, length_scale_m)) for kind, finding in JUDGEMENTS.items())
+def judge(watched: Watched, length_scale_m: float, kinds: Collection[str] = ()) -> tuple[str, str]:
+    """The first conflict that is found, of these kinds or any, by its kind and in a sentence; ("", "") without one."""
+    found = ((kind, JUDGEMENTS[kind](watched, length_scale_m)) for kind in kinds or JUDGEMENTS)
     return next((each for each in found if each[1]), ("", ""))
 
 
