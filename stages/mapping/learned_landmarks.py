@@ -12,6 +12,7 @@ from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks import map_making
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
+    CONTRADICTED,
     AdjustedMap,
     Seen,
     adjusted_drive,
@@ -135,6 +136,8 @@ class LearnLandmarks(Stage):
             ctx.warn(_slipped(adjusted, map.poses if as_driven is None else as_driven.poses))
         poses = robot_poses(poses, mount)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
+        if adjusted.problem == CONTRADICTED:
+            ctx.warn(f"mapping: {CONTRADICTED}; the poses stay as they were given")
         ctx.fact("map_adjusted", _words(adjusted, float(moved.max(initial=0.0)), given))
         values = {
             "number": len(landmarks),

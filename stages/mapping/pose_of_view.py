@@ -33,6 +33,11 @@ def pose_of_view(
             )
         map.put(pose_source=source)
         ctx.fact("map_poses", source)
+    elif truth is not None and map.pose_source != "truth" and supervised == "auto":
+        ctx.warn(
+            "mapping: the first image of the tour has no ground truth and later ones do, so the map is in odometry's "
+            "frame; leave out the images without: type tour_settings.truth=FILE with all, or cut the tour there"
+        )
     pose = truth if map.pose_source == "truth" else odometry
     if pose is None:
         ctx.count("view_without_pose", detail=f"mapping: images without {SOURCE_WORDS[map.pose_source]} are not mapped")

@@ -6,6 +6,7 @@ import numpy as np
 
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.plane.track_fit import track_fit
 from omninav.stages.values.confidence import MIN_SURE
 from omninav.stages.values.drive import Drive, known
@@ -16,6 +17,10 @@ OFF_M, OFF_DEG = 0.3, 30.0
 """Median errors of a position and of a heading, beyond which the truth is examined."""
 MAX_LATE, LATE_GAIN = 10, 4.0
 """Most images by which the truth may be late or early, and how many times smaller the median error must be then."""
+ALIGNED_DEG = 5.0
+"""Median error of headings up to which a truth may be that of another point of the robot (degrees)."""
+FAR_M = 1.0
+"""Median error beyond which a truth that fits under no change is reported (m)."""
 MIN_CONSTANT = 0.9
 """Mean cosine above which headings differ by a constant angle."""
 MIN_MOVED, MIN_PAIRS, MIN_SHARE = 1.0, 40, 0.6
@@ -26,7 +31,10 @@ OTHER_UNIT, OTHER_HEADING = 0.4, math.radians(20.0)
 
 
 def truth_misfit(drive: Drive) -> str:
-    """Describes the change with which a drive's truth fits the estimates of a sure robot; "" where it needs none."""
+    """Describes the change with which a drive's truth fits the estimates of a sure robot, or that none does.
+
+    "" where it needs none.
+    """
     rows = known(drive.truth) & known(drive.estimate)
     truth, estimate, seconds = drive.truth[rows], drive.estimate[rows], drive.seconds[rows]
     sure = drive.confidence[rows & np.isfinite(drive.confidence)]
@@ -36,21 +44,48 @@ def truth_misfit(drive: Drive) -> str:
     off_deg = float(np.median(heading_errors_deg(estimate, truth)))
     if off_m < OFF_M and off_deg < OFF_DEG:
         return ""
-    found = _late(truth, estimate, seconds, off_m) or (
-        _turned(truth, estimate) if off_m < OFF_M else _moved(truth, estimate)
+    found = (
+        (_mounted(truth, estimate, off_m) if off_deg < ALIGNED_DEG else "")
+        or _late(truth, estimate, seconds, off_m)
+        or (_turned(truth, estimate) if off_m < OFF_M else _moved(truth, estimate))
     )
-    return f"the estimates fit the truth only once that is {found}; errors are of the truth as given" if found else ""
+    if found:
+        return f"the estimates fit the truth only once that is {found}; errors are of the truth as given"
+    if off_m < FAR_M:
+        return ""
+    return (
+        "the truth fits the estimates of a sure robot under no shift in time, turn, mirror, scale or move: check that "
+        "it is of this drive, and its columns"
+    )
+
+
+def _mounted(truth: Array, estimate: Array, off_m: float) -> str:
+    """The truth of another point of the robot, or a camera that was moved on it: off by the same in its own frame."""
+    away = between(truth, estimate)[:, :2]
+    middle = np.median(away, axis=0)
+    left = float(np.median(np.hypot(*(away - middle).T)))
+    if left * LATE_GAIN > off_m or left * 2.0 > min(_left_late(truth, estimate).values(), default=math.inf):
+        return ""  # a robot that always drives as fast is ahead by the same where its truth is late
+    return (
+        f"{middle[0]:+.2f} m forward and {middle[1]:+.2f} m to the left on the robot: check which point it is of, and "
+        "where the camera sits (`position` in camera.yaml)"
+    )
 
 
 def _late(truth: Array, estimate: Array, seconds: Array, off_m: float) -> str:
-    most = min(MAX_LATE, len(truth) // 4)
-    shifts = [shift for shift in range(-most, most + 1) if shift]
-    left = [np.median(position_errors(*_shifted(estimate, truth, shift))) for shift in shifts]
-    if not left or min(left) * LATE_GAIN > off_m:
+    left = _left_late(truth, estimate)
+    if not left or min(left.values()) * LATE_GAIN > off_m:
         return ""
-    shift = shifts[int(np.argmin(left))]
+    shift = min(left, key=left.__getitem__)
     apart = float(np.median(np.subtract(*_shifted(seconds, seconds, shift))))
     return f"{abs(apart):.2g} s {'earlier' if apart < 0 else 'later'}: check that both are stamped by one clock"
+
+
+def _left_late(truth: Array, estimate: Array) -> dict[int, float]:
+    """Median errors (m) with a truth that is taken so many images later."""
+    most = min(MAX_LATE, len(truth) // 4)
+    shifts = (shift for shift in range(-most, most + 1) if shift)
+    return {shift: float(np.median(position_errors(*_shifted(estimate, truth, shift)))) for shift in shifts}
 
 
 def _shifted(one: Array, other: Array, by: int) -> tuple[Array, Array]:

@@ -17,6 +17,11 @@ from .positions import track_directions
 from .recording import Recording, UnreadableRecording
 from .stamps import Stamps, ascending_rows, poses_near, within
 
+NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
+"""Columns with what comes after whole seconds, as in the stamps of ROS."""
+MIN_UNTURNED_M = 1.0
+"""A robot that drives further than this along both axes without turning at all is one whose orientation is not known
+(m)."""
 COLUMNS = {
     "time": ("t", "time", "timestamp", "stamp", "sec", "seconds"),
     "x": ("x", "px", "pos_x", "position_x", "tx", "p_rs_r_x", "truth_x"),
@@ -73,10 +78,10 @@ def truth_from(
     unlikely = len(stamps) - len(likely)
     fast = f"of {len(stamps):,} beyond {limits.speed:g} m/s or {limits.turn:.3g} rad/s (nodes.source.limits)"
     if too_fast := 2 * unlikely > len(stamps):
-        fast += "; are they millimetres? A TUM file is in metres, a CSV's columns may be x_mm and y_mm"
+        fast += "; are they centimetres or millimetres? A TUM file is in metres, a CSV's columns may be x_mm and y_mm"
+    if too_fast and within(shifted, stamps).any():
+        raise UnreadableRecording(f"{file}: {counted(unlikely, 'pose')} {fast}")
     if truth is None or not np.isfinite(truth).any():
-        if too_fast and within(shifted, stamps).any():
-            raise UnreadableRecording(f"{file}: {counted(unlikely, 'pose')} {fast}")
         raise UnreadableRecording(
             f"{file}: none of the images of {recording.name} has a pose in it: its times are {_span(stamps)}, "
             f"the images' {_span(shifted)}; clocks that differ: "
@@ -206,6 +211,10 @@ def _poses(table: tables.CsvTable, columns: dict[str, int], units: dict[str, Any
         times = table.nanoseconds(tables.Time(columns["time"], units["time"]))
     except tables.OutOfProportion as error:
         raise UnreadableRecording(f"{error}; {cure}") from None
+    rest = next((row for row, name in enumerate(table.names) if name.lower() in NANOSECONDS), None)
+    if rest is not None and table.names[columns["time"]].lower().startswith("sec"):
+        known = times != tables.NO_TIME
+        times[known] += np.nan_to_num(table.numbers(tables.Length(rest, "m")))[known].astype(np.int64)
     x, y = (table.numbers(tables.Length(columns[axis], units[axis])) for axis in ("x", "y"))
     heading, impossible = np.full(len(x), np.nan), 0
     doubts: list[str] = []
@@ -220,6 +229,9 @@ def _poses(table: tables.CsvTable, columns: dict[str, int], units: dict[str, Any
     elif all(part in columns for part in QUATERNION):
         qx, qy, qz, qw = (table.numbers(tables.Length(columns[part], "m")) for part in QUATERNION)
         heading = np.arctan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
+        placed = np.isfinite(x + y + heading)
+        if len(np.unique(heading[placed])) == 1 and min(np.ptp(x[placed]), np.ptp(y[placed])) > MIN_UNTURNED_M:
+            heading[:] = np.nan
         squares = qx * qx + qy * qy + qz * qz + qw * qw
         wrong = (squares < 0.25) | (squares > 4.0)  # as of the messages of a topic
         impossible = int(wrong.sum())

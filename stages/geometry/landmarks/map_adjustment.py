@@ -33,6 +33,8 @@ poses are wrong, and then."""
 MIN_FIT = 0.4
 """Part of the matches that must fit poses as they are given. In a house 0.95 fit exact ones, 0.76 those that are off by
 10 cm and 2 degrees, and 0.25 the exact ones where the camera is taken for a mirrored one."""
+CONTRADICTED = "what the images show contradicts the poses: check both and the camera"
+"""Problem of poses that fewer matches fit."""
 GIVEN_SIGMAS = (0.1, 0.1, math.radians(2.0))
 """Standard deviations of poses that are given (m, m, rad), before it is known how good they are."""
 MIN_SIGMAS = (0.001, 0.001, math.radians(0.02))
@@ -117,9 +119,7 @@ def adjusted_to_given(views: LocalViews, matches: PairMatches, poses: Array, see
     for miss, off_plane in zip((*MISSES, MISSES[-1]), (*OFF_PLANES, OFF_PLANES[-1]), strict=True):
         fits = fitting_matches(_looking(views, seen, found.camera), matches, found.poses, off_plane)
         if found.camera is None and len(fits) and fits.mean() < MIN_FIT:
-            return AdjustedMap(
-                poses, np.empty(0), "what the images show contradicts the poses: check both and the camera"
-            )
+            return AdjustedMap(poses, np.empty(0), CONTRADICTED)
         again = _bundled(views, tracks_of(views, matches, fits), found, seen, miss, sigmas, None, poses)
         if again is None:
             return AdjustedMap(poses, np.empty(0), "too few landmarks are seen")

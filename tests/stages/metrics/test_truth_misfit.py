@@ -39,7 +39,8 @@ SURE = [PoseConfidence(0.6, "tracking")] * len(PATH)
         (np.roll(PATH, -10, axis=0), r"10 s later"),
         (np.roll(PATH, 10, axis=0), r"10 s earlier"),
         (PATH + np.array([0.1, 0.0, 0.3]), ""),
-        (PATH + np.random.default_rng(0).normal(0.0, 3.0, PATH.shape), ""),
+        (PATH + np.random.default_rng(0).normal(0.0, 3.0, PATH.shape), "under no shift in time, turn"),
+        (compose(PATH, np.array([0.5, -0.2, 0.0])), r"-0\.50 m forward and \+0\.20 m to the left on the robot"),
     ],
 )
 def test_the_change_with_which_a_truth_fits_is_named(truth: np.ndarray, said: str) -> None:

@@ -182,7 +182,7 @@ def test_a_track_too_fast_for_a_robot_is_said_with_its_limit_and_perhaps_its_uni
         list(ticks(source, ctx))
         assert said in ctx.details["impossible_motion"]
         return
-    with refused(f"truth.tum: 101 poses {said}.*; are they millimetres"):
+    with refused(f"truth.tum: 101 poses {said}.*; are they centimetres or millimetres"):
         list(ticks(source, ctx))
 
 
