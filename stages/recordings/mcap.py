@@ -34,6 +34,11 @@ class Mcap(Format):
         if not path.is_dir():
             return _one_file(log, path, options)
         parts = sorted(path.glob("*.mcap"))
+        if bags := sorted(path.glob("*.db3")):
+            raise UnreadableRecording(
+                f"{log}: it holds MCAP and SQLite files ({parts[0].name}, {bags[0].name}); give each part: "
+                f"log=[{parts[0]},{bags[0]}]"
+            )
         listed = _listed(path / "metadata.yaml") or [part.name for part in parts]
         there = [path / file for file in listed if (path / file).is_file()] or parts
         feed = LogReader(there[0]) if len(there) == 1 else SplitLog(there)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import nearest
+from omninav.pipeline import nearest, shown
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Bools
@@ -26,6 +26,8 @@ from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 
+FRAMES_ASKED = 4
+"""Images at the beginning of which camera is asked."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
@@ -122,9 +124,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     told = set_back(records[image_topic]) if len(files) == 1 else ""
     if odometry is not None and not told:
         told = camera_clock_set(_times(records[image_topic]), poses[str(topics.odometry)].times)
-    unsaid = mounted.unsaid(by_info)
+    several, unsaid = _cameras(feed, image_topic, frames[:FRAMES_ASKED]), mounted.unsaid(by_info)
     recording.mounted = mounted.in_words
-    recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, unsaid) if sentence)
+    recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, several, unsaid) if sentence)
     return recording
 
 
@@ -144,6 +146,20 @@ def _camera(
     raise UnreadableRecording(
         f"{name}: nothing states how its images are to be read: no camera.yaml is attached or is beside it; "
         "give camera=PATH/camera.yaml"
+    )
+
+
+def _cameras(feed: Feed, topic: str, images: Sequence[Record]) -> str:
+    """Sentence on images of several cameras on one topic, by their frames; else ""."""
+    try:
+        named = [feed.decode(topic, feed.fetch(image.location)).header.frame_id for image in images]
+    except BadMessage:  # it is counted when it is read in its turn
+        return ""
+    found = list(dict.fromkeys(named))
+    if len(found) < 2:
+        return ""
+    return (
+        f"{topic} carries images of several cameras ({', '.join(map(shown, found))}): record each on a topic of its own"
     )
 
 

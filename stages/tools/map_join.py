@@ -15,6 +15,9 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import TopologicalMap
 
+MAX_OFF_M = 0.5
+"""Median distance from where landmarks put a map of true poses, beyond which these are in another frame (m)."""
+
 
 class JoinMaps(Tool):
     """Writes one map of the references, or places, of several.
@@ -42,8 +45,8 @@ class JoinMaps(Tool):
         given: list[PoseSource] = [source.map.pose_source for source in sources]
         frame: PoseSource = next((source for source in given if source != "truth"), "truth")
         map = joined([source.map for source in sources], frame)
-        if frame != "truth" and not self.same_frame:
-            map = _in_one_frame(sources, map, ctx.rng)
+        if not self.same_frame:
+            map = _in_one_frame(sources, map, ctx.rng) if frame != "truth" else _checked(sources, map, ctx.rng)
         write_saved(path, map, sources, "join")
         what = "references" if isinstance(map, ReferenceGraph) else "places"
         print(f"{path}: {len(map)} {what} of {len(sources)} maps ({' + '.join(str(len(one.map)) for one in sources)})")
@@ -80,6 +83,25 @@ def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces, rng: np.random.
     moved = np.hypot(*(found.poses - map.poses)[:, :2].T)
     print(f"aligned by {found.closures} {by}; moved by {moved.max():.2f} m at most")
     return map.moved(found.poses)
+
+
+def _checked(sources: Sequence[SavedMap], map: MapOfPlaces, rng: np.random.Generator) -> MapOfPlaces:
+    """The joined map of true poses. Raises BadInput where landmarks that maps share put one elsewhere."""
+    graphs = [source.map for source in sources if isinstance(source.map, ReferenceGraph)]
+    found = aligned_by_landmarks(graphs, rng) if graphs else None
+    if found is None:
+        return map
+    first = 0
+    for source, graph in zip(sources, graphs, strict=True):
+        moved = np.hypot(*(found.poses[first : first + len(graph)] - graph.poses)[:, :2].T)
+        first += len(graph)
+        if np.median(moved) > MAX_OFF_M:
+            raise BadInput(
+                f"{source.path}: by landmarks that it shares with the other maps it is {np.median(moved):.2f} m from "
+                f"where its true poses have it: is its ground truth in the frame of {sources[0].path}? Type "
+                "same_frame=true to join them as they are"
+            )
+    return map
 
 
 def joined(maps: Sequence[MapOfPlaces], pose_source: PoseSource) -> MapOfPlaces:

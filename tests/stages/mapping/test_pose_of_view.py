@@ -52,6 +52,15 @@ def test_a_map_keeps_its_source_and_a_view_without_it_is_counted(source: str, po
     assert not ctx.facts
 
 
+def test_truth_that_begins_after_the_first_view_is_told_once() -> None:
+    map, ctx = ReferenceGraph.empty(), at_tick(first=True)
+    for truth in (None, TRUE, TRUE):
+        assert pose_of_view(ctx, DRIVEN, truth, map, "auto") is DRIVEN
+        map.insert(DRIVEN, VIEW, "histograms")
+    (told,) = ctx.warnings
+    assert "the first image of the tour has no ground truth and later ones do" in told
+
+
 @pytest.mark.parametrize("source", ["odometry", "guess"])
 def test_frames_of_two_logs_are_not_mixed(source: str) -> None:
     map = ReferenceGraph.empty()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from made_logs import write_mcap
+from made_logs import IMAGE, messages, write_mcap
 
 from omninav.stages.recordings.opening import log_formats, open_recording
 from omninav.stages.recordings.recording import FORMATS, Format, OpenOptions, Recording
@@ -58,6 +58,21 @@ def test_images_of_several_series_in_one_folder_are_told(tmp_path: Path) -> None
     assert "images of" not in " ".join(open_recording(str(folder)).assumed)
     (folder / "image_1.jpg").rename(folder / "right_0.jpg")
     assert "images of 2 series, image_# (1), right_# (1)" in " ".join(open_recording(str(folder)).assumed)
+
+
+def test_a_folder_with_files_of_two_formats_is_refused_with_its_parts(tmp_path: Path) -> None:
+    (tmp_path / "second.db3").touch()
+    write_mcap(tmp_path / "first.mcap")
+    with refused(r"it holds MCAP and SQLite files .*; give each part: log=\[.*first\.mcap,.*second\.db3\]"):
+        open_recording(str(tmp_path))
+
+
+def test_images_of_two_cameras_on_one_topic_are_told(tmp_path: Path) -> None:
+    made = list(messages())
+    for number, image in enumerate(each for each in made if each.topic == IMAGE):
+        image.content.header.frame_id = "left" if number % 2 else "right"
+    told = open_recording(str(write_mcap(tmp_path / "two.mcap", iter(made)))).assumed
+    assert any("carries images of several cameras ('right', 'left')" in sentence for sentence in told)
 
 
 def test_a_name_that_nothing_opens_says_what_to_type(tmp_path: Path) -> None:

@@ -279,3 +279,19 @@ def test_a_doubt_about_true_poses_is_a_warning_of_the_run(tmp_path: Path) -> Non
     ctx = Context("source")
     list(ticks(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.csv")), ctx))
     assert sum("read as radians" in sentence for sentence in ctx.warnings) == 1
+
+
+@pytest.mark.parametrize("is_known", [False, True])
+def test_an_orientation_that_never_changes_is_none(tmp_path: Path, is_known: bool) -> None:
+    corner = ((t, 0.5 * min(t, 8), 0.5 * max(t - 8, 0), t / 20 * is_known) for t in range(17))
+    rows = (f"{START / 1e9 + t:.3f} {x} {y} 0 0 0 {math.sin(half)} {math.cos(half)}" for t, x, y, half in corner)
+    (tmp_path / "truth.tum").write_text("\n".join(rows))
+    found = read_trajectory(tmp_path / "truth.tum")
+    assert any("direction of travel" in doubt for doubt in found.doubts) != is_known
+    assert is_known or abs(found.poses[-2, 2] - math.pi / 2) < 0.2
+
+
+def test_what_comes_after_whole_seconds_is_read(tmp_path: Path) -> None:
+    rows = [f"{START // 10**9 + n // 2},{n % 2 * 500_000_000},{n},0,0" for n in range(6)]
+    (tmp_path / "truth.csv").write_text("\n".join(["sec,nsec,x,y,yaw", *rows]))
+    assert np.diff(read_trajectory(tmp_path / "truth.csv").stamps).tolist() == [500_000_000] * 5
