@@ -125,4 +125,6 @@ class TransformTopic(PoseTopic):
             )
         if not len(self):
             known = ", ".join(f"{self.topic}:{pair:.80}" for pair in self._seen) or "none"
+            if {self.parent, self.child} <= {frame for pair in self._seen for frame in pair.split(":")}:
+                known += " (of these, those to and from odom are a localiser's and odometry's, no truth)"
             raise UnreadableRecording(f"{log}: no transform {self.name:.80}; type truth= with one of: {known}")
