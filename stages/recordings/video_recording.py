@@ -22,7 +22,9 @@ from .stamps import Stamps, ascending
 
 MAX_FRAMES = 2_000_000
 """Largest accepted number of frames of a video: nine hours at 60 a second."""
-MAX_HIDDEN = 1000
+CAPTURE_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+"""Environment variable with what OpenCV hands on to FFmpeg, as NAME;VALUE|NAME;VALUE."""
+MAX_HIDDEN = 300
 """Frames of a trimmed video that are looked through for the first one that is shown: more than between key frames."""
 MAX_REORDERED = 16.0
 """Largest time by which a frame is stored after a later one, in times between frames: H.264 allows 16."""
@@ -180,8 +182,11 @@ def _opened(path: Path, packets: bool = False, ignoring_edits: bool = False) -> 
         raise UnreadableRecording(f"{path}: this is no video, expected MP4, MOV, AVI, MKV, WebM, MPEG or Ogg")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its messages on broken packets are counted here
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "ignore_editlist;1" if ignoring_edits else ""
+    options = os.environ.get(CAPTURE_OPTIONS, "")
+    if ignoring_edits:
+        os.environ[CAPTURE_OPTIONS] = "|".join(filter(None, (options, "ignore_editlist;1")))
     capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
+    os.environ[CAPTURE_OPTIONS] = options
     if not capture.isOpened():
         raise UnreadableRecording(
             f"{path}: no video can be read from it; it holds sound alone, or was cut off before its index was written, "
