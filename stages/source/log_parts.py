@@ -21,6 +21,9 @@ STILL = 1e-9
 MIN_STEP_M, MIN_STEPS, MIN_DISTANCE_M = 0.01, 5, 0.5
 """Truth that moves by this much between two images, so often in a row and so far in all, is neither noise nor a robot
 that was lifted."""
+MIN_JUMP_M, JUMP_RATIO, MAX_LEFT = 1.0, 10.0, 0.3
+"""Smallest jump of truth against odometry (m, and times the median difference of their steps), and the share of it that
+may be left once the truth has jumped back."""
 OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 
@@ -101,6 +104,32 @@ def frozen_steps(odometry: Array, truth: Array) -> tuple[int, float]:
             steps, metres = steps + length, metres + way
         at += length
     return steps, metres
+
+
+def truth_excursion(odometry: Array, truth: Array) -> tuple[int, int, float] | None:
+    """The first and last image that the truth places elsewhere than those before and after, and by how much (m).
+
+    Both are poses (N, 3) at the images, of truth NaN where it is not known. There the truth jumps and odometry does
+    not, and jumps back; a robot that is carried does not come back to where odometry has it.
+    """
+    known = np.flatnonzero(np.isfinite(truth).all(axis=1))
+    driven, true = odometry[known], truth[known]
+    if len(known) < 3:
+        return None
+
+    def missed(first: Ints, second: Ints) -> Array:
+        off = between(true[first], true[second]) - between(driven[first], driven[second])
+        return np.hypot(off[..., 0], off[..., 1])
+
+    images = np.arange(len(known))
+    jumps = missed(images[:-1], images[1:])
+    jumped = np.flatnonzero(jumps > max(MIN_JUMP_M, JUMP_RATIO * float(np.median(jumps))))
+    first, last = jumped[:-1], jumped[1:]
+    left = np.flatnonzero(missed(first, last + 1) < MAX_LEFT * np.minimum(jumps[first], jumps[last]))
+    if not len(left):
+        return None
+    one, other = int(first[left[0]]), int(last[left[0]])
+    return int(known[one + 1]), int(known[other]), float(jumps[one])
 
 
 def _odometry_kind(recording: Recording, truth: Array | None, guess: bool) -> OdometryKind:

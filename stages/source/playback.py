@@ -20,7 +20,7 @@ from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
 from .dead_reckoning import DeadReckoning
-from .log_parts import LogPart, frozen_steps, parts_of, pauses
+from .log_parts import LogPart, frozen_steps, parts_of, pauses, truth_excursion
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
@@ -157,6 +157,12 @@ class Playback(Source, ABC):
         if steps:
             still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
             ctx.warn(f"{recording.name}: {still}")
+        if (found := truth_excursion(recording.odometry, truth)) is not None:
+            first, last, metres = found
+            ctx.warn(
+                f"{recording.name}: ground truth jumps by {metres:.1f} m, where odometry does not, and back: images "
+                f"{first} to {last}; did the tracker lose the robot?"
+            )
 
     def _motion(
         self, ctx: Context, position: PlaybackState, part: LogPart, image: Image

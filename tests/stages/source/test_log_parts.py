@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from omninav.stages.source.log_parts import frozen_steps
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.source.log_parts import frozen_steps, truth_excursion
 
 AHEAD = np.column_stack([np.arange(20) * 0.2, np.zeros(20), np.zeros(20)])
 
@@ -10,6 +11,12 @@ def changed(poses: np.ndarray, rows: slice, x: float) -> np.ndarray:
     poses = poses.copy()
     poses[rows, 0] = x
     return poses
+
+
+def moved(first: int, end: int, *by: float) -> np.ndarray:
+    """The poses of some images somewhere else."""
+    rows = np.arange(20)
+    return AHEAD + ((rows >= first) & (rows < end))[:, None] * np.array(by)
 
 
 def test_odometry_that_stops_while_the_robot_goes_on_is_counted() -> None:
@@ -32,3 +39,21 @@ def test_odometry_that_stops_while_the_robot_goes_on_is_counted() -> None:
 )
 def test_a_robot_that_moves_stands_or_is_lifted_is_not(odometry: np.ndarray, truth: np.ndarray) -> None:
     assert frozen_steps(odometry, truth) == (0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("truth", "found"),
+    [
+        (AHEAD, None),
+        (compose(np.array([3.0, 1.0, 2.0]), AHEAD), None),
+        (moved(8, 13, 0.0, 3.0, 0.5), (8, 12, 3.0)),
+        (moved(8, 13, 0.0, 0.8, 0.0), None),
+        (moved(8, 20, 0.0, 3.0, 0.0), None),
+        (moved(8, 20, 0.0, 3.0, 0.0) + moved(13, 20, -4.0, -1.0, 0.0) - AHEAD, None),
+        (np.full((20, 3), np.nan), None),
+        (AHEAD[:0], None),
+    ],
+    ids=["fits", "other frame", "lost for a while", "by less", "carried", "carried twice", "no truth", "no image"],
+)
+def test_a_truth_that_leaves_odometry_and_comes_back_is_told(truth: np.ndarray, found: tuple | None) -> None:
+    assert truth_excursion(AHEAD[: len(truth)], truth) == (found and pytest.approx(found, abs=0.01))
