@@ -438,10 +438,11 @@ def moved(watched: Watched, length_scale_m: float, min_metres: float = MOVED_M, 
         return ""  # it was moved within these images
     if math.hypot(*mount[:2]) < min_metres and abs(mount[2]) < min_radians:
         return ""
+    forward, left, turn = mount
     return (
-        f"by landmarks and odometry over {len(rows)} images the camera is {mount[0]:+.2f} m forward, {mount[1]:+.2f} m "
-        f"to the left and turned by {math.degrees(mount[2]):+.0f} degrees of where the map has it: check that nothing "
-        "moved it, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
+        f"by landmarks and odometry over {len(rows)} images the camera is {forward:+.2f} m forward, {left:+.2f} m "
+        f"to the left and turned by {math.degrees(turn):+.0f} degrees from where it is in the map: check whether it "
+        "was moved, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
     )
 
 
