@@ -161,9 +161,9 @@ def of_moved_camera(mount: tuple[float, float, float], sigma_m: float) -> tuple[
     ("mount", "told", "misleads"),
     [
         ((0.0, 0.0, 0.0), "", False),
-        ((0.05, 0.0, math.radians(3.0)), "", False),
+        ((0.05, 0.0, math.radians(6.0)), "", False),
         ((0.2, -0.15, 0.0), "+0.20 m forward, -0.15 m to the left and turned by +0 degrees", False),
-        ((0.0, 0.0, math.radians(6.0)), "turned by +6 degrees", False),
+        ((0.0, 0.0, math.radians(10.0)), "turned by +10 degrees", True),
         ((0.5, 0.0, 0.0), "+0.50 m forward", True),
         ((0.0, 0.0, math.radians(-30.0)), "turned by -30 degrees", True),
     ],
