@@ -36,7 +36,7 @@ def pose_of_view(
     elif truth is not None and map.pose_source != "truth" and supervised == "auto":
         ctx.warn(
             "mapping: the first image of the tour has no ground truth and later ones do, so the map is in odometry's "
-            "frame; leave out the images without: type tour_settings.truth=FILE with all, or cut the tour there"
+            "frame; begin the tour where they begin, or give true poses of all images: tour_settings.truth=FILE"
         )
     pose = truth if map.pose_source == "truth" else odometry
     if pose is None:

@@ -1,6 +1,7 @@
 """Tells a truth in another frame or unit from an estimate that is wrong."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -44,9 +45,10 @@ def truth_misfit(drive: Drive) -> str:
     off_deg = float(np.median(heading_errors_deg(estimate, truth)))
     if off_m < OFF_M and off_deg < OFF_DEG:
         return ""
+    left = _left_late(truth, estimate)
     found = (
-        (_mounted(truth, estimate, off_m) if off_deg < ALIGNED_DEG else "")
-        or _late(truth, estimate, seconds, off_m)
+        (_mounted(truth, estimate, off_m, left) if off_deg < ALIGNED_DEG else "")
+        or _late(seconds, off_m, left)
         or (_turned(truth, estimate) if off_m < OFF_M else _moved(truth, estimate))
     )
     if found:
@@ -59,12 +61,12 @@ def truth_misfit(drive: Drive) -> str:
     )
 
 
-def _mounted(truth: Array, estimate: Array, off_m: float) -> str:
+def _mounted(truth: Array, estimate: Array, off_m: float, left_late: Mapping[int, float]) -> str:
     """The truth of another point of the robot, or a camera that was moved on it: off by the same in its own frame."""
     away = between(truth, estimate)[:, :2]
     middle = np.median(away, axis=0)
     left = float(np.median(np.hypot(*(away - middle).T)))
-    if left * LATE_GAIN > off_m or left * 2.0 > min(_left_late(truth, estimate).values(), default=math.inf):
+    if left * LATE_GAIN > off_m or left * 2.0 > min(left_late.values(), default=math.inf):
         return ""  # a robot that always drives as fast is ahead by the same where its truth is late
     return (
         f"{middle[0]:+.2f} m forward and {middle[1]:+.2f} m to the left on the robot: check which point it is of, and "
@@ -72,8 +74,7 @@ def _mounted(truth: Array, estimate: Array, off_m: float) -> str:
     )
 
 
-def _late(truth: Array, estimate: Array, seconds: Array, off_m: float) -> str:
-    left = _left_late(truth, estimate)
+def _late(seconds: Array, off_m: float, left: Mapping[int, float]) -> str:
     if not left or min(left.values()) * LATE_GAIN > off_m:
         return ""
     shift = min(left, key=left.__getitem__)

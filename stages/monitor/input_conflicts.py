@@ -64,6 +64,15 @@ class Watched:
         """Fit of the turns seen in images to those of odometry."""
         return turn_fit(self.times, self.odometry[:, 2], self.sure_turns)
 
+    @cached_property
+    def mount(self) -> Array | None:
+        """Pose (3,) of the camera against where the map has it, by the last exact estimates and odometry; else None."""
+        rows = np.flatnonzero(np.isfinite(self.exact).all(axis=1))[-MOUNT_IMAGES:]
+        mount, later = (found_mount(self.exact[each], self.odometry[each]) for each in (rows, rows[-LATER_IMAGES:]))
+        if mount is None or later is None or np.abs((mount - later) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
+            return None  # it was moved within these images
+        return mount
+
 
 def driven(odometry: Array) -> tuple[float, float]:
     """Sum the steps of poses (N, 3): metres driven, and radians turned to either side."""
@@ -433,16 +442,15 @@ def whose(watched: Watched, length_scale_m: float) -> str:
 
 def moved(watched: Watched, length_scale_m: float, min_metres: float = MOVED_M) -> str:
     """The camera's place on the robot, by exact estimates against odometry; at least so far off where it was."""
-    rows = np.flatnonzero(np.isfinite(watched.exact).all(axis=1))[-MOUNT_IMAGES:]
-    mount = found_mount(watched.exact[rows], watched.odometry[rows])
-    later = found_mount(watched.exact[rows[-LATER_IMAGES:]], watched.odometry[rows[-LATER_IMAGES:]])
-    if mount is None or later is None or np.abs((mount - later) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
-        return ""  # it was moved within these images
+    mount = watched.mount
+    if mount is None:
+        return ""
     if math.hypot(*mount[:2]) < min_metres and abs(mount[2]) < MOVED_RAD:
         return ""
     forward, left, turn = mount
+    number = min(MOUNT_IMAGES, int(np.isfinite(watched.exact).all(axis=1).sum()))
     return (
-        f"by landmarks and odometry over {len(rows)} images the camera is {forward:+.2f} m forward, {left:+.2f} m "
+        f"by landmarks and odometry over {number} images the camera is {forward:+.2f} m forward, {left:+.2f} m "
         f"to the left and turned by {math.degrees(turn):+.0f} degrees from where it is in the map: check whether it "
         "was moved, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
     )

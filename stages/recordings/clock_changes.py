@@ -10,7 +10,7 @@ from omninav.stages.geometry.arrays import Array
 from .stamps import Stamps
 
 SET_BACK_S = 10.0
-"""Time by which a record is earlier than those before it in the file where the clock was set back."""
+"""Time by which a record is earlier than those before it in the file where the clock was set back, s."""
 MIN_STEP_S = 0.5
 """Smallest change of the camera's clock that is reported, s: a robot drives half a metre and less in that time."""
 NEIGHBOURS, MIN_NEIGHBOURS = 10, 5
@@ -61,7 +61,7 @@ def camera_clock_set(images: Stamps, odometry: Stamps) -> str:
         return ""
     return (
         f"from image {at} on, the camera's clock is {abs(changed):.1f} s {'slow' if changed > 0.0 else 'fast'} against "
-        "odometry's, before it was not: poses are off by what the robot drives in that time; let one clock stamp both "
+        "odometry's, and was not before: poses are off by what the robot drives in that time; let one clock stamp both "
         "(chrony, PTP), or split the log there"
     )
 

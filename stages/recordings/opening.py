@@ -50,7 +50,7 @@ def open_recording(
     kinds = "; ".join(one.names for one in formats)
     if path.is_dir():
         layouts = ", ".join(sorted(known_layouts(layout_folders)))
-        advice = _readable(path) or f"for images with CSVs type log=LAYOUT:{log} (layouts: {layouts})"
+        advice = _readable(path, formats) or f"for images with CSVs type log=LAYOUT:{log} (layouts: {layouts})"
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {advice}")
     if not path.exists() and any(path.suffix in one.suffixes for one in formats):
         raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
@@ -100,13 +100,13 @@ def ring_found_in(log: str, ring: Ring, frame: int) -> str:
     )
 
 
-def _readable(folder: Path) -> str:
+def _readable(folder: Path, formats: Sequence[Format]) -> str:
     """Tells where else images are, or how to make readable ones of a folder's; "" where there are none."""
     inside = sorted(folder.iterdir())
     if any(path.suffix.lower() in UNREAD for path in inside):
         return "HEIC and raw images are not read; export them as JPEG or PNG"
-    below = [path for path in inside if path.is_dir() and any(one.opens(str(path)) for one in log_formats())]
-    return f"type log={below[0]}" if below else ""
+    below = (path for path in inside if path.is_dir() and any(one.opens(str(path)) for one in formats))
+    return next((f"type log={path}" for path in below), "")
 
 
 def _candidates(path: Path) -> str:

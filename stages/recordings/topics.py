@@ -27,7 +27,7 @@ from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 
 FRAMES_ASKED = 4
-"""Images at the beginning of which camera is asked."""
+"""Number of the first images whose cameras are compared."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 

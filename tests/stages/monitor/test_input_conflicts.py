@@ -141,7 +141,7 @@ def test_images_that_fit_no_place_are_said_and_a_quarter_that_fits_is_enough(fit
 
 
 def of_moved_camera(mount: tuple[float, float, float], sigma_m: float) -> tuple[list[str], bool]:
-    """What holds at the end of a drive in which a camera is moved on its robot, and whether it misleads."""
+    """Drives with a camera that is moved on its robot: the findings that hold at the end, and whether they mislead."""
     rng, watch, state, ctx = np.random.default_rng(0), InputConflicts(), InputConflictsState(), Context("watch")
     track, conflicts = np.zeros(3), Conflicts((), (), False)
     covariance = np.diag([sigma_m**2 / 2, sigma_m**2 / 2, 1e-6])
