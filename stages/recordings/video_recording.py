@@ -57,6 +57,12 @@ class VideoRecording(Recording):
         width, height = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH + axis)) for axis in (0, 1))
         if not 0 < width * height <= MAX_PIXELS:
             raise UnreadableRecording(f"{name}: {width} x {height} pixels, at most {MAX_PIXELS:,} are read")
+        if _is_unconverted(path):
+            raise UnreadableRecording(
+                f"{name}: its frames stay the same while what is stored changes: they are interlaced, or it holds "
+                "several tracks; write one that is progressive: "
+                f"`ffmpeg -i {path.name} -map 0:v:0 -vf yadif -c:v libx264 progressive.mp4`"
+            )
         stated = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
         hidden = self._hidden()
         self.stamps = self._in_order(_presentation_times(path))[hidden:]
@@ -94,13 +100,13 @@ class VideoRecording(Recording):
         while self._ahead is None or self._ahead < target - TOLERANCE_NS:
             if not self._capture.grab():
                 raise Undecodable("it cannot be decoded")
-            self._ahead = self._position()
+            self._ahead = self._next_time()
         pixels = None if self._ahead > target + TOLERANCE_NS else self._capture.retrieve()[1]
         if pixels is None:
             raise Undecodable("it cannot be decoded")
         return np.asarray(pixels, np.uint8)
 
-    def _position(self) -> int:
+    def _next_time(self) -> int:
         """Time (ns) of the frame that the decoder gave last. An AVI states none: there the n-th frame has the n-th."""
         self._grabbed += 1
         if self._is_numbered and self._grabbed <= len(self.stamps):
@@ -110,12 +116,6 @@ class VideoRecording(Recording):
     def _hidden(self) -> int:
         """Counts the stored frames before the first that is shown: a trimmed video begins between two key frames."""
         is_shown, first = _opened(self._path).read()
-        if _is_unconverted(self._path):
-            raise UnreadableRecording(
-                f"{self.name}: its frames stay the same while what is stored changes: they are interlaced, or it holds "
-                "several tracks; write one that is progressive: "
-                f"`ffmpeg -i {self._path.name} -map 0:v:0 -vf yadif -c:v libx264 progressive.mp4`"
-            )
         every = _opened(self._path, ignoring_edits=True)
         for number in range(MAX_HIDDEN if is_shown else 0):
             is_stored, pixels = every.read()
