@@ -359,6 +359,8 @@ class LiveSource(Source):
         roles: dict[str, Role] = {}
         for topic, role in wanted:
             name = "" if topic is None else full_name(topic)
+            if ":" in name:
+                raise BadInput(f"{name}: transforms are read from logs alone; live, publish topics.{role} as messages")
             if name and roles.setdefault(name, role) != role:
                 raise BadInput(f"{name}: it cannot be both {roles[name]} and {role}; give one of them its own topic")
         return roles

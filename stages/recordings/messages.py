@@ -18,6 +18,7 @@ POSE_TYPES = (
     "geometry_msgs/msg/TransformStamped",
 )
 TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
+TRANSFORMS_TYPES = (TRANSFORMS_TYPE, "tf/msg/tfMessage")  # the second in bags of before 2014
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 MAX_COORDINATE_M = 1e8

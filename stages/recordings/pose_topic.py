@@ -9,7 +9,7 @@ import numpy as np
 from omninav.pipeline.mcap.message import Record
 from omninav.stages.geometry.arrays import Array, Ints
 
-from .messages import TRANSFORMS_TYPE, pose_of
+from .messages import TRANSFORMS_TYPES, pose_of
 from .plausibility import MotionLimits, believed, without_jumps
 from .recording import UnreadableRecording
 from .stamps import Stamps
@@ -99,7 +99,10 @@ class PoseTopic:
 
 
 class TransformTopic(PoseTopic):
-    """Transforms of `child` in `parent` from a topic (`/tf`), in the order of their own stamps."""
+    """Transforms of `child` in `parent` from a topic (`/tf`), in the order of their own stamps.
+
+    A name without a child (`/tf:odom:`) is of the first child that comes.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -111,20 +114,27 @@ class TransformTopic(PoseTopic):
         """Every transform in it that is meant. Raises ValueError for one that cannot be, as `pose_of`."""
         for each in message.transforms:
             frames = each.header.frame_id.strip("/"), each.child_frame_id.strip("/")
+            if not self.child and frames[0] == self.parent:
+                self.child = frames[1]
             if frames == (self.parent.strip("/"), self.child.strip("/")):
                 at = each.header.stamp
                 self.add(at.sec * 1_000_000_000 + at.nanosec, record.log_time, pose_of(each))
             elif len(self._seen) < MAX_FRAMES:
                 self._seen[":".join(frames)] = None
 
-    def require(self, log: str, kind: str) -> None:
-        """Raise `UnreadableRecording` where there was no such transform, naming those that there were."""
-        if kind != TRANSFORMS_TYPE:
+    def require(self, log: str, setting: str, kind: str) -> None:
+        """Raise `UnreadableRecording` where there was no such transform, naming those that there were.
+
+        `setting`: what the user typed it for. `kind`: type of the topic's messages, or empty.
+        """
+        if kind not in TRANSFORMS_TYPES:
             raise UnreadableRecording(
-                f"{log}: {self.topic} carries {kind or 'nothing'}, not transforms; truth=/tf:PARENT:CHILD"
+                f"{log}: {self.topic} carries {kind or 'nothing'}, not transforms; {setting}=/tf:PARENT:CHILD"
             )
         if not len(self):
             known = ", ".join(f"{self.topic}:{pair:.80}" for pair in self._seen) or "none"
-            if {self.parent, self.child} <= {frame for pair in self._seen for frame in pair.split(":")}:
+            if setting == "truth" and {self.parent, self.child} <= {
+                frame for pair in self._seen for frame in pair.split(":")
+            }:
                 known += " (of these, those to and from odom are a localiser's and odometry's, no truth)"
-            raise UnreadableRecording(f"{log}: no transform {self.name:.80}; type truth= with one of: {known}")
+            raise UnreadableRecording(f"{log}: no transform {self.name:.80}; type {setting}= with one of: {known}")

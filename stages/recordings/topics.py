@@ -17,7 +17,7 @@ from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .clock_changes import camera_clock_set, set_back
-from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPES, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
@@ -28,6 +28,8 @@ from .topic_recording import Feed, TopicRecording, in_order, require_stamps
 
 FRAMES_ASKED = 4
 """Number of the first images whose cameras are compared."""
+ODOMETRY_FRAMES = "/tf:odom:"
+"""Transforms that are odometry by the convention of ROS (REP 105), to whichever frame of the robot."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
@@ -37,23 +39,26 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     Camera: a camera.yaml named by the user; else one attached, else one beside the file, else CameraInfo.
     Raises `UnreadableRecording` where a topic is missing, or nothing usable remains.
     """
-    topics, transforms = options.topics, None
-    if topics.truth is not None and ":" in topics.truth:
-        transforms = TransformTopic(topics.truth)
-        topics = replace(topics, truth=transforms.topic)
-    wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
+    topics = options.topics
+    if odometry_in_transforms := _odometry_in_transforms(feed, topics):
+        topics = replace(topics, odometry=ODOMETRY_FRAMES)
+    poses = {
+        each: TransformTopic(each) if ":" in each else PoseTopic(each)
+        for each in (topics.odometry, topics.truth)
+        if each
+    }
+    transforms = [each for each in poses.values() if isinstance(each, TransformTopic)]
+    wanted = {topic for topic in (topics.camera_info, topics.scan) if topic} | {each.topic for each in poses.values()}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     wanted.add(TF_STATIC)
     records: dict[str, list[Record]] = {topic: [] for topic in wanted}
-    poses = {topic: PoseTopic(topic) for topic in (topics.odometry, topics.truth) if topic}
     infos: list[Any] = []
     fixed, base = StaticTransforms(), ""
-    if transforms is not None:
-        poses[transforms.topic] = transforms
     for record in feed.scan(wanted):
         try:
-            if transforms is not None and record.topic == transforms.topic:
-                _add_transforms(feed, name, partial(transforms.add_message, record), record)
+            if on_topic := [each for each in transforms if each.topic == record.topic]:
+                for each in on_topic:
+                    _add_transforms(feed, name, partial(each.add_message, record), record)
                 continue
             if record.topic in poses:
                 message = feed.decode(record.topic, record.data)
@@ -73,8 +78,12 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
             continue
         records[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
 
-    if transforms is not None:
-        transforms.require(name, feed.topics.get(transforms.topic, ""))
+    if odometry_in_transforms and not len(poses[ODOMETRY_FRAMES]):
+        topics = replace(topics, odometry=None)
+        transforms.remove(poses.pop(ODOMETRY_FRAMES))  # type: ignore[arg-type]
+    for each in transforms:
+        each.require(name, "truth" if each.name == topics.truth else "topics.odometry", feed.topics.get(each.topic, ""))
+        base = each.child if each.name == topics.odometry else base
     image_topic = _image_topic(name, feed, topics, records)
     require_stamps(name, image_topic, "images", np.array([record.stamp for record in records[image_topic]], np.int64))
     odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
@@ -121,13 +130,25 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, records),
     )
+    found = ""
+    if odometry_in_transforms and odometry is not None:
+        found = f"no Odometry is recorded: its transforms from {ODOMETRY_FRAMES.split(':')[1]} to {base} are taken"
     told = set_back(records[image_topic]) if len(files) == 1 else ""
     if odometry is not None and not told:
         told = camera_clock_set(_times(records[image_topic]), poses[str(topics.odometry)].times)
     several, unsaid = _cameras(feed, image_topic, frames[:FRAMES_ASKED]), mounted.unsaid(by_info)
     recording.mounted = mounted.in_words
-    recording.assumed = tuple(f"{name}: {sentence}" for sentence in (told, several, unsaid) if sentence)
+    recording.assumed = tuple(f"{name}: {sentence}" for sentence in (found, told, several, unsaid) if sentence)
     return recording
+
+
+def _odometry_in_transforms(feed: Feed, topics: Topics) -> bool:
+    """Tells whether a log without any Odometry may hold it as transforms."""
+    return (
+        topics.odometry == Topics.odometry
+        and not {topics.odometry, POSE_TYPES[0]} & {*feed.topics, *feed.topics.values()}
+        and feed.topics.get(ODOMETRY_FRAMES.split(":")[0]) in TRANSFORMS_TYPES
+    )
 
 
 def _camera(
@@ -174,7 +195,7 @@ def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
 
 
 def _add_transforms(feed: Feed, name: str, add: Callable[[Any], None], record: Record) -> None:
-    if feed.topics.get(record.topic) != TRANSFORMS_TYPE:
+    if feed.topics.get(record.topic) not in TRANSFORMS_TYPES:
         return  # where it is needed, that is reported once the log has been gone through
     try:
         add(feed.decode(record.topic, record.data))
@@ -231,7 +252,7 @@ def _track(
     """Stamps and poses of a pose topic in ascending order; None where the recording does not have it."""
     if topic is None:
         return None
-    if topic not in feed.topics:
+    if poses[topic].topic not in feed.topics:
         default = next(field.default for field in fields(Topics) if field.name == role)
         kinds = POSE_TYPES if topic != default else POSE_TYPES[:1] if role == "odometry" else ()
         options = [other for other, kind in feed.topics.items() if kind in kinds]

@@ -547,3 +547,47 @@ def test_a_compressed_rosbag2_folder_is_read_within_limits(
     monkeypatch.setattr(rosbag, "MAX_RATIO", 1)
     with refused(r"not a readable bag|image"):
         open_recording(str(folder))
+
+
+def odometry_as_transforms(made: Made) -> list[Made]:
+    if made.topic != ODOMETRY:
+        return [made]
+    x, y, heading = pose_at((made.stamp - START) / 1e9)
+    half = heading / 2
+    link = in_frame("/odom", "base_footprint", x, y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+    link["header"]["stamp"] = {"sec": made.stamp // 10**9, "nanosec": made.stamp % 10**9}
+    other = in_frame("map", "odom", 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    kind = "tf2_msgs/msg/TFMessage"
+    return [made._replace(topic="/tf", msgtype=kind, content=make_message(kind, {"transforms": [other, link]}))]
+
+
+@pytest.mark.parametrize("topic", ["/odom", "/tf:odom:base_footprint"])
+def test_odometry_in_transforms_alone_is_read_and_told(tmp_path: Path, whole: Recording, topic: str) -> None:
+    path = write_mcap(tmp_path / "log.mcap", messages(odometry_as_transforms))
+    recording = open_recording(str(path), Topics(odometry=topic))
+    np.testing.assert_allclose(recording.odometry, whole.odometry, atol=1e-9)
+    told = [each for each in recording.assumed if "no Odometry is recorded" in each]
+    assert [each.split(": ", 1)[1] for each in told] == (
+        ["no Odometry is recorded: its transforms from odom to base_footprint are taken"] if topic == "/odom" else []
+    )
+
+
+def test_transforms_that_hold_no_odometry_are_no_odometry(tmp_path: Path) -> None:
+    def of_map(made: Made) -> list[Made]:
+        if made.topic != ODOMETRY:
+            return [made]
+        kind = "tf2_msgs/msg/TFMessage"
+        link = in_frame("map", "odom", 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return [made._replace(topic="/tf", msgtype=kind, content=make_message(kind, {"transforms": [link]}))]
+
+    recording = open_recording(str(write_mcap(tmp_path / "map.mcap", messages(of_map))))
+    assert recording.odometry is None
+    assert not [each for each in recording.assumed if "Odometry" in each]
+
+    def without(made: Made) -> list[Made]:
+        return [each._replace(topic="/tf2") if each.topic == "/tf" else each for each in odometry_as_transforms(made)]
+
+    path = str(write_mcap(tmp_path / "log.mcap", messages(without)))
+    assert open_recording(path).odometry is None
+    with refused("/tf2:odom:base; type topics.odometry= with one of: /tf2:map:odom, /tf2:odom:base_footprint"):
+        open_recording(path, Topics(odometry="/tf2:odom:base"))
