@@ -279,14 +279,19 @@ def test_a_range_finder_that_is_missing_and_a_request_of_another_type_are_noted_
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"topics": Topics(image="/odom")}, "/odom: it cannot be both image and odometry"),
-        ({"topics": Topics(truth="/odom")}, "/odom: it cannot be both odometry and truth"),
-        ({"goal": "/initialpose"}, "/initialpose: it cannot be both initial_pose and goal"),
-        ({"topics": Topics(odometry="/tf:odom:base_link")}, "/tf:odom:base_link: transforms are read from logs alone"),
+        ({"topics": Topics(image="/odom")}, "/odom: it cannot be both image and odometry; give"),
+        ({"topics": Topics(truth="/odom")}, "/odom: it cannot be both odometry and truth; give"),
+        ({"goal": "/initialpose"}, "/initialpose: it cannot be both initial_pose and goal; give"),
+        (
+            {"topics": Topics(odometry="/tf:odom:base_link")},
+            "/tf:odom:base_link: transforms are read from logs alone; live",
+        ),
     ],
 )
-def test_a_topic_for_two_things_is_refused_before_anything_runs(wire: Wire, given: dict[str, object], said: str):
-    with pytest.raises(BadInput, match=f"{said}; give one of them its own topic"):
+def test_a_topic_for_two_things_or_of_transforms_is_refused_before_anything_runs(
+    wire: Wire, given: dict[str, object], said: str
+):
+    with pytest.raises(BadInput, match=said):
         LiveSource(camera=str(CAMERA), **given).check(Context("source"))
 
 
