@@ -9,6 +9,12 @@ from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.pose import AssumedMotion, BridgedMotion, Motion, UncertainMotion
 
+FLOOR_RAD, FLOOR_M = 0.001, 0.001
+"""Standard deviations of heading (rad) and distance (m) added at each image, also of a stationary robot."""
+UNMEASURED_RAD_S, UNMEASURED_M_S = 0.5, 0.5
+"""Standard deviations of heading (rad) and distance (m) per second without believed odometry: half a slow turn, and
+half of what an indoor robot may make."""
+
 
 @dataclass(kw_only=True, eq=False)
 class OdometryNoiseModel:
@@ -16,9 +22,9 @@ class OdometryNoiseModel:
 
     Variances are proportional to distance and turn, so that many small motions are as uncertain as their sum, whatever
     the camera's rate. Each rotation has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 distance +
-    rotation_floor^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
-    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). Seconds without odometry add
-    (unmeasured_turn t)^2 / 2 and (unmeasured_speed t)^2, and a guessed motion its own. `turn` is the sum of both
+    FLOOR_RAD^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
+    translation_per_rotation^2 |turn| + FLOOR_M^2 (m^2). Seconds without odometry add
+    (UNMEASURED_RAD_S t)^2 / 2 and (UNMEASURED_M_S t)^2, and a guessed motion its own. `turn` is the sum of both
     rotations, so that wheel jitter sideways is no turn.
     """
 
@@ -30,14 +36,6 @@ class OdometryNoiseModel:
     """Standard deviation (m) of the distance after 1 m."""
     translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.01
     """Standard deviation (m) of the distance after a turn by 1 rad."""
-    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.001
-    """Standard deviation (rad) added at each image, also of a stationary robot."""
-    translation_floor: Annotated[float, Bounds(ge=0)] = 0.001
-    """Standard deviation (m) added at each image, also of a stationary robot."""
-    unmeasured_turn: Annotated[float, Bounds(ge=0)] = 0.5
-    """Standard deviation (rad) of the heading for each second about which no odometry is believed: half a slow turn."""
-    unmeasured_speed: Annotated[float, Bounds(ge=0)] = 0.5
-    """Standard deviation (m) of the distance for each such second: half of what an indoor robot may make."""
 
     def model(self, motion: Motion) -> UncertainMotion:
         """A motion as rotation, translation, rotation, with the standard deviation of each."""
@@ -45,8 +43,8 @@ class OdometryNoiseModel:
         more_turn, more_way = 0.0, 0.0
         if isinstance(motion, BridgedMotion):
             more_turn, more_way = (
-                self.unmeasured_turn * motion.unmeasured_s,
-                self.unmeasured_speed * motion.unmeasured_s,
+                UNMEASURED_RAD_S * motion.unmeasured_s,
+                UNMEASURED_M_S * motion.unmeasured_s,
             )
         elif isinstance(motion, AssumedMotion):
             more_turn, more_way = motion.sigma_turn, motion.sigma_m
@@ -61,14 +59,13 @@ class OdometryNoiseModel:
         """
         distance, turn = abs(steps[1]), abs(wrap_angle(steps[0] + steps[2]))
         rotation = math.sqrt(
-            0.5
-            * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)
+            0.5 * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + FLOOR_RAD**2)
             + 0.5 * more_turn**2
         )
         translation = math.sqrt(
             self.translation_per_metre**2 * distance
             + self.translation_per_rotation**2 * turn
-            + self.translation_floor**2
+            + FLOOR_M**2
             + more_way**2
         )
         return rotation, translation, rotation

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion, move_poses
 from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.motion.odometry_noise_model import FLOOR_M, FLOOR_RAD
 from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise, RotationTranslationRotation
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Motion
@@ -33,15 +34,13 @@ def test_samples_have_the_spread_that_the_parameters_say() -> None:
         rotation_per_metre=0.02,
         translation_per_metre=0.05,
         translation_per_rotation=0.04,
-        rotation_floor=0.01,
-        translation_floor=0.02,
     )
     number = 200_000
     ctx = Context("motion", np.random.default_rng(3))
     start = Particles(np.zeros((number, 3)), np.full(number, 1 / number))
     poses = stage.step(ctx, start, Motion(1.0, 0.0, 0.5), MeasuredNoise()).belief.poses
-    way = math.sqrt(0.05**2 + 0.04**2 * 0.5 + 0.02**2)
-    first = math.sqrt((0.1**2 * 0.5 + 0.02**2 + 0.01**2) / 2)
+    way = math.sqrt(0.05**2 + 0.04**2 * 0.5 + FLOOR_M**2)
+    first = math.sqrt((0.1**2 * 0.5 + 0.02**2 + FLOOR_RAD**2) / 2)
     heading = math.sqrt(2) * first
     assert poses[:, 0].mean() == pytest.approx(math.exp(-(first**2) / 2), abs=1e-3)
     assert poses[:, 0].std() == pytest.approx(way, rel=0.01)
