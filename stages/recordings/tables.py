@@ -7,6 +7,7 @@ import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from itertools import chain
@@ -62,6 +63,7 @@ _TOO_LONG = f"a row of more than {MAX_ROW:,} characters; is this a table?"
 NO_TIME = np.iinfo(np.int64).min
 """Nanoseconds that mean no time at all."""
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 _CELL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*$")
 _SPELLINGS = {
     spelling: unit
@@ -208,7 +210,8 @@ def read_table(path: Path, header: bool = True, delimiter: Delimiter = ",") -> C
     if first is None:
         raise UnreadableRecording(f"{path}: an empty table")
     if header:
-        return table_of(path, tuple(cell.strip() for cell in first[1]), rows)
+        names = [cell.strip() for cell in first[1]]
+        return table_of(path, tuple(names[1:] if names[0] == "#" else names), rows)
     return table_of(path, tuple(map(str, range(len(first[1])))), chain([first], rows))
 
 
@@ -318,11 +321,23 @@ def _plain_numbers(texts: Any, unit: str) -> tuple[Bools, npt.NDArray[Any]]:
     return chosen, values[within]
 
 
+def _moment(text: str) -> Decimal | None:
+    """Nanoseconds since 1970 of a date and time by ISO 8601, in UTC where it states no zone; None where it is none."""
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    since = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+    return Decimal(since // timedelta(microseconds=1)) * 1000
+
+
 def _in_base_unit(text: str, unit: str) -> Decimal | None:
     """The number in a cell in metres, nanoseconds or radians; None where there is none."""
     if len(text) > MAX_CELL:
         return None
     match = _CELL.match(text)
+    if match is None and unit in TIMES and _ISO.match(text):
+        return _moment(text)
     if match is None:
         if text.count(",") == 1 and "." not in text and _CELL.match(pointed := text.replace(",", ".")):
             raise UnreadableRecording(f"{cut(text)} has a decimal comma, expected a point: {pointed}")

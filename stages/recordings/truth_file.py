@@ -33,6 +33,8 @@ COLUMNS = {
     "qw": ("qw", "q_w", "orientation_w", "q_rs_w"),
 }
 """Accepted names of a CSV table's columns, in small letters, without units."""
+DELIMITERS: tuple[tables.Delimiter, ...] = (",", ";", "\t")
+"""Signs between a table's columns, by the first that its header has; else blanks."""
 QUATERNION = ("qx", "qy", "qz", "qw")
 LIKE_HEADING = re.compile(r"heading|hdg|yaw|theta|(?<![a-z])psi(?![a-z])|azimuth|bearing|orientation|rotation|quat")
 NO_HEADING = re.compile(r"rate|vel|speed|acc|std|sigma|var|cov|err|dot")
@@ -107,14 +109,18 @@ def read_trajectory(file: Path) -> Trajectory:
     if not headed[placed & timed].any():  # one heading that is missing costs its own row, not the others' headings
         headed[:] = True
     known = np.flatnonzero(placed & timed & headed)
-    if 2 * (np.diff(times[known]) < 0).sum() > len(known) - 1:  # the file begins with its last pose
-        known = known[::-1]
     rows = known[ascending_rows(times[known])]
+    if 2 * len(rows) < len(known):  # its rows are in another order, as in one that begins with the last pose
+        known = known[np.argsort(times[known], kind="stable")]
+        rows = known[ascending_rows(times[known])]
+    late = "not later than the row before"
+    if 2 * len(rows) < len(known):
+        late = "whose times repeat those of others (are they written with too few digits?)"
     lost = {
         "without x or y": int((~placed).sum()) - impossible,
         "without a time": int((placed & ~timed).sum()),
         "without a heading": int((placed & timed & ~headed).sum()),
-        "not later than the row before": len(known) - len(rows),
+        late: len(known) - len(rows),
     }
     lost = {what: number for what, number in lost.items() if number}
     if len(rows) < 2:
@@ -131,9 +137,12 @@ def read_trajectory(file: Path) -> Trajectory:
 def trajectory_rows(file: Path) -> Rows:
     """The rows of a file as they are, in TUM's format or a CSV table. Raises `BadInput`."""
     head = read_small(file, tables.MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
-    lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    tum = lines and "," not in lines[0] and len(lines[0].split()) == 8
-    return _tum(file) if tum else _csv(file)
+    lines = [line for line in head.splitlines() if line.strip()]
+    rows = [line for line in lines if not line.lstrip().startswith("#")]
+    if rows and "," not in rows[0] and len(rows[0].split()) == 8 and re.search(r"\d", rows[0]):
+        return _tum(file)
+    blank: tables.Delimiter = " "
+    return _csv(file, next((sign for sign in DELIMITERS if lines and sign in lines[0]), blank))
 
 
 def _tum(file: Path) -> Rows:
@@ -156,9 +165,9 @@ def _tum(file: Path) -> Rows:
     )
 
 
-def _csv(file: Path) -> Rows:
+def _csv(file: Path, delimiter: tables.Delimiter) -> Rows:
     """A table with a header: time, x, y and, where it has one, a heading or a quaternion."""
-    table = tables.read_table(file)
+    table = tables.read_table(file, delimiter=delimiter)
     found, units = _columns(table)
     missing = [meaning for meaning in ("time", "x", "y") if meaning not in found]
     if missing:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,6 +46,11 @@ def tum(path: Path, shift_s: float = START / 1e9, seconds: tuple[float, ...] = S
         ("time [milliseconds],pos x [km],pos y [km],Heading_Degrees", "{ms},{x_km},{y_km},{deg}"),
         ("time [min],x [meters],y (m),heading [°]", "{min},{x},{y},{deg}"),
         ("UTC,time [UTC],time_seconds,x,y,yaw [mils],yaw deg", "0,0,{t},{x},{y},0,{deg}"),
+        ("time;x;y;yaw", "{t};{x};{y};{h}"),
+        ("time\tx\ty\tyaw", "{t}\t{x}\t{y}\t{h}"),
+        ("# time  x y   yaw", "{t}  {x} {y}   {h}"),
+        ("time x y z qx qy qz qw", "{t} {x} {y} 0 0 0 {qz} {qw}"),
+        ("time,x,y,yaw", "{iso},{x},{y},{h}"),
     ],
 )
 def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path, header: str, row: str) -> None:
@@ -53,6 +59,7 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
         x, y, h = pose_at(at)
         in_si = {"t": at, "x": x, "y": y, "h": h, "qw": math.cos(h / 2), "qz": math.sin(h / 2)}
         others = {"ns": round(at * 1e9), "ms": at * 1e3, "x_mm": x * 1e3, "y_mm": y * 1e3, "deg": math.degrees(h)}
+        others["iso"] = f"1970-01-01T{'02' if at < 5 else '00'}:00:{at:09.6f}{'+02:00' if at < 5 else 'Z'}"
         others |= {"min": f"{at / 60:.15f}", "x_km": f"{x / 1e3:.15f}", "y_km": f"{y / 1e3:.15f}"}
         rows.append(row.format(**in_si, **others))
     (tmp_path / "truth.csv").write_text("\n".join(rows))
@@ -104,14 +111,22 @@ def test_rows_that_were_lost_are_counted_with_what_they_lack(tmp_path: Path) -> 
         assert out.truth is None or out.truth.heading == pytest.approx(expected[2], abs=2e-2)
 
 
-def test_a_file_that_begins_with_its_last_pose_is_read_from_its_end(tmp_path: Path) -> None:
-    lines = tum(tmp_path / "truth.tum").read_text().splitlines()
+@pytest.mark.parametrize("order", [slice(None, None, -1), np.random.default_rng(0).permutation(len(SECONDS))])
+def test_rows_in_another_order_are_read_in_that_of_their_times(tmp_path: Path, order: Any) -> None:
+    lines = tum(tmp_path / "truth.tum").read_text().splitlines()[1:]
     forward = read_trajectory(tmp_path / "truth.tum")
-    (tmp_path / "truth.tum").write_text("\n".join(lines[:0:-1]))
-    backward = read_trajectory(tmp_path / "truth.tum")
-    np.testing.assert_array_equal(backward.stamps, forward.stamps)
-    np.testing.assert_array_equal(backward.poses, forward.poses)
-    assert not backward.lost
+    (tmp_path / "truth.tum").write_text("\n".join(np.array(lines)[order].tolist()))
+    other = read_trajectory(tmp_path / "truth.tum")
+    np.testing.assert_array_equal(other.stamps, forward.stamps)
+    np.testing.assert_array_equal(other.poses, forward.poses)
+    assert not other.lost
+
+
+def test_times_of_too_few_digits_are_named(tmp_path: Path) -> None:
+    rows = [f"{START / 1e9 + at:.6e} {at} 0 0 0 0 0 1" for at in SECONDS]
+    (tmp_path / "truth.tum").write_text("\n".join(rows))
+    with refused("100 whose times repeat those of others .are they written with too few digits"):
+        read_trajectory(tmp_path / "truth.tum")
 
 
 @pytest.mark.parametrize(
