@@ -38,6 +38,10 @@ _AS_BGR = {
     "rgba8": (4, cv2.COLOR_RGBA2BGR),
     "mono8": (1, cv2.COLOR_GRAY2BGR),
     "8UC1": (1, cv2.COLOR_GRAY2BGR),
+    "yuv422": (2, cv2.COLOR_YUV2BGR_UYVY),
+    "uyvy": (2, cv2.COLOR_YUV2BGR_UYVY),
+    "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
+    "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
     # OpenCV names a Bayer pattern by the second row's second and third pixel, ROS by the first row's first two
     "bayer_rggb8": (1, cv2.COLOR_BayerBG2BGR),
     "bayer_bggr8": (1, cv2.COLOR_BayerRG2BGR),
@@ -114,7 +118,11 @@ def _raw_pixels(message: Any) -> Pixels:
     channels, conversion = _AS_BGR[message.encoding]
     height, width, step = int(message.height), int(message.width), int(message.step)
     data: Bytes = np.frombuffer(bytes(message.data), np.uint8)
-    if width < 1 or height < 1 or step < width * channels or data.size < height * step:
+    if channels == 2 and width % 2:
+        raise Undecodable(f"{width} pixels a row, expected an even number of {message.encoding}")
+    if 0 < step < width * channels:
+        raise Undecodable(f"its step of {step} bytes is too short for {width} pixels of {message.encoding}")
+    if width < 1 or height < 1 or step < 1 or data.size < height * step:
         raise Undecodable(f"{data.size} bytes for {width} x {height} pixels of {message.encoding}")
     padded = {-(-width * channels // bytes_) * bytes_ for bytes_ in ALIGNMENTS}
     if step % width == 0 and step // width in {1, 2, 3, 4} - {channels} and step not in padded:

@@ -446,6 +446,28 @@ def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
     assert (pixels[4:12, 4:44] == (200, 100, 20)).all()
 
 
+@pytest.mark.parametrize(("encoding", "luma"), [("yuv422", 1), ("uyvy", 1), ("yuv422_yuy2", 0), ("yuyv", 0)])
+def test_colours_of_half_the_width_are_read(encoding: str, luma: int) -> None:
+    """Blue and red of two neighbours in common, ITU-R BT.601: 16 to 235 is black to white, 128 no colour."""
+    pair = np.full(4, 128, np.uint8)
+    pair[[luma, luma + 2]] = 16, 235
+    pixels = pixels_of(raw_image(encoding, np.tile(pair, (16, 24))))
+    assert (pixels[:, ::2] <= 2).all()
+    assert (pixels[:, 1::2] >= 253).all()
+    pair[1 - luma] = 240  # the first of both colours is blue
+    blue = pixels_of(raw_image(encoding, np.tile(pair, (16, 24))))[:, ::2]
+    assert (blue[..., 0] > blue[..., 2] + 150).all()
+    with pytest.raises(Undecodable, match="47 pixels a row, expected an even number"):
+        pixels_of(raw_image(encoding, np.tile(pair, (16, 24)), 47))
+
+
+def test_a_step_that_is_too_short_is_named() -> None:
+    message = raw_image("bgr8", np.zeros((16, 144), np.uint8))
+    message.step = 48
+    with pytest.raises(Undecodable, match="its step of 48 bytes is too short for 48 pixels of bgr8"):
+        pixels_of(message)
+
+
 def raw_image(encoding: str, rows: np.ndarray, width: int = 48) -> object:
     """A message of 16 rows of pixels, which may be longer than its width."""
     fields = {"height": 16, "width": width, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
