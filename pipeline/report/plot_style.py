@@ -3,13 +3,23 @@
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from omninav.pipeline.files import user_path
+from omninav.pipeline.graph.problems import BadInput
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#111111", "#8a8f98", "#E69F00", "#56B4E9")
 """Okabe & Ito's colours (2008), which colour-blind readers tell apart, dark enough on white."""
+
+SOFTWARE = "omninav"
+"""Program that a plot's file names, by which it is told from the pictures of others."""
+
+MAX_HEAD = 200
+"""Bytes of a PNG in which its program is named."""
 
 RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same plot on every machine
@@ -51,5 +61,15 @@ def plot(width: float, height: float, dpi: int = 110) -> Iterator[Drawing]:
         drawn = Drawing(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
         yield drawn
         buffer = io.BytesIO()
-        drawn.canvas.savefig(buffer, format="png", metadata={"Software": None})
+        drawn.canvas.savefig(buffer, format="png", metadata={"Software": SOFTWARE})
         drawn.content = buffer.getvalue()
+
+
+def plot_file(out: str) -> Path:
+    """The file of a plot. Raises BadInput where it is no .png, or another program's picture would be lost."""
+    path = user_path(out)
+    if path.suffix != ".png":
+        raise BadInput(f"out={out:.100}: a picture is written to a file that ends in .png; type out=NAME.png")
+    if path.is_file() and f"Software\0{SOFTWARE}".encode() not in path.read_bytes()[:MAX_HEAD]:
+        raise BadInput(f"out={out:.100}: it is there, and omninav did not draw it; type another name, or delete it")
+    return path

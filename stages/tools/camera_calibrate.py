@@ -48,6 +48,9 @@ class CalibrateCamera(Tool):
         path = user_path(self.out)
         if path.suffix not in (".yaml", ".yml"):
             raise BadInput(f"calibrate: out={self.out:.100} is no .yaml; type out=camera.yaml")
+        picture = path.with_suffix(".png")
+        if there := next((each for each in (path, picture) if each.exists()), None):
+            raise BadInput(f"calibrate: {there} is there; type another name, or delete it")
         columns, rows = board_size(self.board)
         recording = open_recording(self.images, camera="perspective")  # of which no number is used
         chosen = np.unique(np.linspace(0, len(recording.stamps) - 1, self.max_images).round().astype(int)).tolist()
@@ -71,7 +74,6 @@ class CalibrateCamera(Tool):
             self.projection, first.shape[1::-1], ring_of(first), list(seen.values()), board_points(columns, rows)
         )
         write_whole(path, write_camera(found.camera))
-        picture = path.with_suffix(".png")
         write_whole(picture, draw_calibration(found, list(seen), list(seen.values()), first))
         for frame, rms in zip(seen, found.rms_px, strict=True):
             print(f"image {frame}: {rms:.2f} px")

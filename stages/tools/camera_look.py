@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path, write_whole
-from omninav.pipeline.report.plot_style import PALETTE, plot
+from omninav.pipeline import BadInput, Bounds, Context, Tool, write_whole
+from omninav.pipeline.report.plot_style import PALETTE, plot, plot_file
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import angles, turned, unit_vectors
 from omninav.stages.recordings.opening import open_recording
@@ -44,9 +44,7 @@ class LookThroughCamera(Tool):
 
     def run(self, ctx: Context) -> None:
         """Unwarp one image and draw it."""
-        path = user_path(self.out)
-        if path.suffix != ".png":
-            raise BadInput(f"look: out={self.out:.100} is no .png; type out=look.png")
+        path = plot_file(self.out)
         recording = open_recording(self.log, self.topics, self.camera)
         frames = range(self.frame, len(recording.stamps))
         frame, pixels = next(((n, found) for n in frames if (found := recording.image(n)) is not None), (0, None))

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from omninav.pipeline import BadInput, Context, Tool, user_path, write_whole
 from omninav.pipeline.engine.artifact import read_artifact, read_header
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.plot_style import plot, plot_file
 from omninav.stages.plots.drawing import draw_grid, draw_landmarks, draw_map, plan_axes
 from omninav.stages.recordings.occupancy_grid import read_occupancy
 from omninav.stages.values.map_places import AnyMap, map_poses
@@ -37,8 +37,8 @@ class ShowMap(Tool):
 
     def run(self, ctx: Context) -> None:
         names = (self.maps,) if isinstance(self.maps, str) else self.maps
-        path = user_path(self.out)
-        if not names or path.suffix != ".png":
+        path = plot_file(self.out)
+        if not names:
             raise BadInput("maps: name a map, and a .png to write: FILE.omap out=map.png")
         grid = read_occupancy(user_path(self.grid)) if self.grid is not None else None
         maps = {file: _read(file) for file in map(user_path, names)}

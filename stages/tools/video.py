@@ -64,6 +64,8 @@ class MakeVideo(Tool):
         log, out = user_path(self.run_folder) / "result.mcap", user_path(self.out)
         if out.suffix not in CODECS:
             raise BadInput(f"out: {self.out} is no .mp4 or .webm; type out=video.mp4")
+        if out.is_file() and not _is_such(out):
+            raise BadInput(f"out: {out} is there, and no such video; type another name, or delete it")
         if not log.is_file():
             raise BadInput(f"{self.run_folder}: no result.mcap in it; name the folder of a run that has ended")
         messages = LogReader(log)
@@ -187,6 +189,13 @@ def _pose(scene: dict[str, Any]) -> Array:
 
 def _field(scene: dict[str, Any], topic: str, name: str) -> Any:
     return getattr(scene[topic], name) if topic in scene else []
+
+
+def _is_such(file: Path) -> bool:
+    """Tells whether a file may be a video that this tool wrote: by its width and codec, since it names no program."""
+    video = cv2.VideoCapture(str(file))
+    codec = int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little")
+    return bool(video.get(cv2.CAP_PROP_FRAME_WIDTH) == WIDTH and codec in (b"FMP4", b"VP80"))
 
 
 @contextmanager

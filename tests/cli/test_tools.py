@@ -62,7 +62,11 @@ def test_maps_are_joined_thinned_cut_and_shown(tmp_path: Path, capsys: pytest.Ca
     assert "of 70 references, at least 2 m apart" in said
     assert "features     Colours, bins=4" in said
     assert "made by      cut area=[0.0, -4.0, 8.0, 4.0]" in said
-    assert cv2.imread(str(tmp_path / "map.png")) is not None
+    assert main(["map", "show", "c.omap"]) == 0  # its own picture, not another's
+    assert cv2.imwrite(str(tmp_path / "map.png"), np.zeros((9, 9), np.uint8))
+    assert main(["map", "show", "c.omap"]) == 2
+    assert "out=map.png: it is there, and omninav did not draw it; type another name" in capsys.readouterr().err
+    assert cv2.imread(str(tmp_path / "map.png")).shape == (9, 9, 3)
     first = (tmp_path / "d.omap").read_bytes()
     assert main(["map", "thin", "c.omap", "spacing=2", "out=d.omap"]) == 0
     assert (tmp_path / "d.omap").read_bytes() == first

@@ -99,6 +99,12 @@ def test_images_of_a_board_make_a_camera_file_and_a_picture(tmp_path: Path, caps
     assert "over 6 images; no board in images 6" in printed
     written = out.read_bytes(), out.with_suffix(".png").read_bytes()
     assert written[1].startswith(b"\x89PNG")
+    with pytest.raises(BadInput, match=r"camera\.yaml is there; type another name, or delete it"):
+        stage.run(Context("calibrate"))
+    out.unlink()
+    with pytest.raises(BadInput, match=r"camera\.png is there"):
+        stage.run(Context("calibrate"))
+    out.with_suffix(".png").unlink()
     stage.run(Context("calibrate"))
     assert (out.read_bytes(), out.with_suffix(".png").read_bytes()) == written
     look = tmp_path / "look.png"

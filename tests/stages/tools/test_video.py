@@ -103,15 +103,29 @@ def test_a_video_has_a_rate_that_players_can_show(tmp_path, seconds, rate):
     assert cv2.VideoCapture(str(tmp_path / "video.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(rate)
 
 
+def whole_video(file, width):
+    writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"mp4v"), 4.0, (width, 400))
+    writer.write(np.zeros((400, width, 3), np.uint8))
+    writer.release()
+    return file.read_bytes()
+
+
+def test_a_recording_is_not_written_over(folder):
+    before = whole_video(folder / "drive.mp4", 640)
+    with pytest.raises(BadInput, match=r"drive\.mp4 is there, and no such video; type another name"):
+        MakeVideo(run_folder=str(folder), out=str(folder / "drive.mp4")).run(Context("video"))
+    assert (folder / "drive.mp4").read_bytes() == before
+
+
 def test_a_video_that_fails_leaves_the_one_that_was_there(folder, monkeypatch):
     def fails(floor, number):
         raise RuntimeError("half way")
 
-    (folder / "video.mp4").write_bytes(b"before")
+    before = whole_video(folder / "video.mp4", 960)
     monkeypatch.setattr(Floor, "frame", fails)
     with pytest.raises(RuntimeError):
         MakeVideo(run_folder=str(folder), out=str(folder / "video.mp4")).run(Context("video"))
-    assert {path.name: path.read_bytes() for path in folder.glob("*video*")} == {"video.mp4": b"before"}
+    assert {path.name: path.read_bytes() for path in folder.glob("*video*")} == {"video.mp4": before}
     assert [path.name for path in folder.glob(".video*")] == []
 
 
