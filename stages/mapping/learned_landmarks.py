@@ -134,6 +134,8 @@ class LearnLandmarks(Stage):
             )
         if len(adjusted.slipped):
             ctx.warn(_slipped(adjusted, map.poses if as_driven is None else as_driven.poses))
+        if len(adjusted.carried):
+            ctx.warn(_carried(adjusted.carried, events, ticks))
         poses = robot_poses(poses, mount)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         if adjusted.problem == CONTRADICTED:
@@ -213,6 +215,22 @@ def _slipped(adjusted: AdjustedMap, odometry: Array) -> str:
         f"{stretch[-1] + 1}: {driven:.2f} m in place of {seen:.2f}, as of wheels that slip; the map "
         "has what the images show"
     )
+
+
+def _carried(after: Ints, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick]) -> str:
+    """The sentence on a tour in which the robot was carried, by the references after which it was."""
+    first = int(after[0])
+    rows = [row for row, event in enumerate(events) if event is not None][first : first + 2]
+    when = f" ({_clock(ticks, rows[0])} to {_clock(ticks, rows[1])})" if len(ticks) == len(events) else ""
+    more = f", and {counted(len(after) - 1, 'time')} more" if len(after) > 1 else ""
+    return (
+        f"the robot was carried in the tour between references {first} and {first + 1}{when}{more}: their images share "
+        "nothing, and odometry contradicts where the rest shows them; the map has what the images show"
+    )
+
+
+def _clock(ticks: Sequence[Tick], row: int) -> str:
+    return f"{(ticks[row].stamp - ticks[0].stamp) / 1e9:.1f} s"
 
 
 def _sigmas(adjusted: AdjustedMap, poses: Array, mount: Array) -> Array | None:

@@ -13,7 +13,7 @@ from omninav.stages.geometry.plane.mount import camera_poses, found_mount
 from omninav.stages.geometry.plane.se2 import between, compose, distances_along, wrap
 
 from .adjustment import Lens, Motions, adjusted
-from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
+from .closures import FAR_M, CarriedDrive, candidate_pairs, carried_drive, straightened_drive, verified_pairs
 from .floor import floor_depth, lowest_plane
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
 from .pair_lengths import Steps, driven_steps, pair_lengths
@@ -60,6 +60,8 @@ right, and 10.7 without (docs/experiments/landmarks.md)."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of standard deviation 1."""
 
+NOWHERE: Ints = np.empty(0, np.int64)
+
 
 class AdjustedMap(NamedTuple):
     """Poses (R, 3) of references that agree with what their images show, and what the camera is corrected by (K,).
@@ -69,7 +71,7 @@ class AdjustedMap(NamedTuple):
     `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
     images measured any. `covariances`: a function that gives those (R, 3, 3) of the poses, 0 where images confirm given
     ones; None where nothing was adjusted. `slipped` (S,): references after which odometry had another length than the
-    images show, up to the next one.
+    images show, up to the next one. `carried` (C,): references after which the robot was carried.
     """
 
     poses: Array
@@ -79,7 +81,8 @@ class AdjustedMap(NamedTuple):
     scale: float | None = None
     seen: Array | None = None
     covariances: Callable[[], Array] | None = None
-    slipped: Ints = np.empty(0, np.int64)
+    slipped: Ints = NOWHERE
+    carried: Ints = NOWHERE
 
 
 def found_with_mount(
@@ -177,17 +180,23 @@ def adjusted_drive(
         return AdjustedMap(odometry, np.empty(0), "no place that the tour came back to was recognised by its landmarks")
     sigmas = odometry_sigmas(steps)
     if seen_motion:
-        measured, looseness = Steps(steps, sigmas, np.empty(0, np.int64)), np.array(SEEN_LOOSENESS)
+        measured, looseness = Steps(steps, sigmas, NOWHERE), np.array(SEEN_LOOSENESS)
     else:
         lengths = pair_lengths(views.bearings, verified, odometry)
         measured, looseness = driven_steps(steps, sigmas, verified, lengths), np.ones(3)
+    drive = CarriedDrive(measured.motions, measured.sigmas, NOWHERE)
+    start = straightened_drive(odometry[0], drive.motions, drive.sigmas, verified)
+    if not seen_motion:
+        drive = carried_drive(start, drive.motions, drive.sigmas, verified)
+    if len(drive.steps):
+        start = straightened_drive(odometry[0], drive.motions, drive.sigmas, verified, is_near=True)
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
-    motions = Motions(np.column_stack([along[:-1], along[1:]]), measured.motions, looseness * measured.sigmas)
-    solution = _Solution(straightened_drive(odometry[0], measured.motions, measured.sigmas, verified), None)
+    driven_motions = Motions(np.column_stack([along[:-1], along[1:]]), drive.motions, looseness * drive.sigmas)
+    solution = _Solution(start, None)
     for miss in MISSES:
-        refined = _bundled(views, tracks, solution, seen, miss, None, motions, None)
+        refined = _bundled(views, tracks, solution, seen, miss, None, driven_motions, None)
         if refined is None:
             return AdjustedMap(odometry, np.empty(0), "too few landmarks are seen")
         solution = refined
@@ -213,7 +222,7 @@ def adjusted_drive(
     def uncertain() -> Array:
         return covariances(SIGMA_FACTOR) * np.outer(units, units)
 
-    return AdjustedMap(poses, solution.camera, "", closures, scale, shown, uncertain, measured.slipped)
+    return AdjustedMap(poses, solution.camera, "", closures, scale, shown, uncertain, measured.slipped, drive.steps)
 
 
 class _Solution(NamedTuple):

@@ -123,6 +123,18 @@ def test_a_tour_by_odometry_is_straightened_from_how_it_was_driven() -> None:
     assert 0.002 < np.median(out.map.landmarks.pose_sigmas[:, :2]) < 0.05  # as odometry could have it
 
 
+def test_a_tour_in_whose_pause_the_robot_was_carried_is_told_and_its_map_is_right() -> None:
+    whole = tour_poses()
+    poses = np.concatenate([whole[:5], whole[18:]])  # carried from one end of the room to the other
+    motions = between(poses[:-1], poses[1:])
+    motions[4] = 0.0
+    odometry = compose(poses[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+    ctx, out = learned(odometry, "odometry", seen_along(poses))
+    assert [warning for warning in ctx.warnings if "was carried in the tour between references 4 and 5: " in warning]
+    assert np.hypot(*(odometry - poses)[:, :2].T).max() > 3.0
+    assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.1
+
+
 def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
     poses = tour_poses()[:6]
     for source in ("truth", "odometry"):
