@@ -11,6 +11,8 @@ from .description import known_layouts
 from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
 
+SHOWN_FILES = 3
+"""Largest number of a folder's files that are named."""
 MAX_SEARCHED = 20
 """Images of a log, from its first on, in which is looked for what its camera leaves open."""
 
@@ -54,6 +56,8 @@ def open_recording(
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {advice}")
     if not path.exists() and any(path.suffix in one.suffixes for one in formats):
         raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
+    if path.suffix == ".active" and path.exists():
+        raise UnreadableRecording(f"{log}: a bag that was never closed; `rosbag reindex` closes it, then name it .bag")
     what = "not a recording" if path.exists() else f"no such file{_candidates(path)}"
     raise UnreadableRecording(f"{log}: {what}; name {kinds}")
 
@@ -105,6 +109,9 @@ def _readable(folder: Path, formats: Sequence[Format]) -> str:
     inside = sorted(folder.iterdir())
     if any(path.suffix.lower() in UNREAD for path in inside):
         return "HEIC and raw images are not read; export them as JPEG or PNG"
+    if parts := [str(path) for path in inside if path.is_file() and any(one.opens(str(path)) for one in formats)]:
+        named = ",".join([*parts[:SHOWN_FILES], *(["…"] if len(parts) > SHOWN_FILES else [])])
+        return f"type log={named if len(parts) == 1 else f'[{named}]'}"
     below = (path for path in inside if path.is_dir() and any(one.opens(str(path)) for one in formats))
     return next((f"type log={path}" for path in below), "")
 

@@ -86,3 +86,12 @@ def test_a_name_that_nothing_opens_says_what_to_type(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     with refused(r"notes\.txt: not a recording; name .*\.mcap"):
         open_recording(str(tmp_path / "notes.txt"))
+    bags = tmp_path / "bags"
+    bags.mkdir()
+    for number in range(4):
+        (bags / f"{number}.bag").touch()
+    with refused(r"no recording is in this folder .* type log=\[.*/0\.bag,.*/1\.bag,.*/2\.bag,…\]$"):
+        open_recording(str(bags))
+    (tmp_path / "cut.bag.active").touch()
+    with refused(r"cut\.bag\.active: a bag that was never closed; `rosbag reindex` closes it"):
+        open_recording(str(tmp_path / "cut.bag.active"))
