@@ -21,6 +21,7 @@ from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.source.dead_reckoning import DeadReckoning, VisualCompass, assumed_speed, dead_reckon
 from omninav.stages.source.outputs import DriveOutputs, motion_of, pose_of
 from omninav.stages.values.command import Command
+from omninav.stages.values.commands import GOAL_TOPIC
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import AssumedPose, Motion, Pose
@@ -106,7 +107,7 @@ class LiveSource(Source):
     """The map's frame: goals and poses that are given from outside in another one are refused."""
     initial_pose: str | None = "/initialpose"
     """Topic for the robot's pose, given from outside (PoseWithCovarianceStamped): the belief starts again there."""
-    goal: str | None = "/goal_pose"
+    goal: str | None = GOAL_TOPIC
     """Topic for its goal (PoseStamped)."""
     restart: str | None = "/reinitialize_global_localization"
     """Topic (Empty), and service of that name where the transport has services: the belief starts again, uniform."""

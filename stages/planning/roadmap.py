@@ -12,7 +12,7 @@ from omninav.stages.geometry.landmarks.unbroken_view import of_one_place
 from omninav.stages.geometry.plane.roadmap import Paths, ahead_on, path_from, paths_to
 from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.commands import GoalPoint
+from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
@@ -97,7 +97,7 @@ class RoadmapPlanner(Stage):
     """
 
     goal: str | int | None = None
-    """The goal's image file."""
+    """The goal's image file; `/goal_pose`: a `point` comes later."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
     """The robot's body (m)."""
 
@@ -130,6 +130,8 @@ class RoadmapPlanner(Stage):
             off = float(np.hypot(*(map.poses[:, :2] - state.goal[:2]).T).min())
             if off > FAR_M:
                 state.ended, state.why = "gave up", f"the goal is {off:.0f} m from the nearest place of the map"
+        elif not len(state.goal) and self.goal == GOAL_TOPIC:
+            return self.Out(route=_route(state, "locating"))
         elif not len(state.goal):
             poses, state.doubtful = goal_poses(self.goal, goal_fix, goal_features, map)
             self._set_out(state, map, poses[0])
@@ -258,7 +260,7 @@ def _line(state: RoadmapPlannerState, map: ReferenceGraph, places: Ints) -> Arra
 
 
 def _route(state: RoadmapPlannerState, now: Literal["locating", "under way", "arrived", "gave up"]) -> PlannedRoute:
-    why, goal = state.why if now == "gave up" else "", GoalPoint(*state.goal[:2].tolist())
+    why, goal = state.why if now == "gave up" else "", GoalPoint(*state.goal[:2].tolist()) if len(state.goal) else None
     return PlannedRoute(state.places, now, state.number, why, goal, state.asked)
 
 

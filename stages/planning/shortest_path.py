@@ -10,7 +10,7 @@ import numpy as np
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State, Tick, nearest
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.commands import GoalPoint
+from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
@@ -69,7 +69,7 @@ class ShortestPathPlanner(Stage):
 
     goal: str | int | None = None
     """A place's number or name (of several of that name the nearest), or an image file: the place that looks most like
-    it."""
+    it. `/goal_pose`: a `point` comes later."""
     search_s: Annotated[float, Bounds(ge=0)] = 15.0
     """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
     around (it stops, then wanders) before it plans; sure of another place, it plans at once."""
@@ -103,9 +103,14 @@ class ShortestPathPlanner(Stage):
             medoids = map.poses[map.places][:, :2]
             state.asked = int(np.argmin(np.hypot(*(medoids - (point.x, point.y)).T)))
             state.renewed, state.ended, state.waiting_since = True, "", None
-        pictured = None if image is None else place_in_image(self.goal, image, MAX_VISUAL_DISTANCE, map)
-        goals = places_called(self.goal, map) if pictured is None else pictured
-        goals = goals if state.asked < 0 else np.array([state.asked], np.int64)
+        if state.asked >= 0:
+            goals = np.array([state.asked], np.int64)
+        elif self.goal == GOAL_TOPIC:
+            return self.Out(route=_route(state))
+        elif image is not None:
+            goals = place_in_image(self.goal, image, MAX_VISUAL_DISTANCE, map)
+        else:
+            goals = places_called(self.goal, map)
         if state.ended or not self._must_plan(state, tick, belief, status, progress):
             return self.Out(route=_route(state))
         if state.number >= 0 and not state.renewed and progress is not None and status is not None:

@@ -11,6 +11,7 @@ from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.room_view import room_view
 from omninav.stages.simulator.simulated_recording import simulation_digest
 from omninav.stages.simulator.world_rooms import known_rooms
+from omninav.stages.values.commands import GOAL_TOPIC
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
 
@@ -27,7 +28,8 @@ class GoalImage(Stage):
     """
 
     goal: str | int | None = None
-    """An image file, by its suffix; any other names a place or, without `places`, a room whose image is taken."""
+    """An image file, by its suffix; any other names a place or, without `places`, a room whose image is taken.
+    `/goal_pose`: none yet, a live robot waits to be sent."""
     world: WorldConfig | None = None
     """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
@@ -82,7 +84,14 @@ class GoalImage(Stage):
         if self.goal is None or not str(self.goal).strip():
             room = "goal=ROOM, or " if self._has_rooms() else ""
             place = "goal=PLACE, its name or number, or " if self.places else room
-            raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png")
+            wait = f", or goal={GOAL_TOPIC} to wait for one" if self.world is None else ""
+            raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png{wait}")
+        if self.goal == GOAL_TOPIC:
+            if self.world is not None:
+                raise BadInput(
+                    f"goal: {GOAL_TOPIC} is for a live robot; type nodes.source.goals=[[x,y],…] beside a goal"
+                )
+            return None
         if not str(self.goal).lower().endswith(SUFFIXES):
             if not self.places and not self._has_rooms():
                 raise BadInput(

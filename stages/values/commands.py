@@ -11,6 +11,10 @@ class Reinitialise(Value):
     at: StartPose | None = None
 
 
+GOAL_TOPIC = "/goal_pose"
+"""Topic on which a running robot is sent somewhere; as a goal: it waits to be."""
+
+
 class GoalPoint(Value):
     """Goal of the robot: a point in the map frame (m)."""
 

@@ -21,7 +21,7 @@ from omninav.stages.planning.roadmap import (
 )
 from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.commands import GoalPoint
+from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.homing import DrivingStatus
 from omninav.stages.values.landmarks import LandmarkFix
@@ -82,6 +82,16 @@ def test_a_robot_stops_where_the_image_was_taken_and_looks_as_it_did() -> None:
     assert drive.tick < 200
     assert out.route.number == 0
     assert drive.status.state == "arrived"
+
+
+def test_a_robot_without_a_goal_waits_until_it_is_sent() -> None:
+    drive = Drive()
+    drive.planner, drive.goal, drive.features = RoadmapPlanner(goal=GOAL_TOPIC), None, None
+    waiting = [drive.step() for _ in range(3)]
+    assert [(out.vector, out.route.state, out.route.goal) for out in waiting] == [(None, "locating", None)] * 3
+    assert (drive.pose == START).all()
+    assert drive.step(point=GoalPoint(*GOAL[:2])).route.state == "under way"
+    assert drive.step().vector is not None
 
 
 def test_only_landmarks_tell_that_it_has_arrived() -> None:

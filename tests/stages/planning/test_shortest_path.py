@@ -15,7 +15,7 @@ from omninav.stages.planning.shortest_path import (
     shortest_route,
 )
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.commands import GoalPoint
+from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -278,6 +278,16 @@ def test_after_so_many_ways_it_gives_up_and_says_why():
     route = planner.look(1, "lost", at=0).route
     assert route.state == "gave up"
     assert route.why == "20 routes were tried; the last route ended because it was lost: too few matches"
+
+
+def test_a_robot_without_a_goal_waits_until_it_is_sent():
+    planner = Planner(GOAL_TOPIC)
+    waiting = [planner.look(1) for _ in range(10)]
+    assert planned(waiting) == [False] * 10
+    assert waiting[-1].route.state == "locating"
+    outs = [planner.look(1, point=point) for point in (GoalPoint(0.9, 4.4), *[None] * 10)]
+    assert planned(outs).count(True) == 1
+    assert outs[-1].route.places.tolist() == [1, 2]
 
 
 def test_a_robot_that_is_sent_elsewhere_looks_anew_and_goes_to_the_place_nearest_to_there(

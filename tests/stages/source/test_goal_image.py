@@ -76,12 +76,19 @@ ROOM_OR_IMAGE = {"world": ROOMS, "places": False}
         ({"goal": "kitchen"}, r"no place 'kitchen'; type goal=0, or a place's number \(its places have no names\)"),
         ({"goal": None} | ROOM_OR_IMAGE, r"no goal is named; type goal=ROOM, or goal=IMAGE\.png"),
         ({"goal": "3"} | ROOM_OR_IMAGE, r"no place .3.; type goal=kitchen, or goal=IMAGE\.png"),
+        ({"goal": "/goal_pose"}, "goal: /goal_pose is for a live robot"),
+        ({"goal": None, "world": None}, r"no goal is named; type .*, or goal=/goal_pose to wait for one"),
         ({"goal": "kitchen", "world": None, "places": False}, "goal: kitchen is no image, and the map has no places"),
     ],
 )
 def test_what_can_be_no_goal_is_said_before_anything_runs(given, said):
     with pytest.raises(BadInput, match=said):
         GoalImage(**{"world": WORLD, **given}).inputs_digest()
+
+
+def test_a_live_robot_may_wait_for_its_goal():
+    assert GoalImage(goal="/goal_pose").inputs_digest() is None
+    assert GoalImage(goal="/goal_pose", places=False).step(Context("goal")).image is None
 
 
 def test_a_name_that_a_place_may_have_is_left_to_the_map():
