@@ -134,8 +134,9 @@ class LearnLandmarks(Stage):
             )
         if len(adjusted.slipped):
             ctx.warn(_slipped(adjusted, map.poses if as_driven is None else as_driven.poses))
-        if len(adjusted.carried):
-            ctx.warn(_carried(adjusted.carried, events, ticks))
+        for after, is_shown in ((adjusted.carried, True), (adjusted.unseen, False)):
+            if len(after):
+                ctx.warn(_carried(after, is_shown, events, ticks))
         poses = robot_poses(poses, mount)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         if adjusted.problem == CONTRADICTED:
@@ -217,15 +218,20 @@ def _slipped(adjusted: AdjustedMap, odometry: Array) -> str:
     )
 
 
-def _carried(after: Ints, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick]) -> str:
-    """The sentence on a tour in which the robot was carried, by the references after which it was."""
+def _carried(after: Ints, is_shown: bool, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick]) -> str:
+    """The sentence on a tour in which the robot was carried, by the references after which it was or, unless the rest
+    of the tour shows where to, may have been."""
     first = int(after[0])
     rows = [row for row, event in enumerate(events) if event is not None][first : first + 2]
     when = f" ({_clock(ticks, rows[0])} to {_clock(ticks, rows[1])})" if len(ticks) == len(events) else ""
     more = f", and {counted(len(after) - 1, 'time')} more" if len(after) > 1 else ""
+    between_them = f"in the tour between references {first} and {first + 1}{when}{more}: their images share nothing"
+    if is_shown:
+        contradicted = "odometry contradicts where the rest shows them; the map has what the images show"
+        return f"the robot was carried {between_them}, and {contradicted}"
     return (
-        f"the robot was carried in the tour between references {first} and {first + 1}{when}{more}: their images share "
-        "nothing, and odometry contradicts where the rest shows them; the map has what the images show"
+        f"the robot may have been carried {between_them}, though odometry has them side by side; the map follows "
+        "odometry there, and is wrong if it was"
     )
 
 

@@ -38,10 +38,13 @@ CARRIED_M, CARRIED_RAD = 0.5, math.radians(20.0)
 """Smallest difference from odometry that tells that the robot was carried: distance (m) and turn (rad)."""
 MISS_M, ROUNDS = 0.5, 10
 """Distance of a place from where a pair sees it at which the pair counts by half (m), and rounds of weighing pairs."""
+UNSEEN_M = 0.5
+"""Distance by odometry within which two consecutive images should share something, m."""
 MAX_DOUBTFUL = 10
 """Largest number of steps of a drive in which the robot may have been carried: with more its images show too little."""
 MIN_DISAGREEING = 6
-"""Smallest number of pairs that must cease to disagree once a step is one in which the robot was carried."""
+"""Smallest number of pairs that must cease to disagree once the robot was carried in a step, and by which fewer must be
+left than with any other step."""
 AGREED_TURN, AGREED_DIRECTION = math.radians(2.0), math.radians(15.0)
 """Largest differences from poses of a pair that agrees with them: of its turn and its direction (rad)."""
 
@@ -148,42 +151,54 @@ def _distances(poses: Array, verified: VerifiedPairs) -> Array:
 
 class CarriedDrive(NamedTuple):
     """Motions (R - 1, 3) of a drive and their standard deviations, and the steps (S,) in which the robot was carried,
-    whose motions are those that the closures show."""
+    whose motions are those that the closures show. `unseen` (U,): short steps by odometry without a near pair, though
+    neither they nor their contrary can be shown."""
 
     motions: Array
     sigmas: Array
     steps: Ints
+    unseen: Ints
 
 
 def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedPairs) -> CarriedDrive:
     """Finds the steps of a drive in which the robot was carried, as while its recording paused.
 
     `poses` (R, 3): the drive straightened by `straightened_drive` of the same `steps`, `sigmas` and `verified`. No near
-    pair spans such a step, and with the motion that closures give it, which is not odometry's, at most half as many
-    pairs disagree. Where another step explains the closures as well nobody knows, and neither is told.
+    pair spans such a step, and with the motion that closures give it, which is not odometry's, at most half of the
+    pairs disagree that span it and did so before. Where another step explains the closures as well nobody knows.
     """
-    found = CarriedDrive(steps, sigmas, np.empty(0, np.int64))
     doubtful = _unspanned(steps, verified)
-    disagreeing, is_clear = np.count_nonzero(~_agreeing(poses, verified)), True
-    while 0 < len(doubtful) <= MAX_DOUBTFUL and disagreeing >= 2 * MIN_DISAGREEING:
+    short = [step for step in doubtful if math.hypot(steps[step, 0], steps[step, 1]) < UNSEEN_M]
+    found = same = CarriedDrive(steps, sigmas, np.empty(0, np.int64), np.array(short, np.int64))
+    disagreeing, is_clear = ~_agreeing(poses, verified), True
+    while 0 < len(doubtful) <= MAX_DOUBTFUL:
         tried = [_carried(poses[0], found, step, verified) for step in doubtful]
         freed = [straightened_drive(poses[0], *each[:2], verified, is_near=True) for each in tried]
-        left = [np.count_nonzero(~_agreeing(each, verified)) for each in freed]
-        best, *others = np.argsort(left, kind="stable").tolist()
-        off = tried[best].motions[doubtful[best]] - steps[doubtful[best]]
+        wrong = [~_agreeing(each, verified) for each in freed]
+        left = np.array([np.count_nonzero(each) for each in wrong])
+        best = int(np.argmin(left))
+        step = doubtful.pop(best)
+        off = tried[best].motions[step] - steps[step]
         moved = math.hypot(off[0], off[1]) > CARRIED_M or abs(float(wrap(off[2]))) > CARRIED_RAD
-        if not moved or 2 * left[best] > disagreeing:
+        doubted = disagreeing & _spanning(step, verified)
+        fewer = np.count_nonzero(doubted) - np.count_nonzero(doubted & wrong[best])
+        if not moved or fewer < max(MIN_DISAGREEING, np.count_nonzero(doubted) / 2):
             break
-        disagreeing, found = left[best], tried[best]
-        is_clear = all(left[other] >= 2 * disagreeing + MIN_DISAGREEING for other in others)
-        del doubtful[best]
-    return found if is_clear else CarriedDrive(steps, sigmas, np.empty(0, np.int64))
+        is_clear = bool((np.delete(left, best) - left[best] >= MIN_DISAGREEING).all())
+        disagreeing, found = wrong[best], tried[best]
+    if not is_clear:
+        return same
+    return found._replace(unseen=np.setdiff1d(found.unseen, found.steps))
+
+
+def _spanning(step: int, verified: VerifiedPairs) -> Bools:
+    return (verified.pairs[:, 0] <= step) & (verified.pairs[:, 1] > step)
 
 
 def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPairs) -> CarriedDrive:
     """The drive with another motion in a step: that with which most of the pairs agree that span it."""
     poses = np.concatenate([first[None], compose(first, chain(drive.motions))])
-    spanning = (verified.pairs[:, 0] <= step) & (verified.pairs[:, 1] > step)
+    spanning = _spanning(step, verified)
     motions, sigmas = drive.motions.copy(), drive.sigmas.copy()
     sigmas[step] = CARRIED_SIGMAS
     if np.count_nonzero(spanning) >= MIN_DISAGREEING:
@@ -202,7 +217,7 @@ def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPai
             by = np.linalg.lstsq(across * weights[:, None], missing * weights, rcond=None)[0]
             weights = 1.0 / np.sqrt(1.0 + ((across @ by - missing) / MISS_M) ** 2)
         motions[step] = between(start, np.array([*(then[:2] + by), then[2] + turn]))
-    return CarriedDrive(motions, sigmas, np.sort(np.append(drive.steps, step)))
+    return CarriedDrive(motions, sigmas, np.sort(np.append(drive.steps, step)), drive.unseen)
 
 
 def _unspanned(steps: Array, verified: VerifiedPairs) -> list[int]:

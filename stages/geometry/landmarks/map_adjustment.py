@@ -71,7 +71,8 @@ class AdjustedMap(NamedTuple):
     `seen` (R, 3): poses as the images show them, also where those that were given are kept; None where nothing but the
     images measured any. `covariances`: a function that gives those (R, 3, 3) of the poses, 0 where images confirm given
     ones; None where nothing was adjusted. `slipped` (S,): references after which odometry had another length than the
-    images show, up to the next one. `carried` (C,): references after which the robot was carried.
+    images show, up to the next one. `carried` (C,): references after which the robot was carried, `unseen`
+    (U,): those after which only odometry tells where it went, though it should have been seen.
     """
 
     poses: Array
@@ -83,6 +84,7 @@ class AdjustedMap(NamedTuple):
     covariances: Callable[[], Array] | None = None
     slipped: Ints = NOWHERE
     carried: Ints = NOWHERE
+    unseen: Ints = NOWHERE
 
 
 def found_with_mount(
@@ -184,7 +186,7 @@ def adjusted_drive(
     else:
         lengths = pair_lengths(views.bearings, verified, odometry)
         measured, looseness = driven_steps(steps, sigmas, verified, lengths), np.ones(3)
-    drive = CarriedDrive(measured.motions, measured.sigmas, NOWHERE)
+    drive = CarriedDrive(measured.motions, measured.sigmas, NOWHERE, NOWHERE)
     start = straightened_drive(odometry[0], drive.motions, drive.sigmas, verified)
     if not seen_motion:
         drive = carried_drive(start, drive.motions, drive.sigmas, verified)
@@ -222,7 +224,9 @@ def adjusted_drive(
     def uncertain() -> Array:
         return covariances(SIGMA_FACTOR) * np.outer(units, units)
 
-    return AdjustedMap(poses, solution.camera, "", closures, scale, shown, uncertain, measured.slipped, drive.steps)
+    return AdjustedMap(
+        poses, solution.camera, "", closures, scale, shown, uncertain, measured.slipped, drive.steps, drive.unseen
+    )
 
 
 class _Solution(NamedTuple):

@@ -135,6 +135,18 @@ def test_a_tour_in_whose_pause_the_robot_was_carried_is_told_and_its_map_is_righ
     assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.1
 
 
+def test_a_tour_in_two_parts_that_share_nothing_is_told() -> None:
+    whole = tour_poses()
+    poses = np.concatenate([whole[:5], whole[18:32]])  # both ends of the room, and no way back
+    motions = between(poses[:-1], poses[1:])
+    motions[4] = 0.0
+    odometry = compose(poses[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+    ticks = [Tick(n, 10**9 * n) for n in range(len(poses))]
+    ctx, _ = learned(odometry, "odometry", seen_along(poses), ticks=ticks)
+    told = "the robot may have been carried in the tour between references 4 and 5 (4.0 s to 5.0 s): their images share"
+    assert [warning for warning in ctx.warnings if warning.startswith(told)]
+
+
 def test_where_too_little_is_seen_the_poses_stay_and_it_is_said() -> None:
     poses = tour_poses()[:6]
     for source in ("truth", "odometry"):

@@ -121,6 +121,7 @@ def carried_in(laps, rows):
 def test_a_robot_that_was_carried_between_rooms_is_told_and_its_drive_is_straight(laps, rows):
     found, bent, straight, poses = carried_in(laps, rows)
     assert found.steps.tolist() == rows
+    assert not len(found.unseen)
     assert misplaced(bent, poses)[0] > 1.0
     assert misplaced(straight, poses)[0] < 0.1
     others = np.delete(np.arange(len(found.motions)), rows)
@@ -131,6 +132,7 @@ def test_a_robot_that_was_carried_between_rooms_is_told_and_its_drive_is_straigh
 def test_a_robot_that_drove_between_rooms_unseen_was_not_carried(laps):
     found, _, straight, poses = carried_in(laps, [])
     assert not len(found.steps)
+    assert not len(found.unseen)  # rooms are several metres from each other
     assert misplaced(straight, poses)[0] < 0.1
 
 
@@ -141,4 +143,5 @@ def test_where_several_steps_explain_the_closures_none_is_told(world, verified):
     start = np.concatenate([world.poses[:1], compose(world.poses[0], chain(steps))])
     found = carried_drive(straightened(start, verified), steps, odometry_sigmas(steps), verified)
     assert not len(found.steps)
+    assert found.unseen.tolist() == [47]
     assert (found.motions == steps).all()
