@@ -10,6 +10,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Source, Tick, counted, digest_file, user_path
 from omninav.pipeline.engine.code_version import module_version
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.plausibility import MotionLimits
@@ -157,12 +158,6 @@ class Playback(Source, ABC):
         if steps:
             still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
             ctx.warn(f"{recording.name}: {still}")
-        if (found := truth_excursion(recording.odometry, truth)) is not None:
-            first, last, metres = found
-            ctx.warn(
-                f"{recording.name}: ground truth jumps by {metres:.1f} m, where odometry does not, and back: images "
-                f"{first} to {last}; did the tracker lose the robot?"
-            )
 
     def _motion(
         self, ctx: Context, position: PlaybackState, part: LogPart, image: Image
@@ -203,6 +198,23 @@ class Playback(Source, ABC):
                     recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
                 )
                 self._doubts += doubts
+            if recording.odometry is not None and truth is not None:
+                truth = _without_excursions(recording, truth, recording.odometry)
             self._parts += parts_of(recording, truth, self.cuts, selected, self.rate_hz, self._guesses())
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
+
+
+def _without_excursions(recording: Recording, truth: Array, odometry: Array) -> Array:
+    """True poses (N, 3) without those of images where the truth jumps and odometry does not, which are counted."""
+    truth = truth.copy()
+    while (found := truth_excursion(odometry, truth)) is not None:
+        first, last, metres = found
+        recording.dropped["truth_jump"] += last - first + 1
+        recording.details.setdefault(
+            "truth_jump",
+            f"{recording.name}: ground truth jumps by {metres:.1f} m, where odometry does not, and back: images "
+            f"{first} to {last}; did the tracker lose the robot?",
+        )
+        truth[first : last + 1] = np.nan
+    return truth

@@ -8,7 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap
+from conflicting_logs import ticks
+from made_logs import (
+    FRAMES,
+    IMAGE,
+    ODOMETRY,
+    START,
+    TRUTH,
+    Made,
+    compressed,
+    messages,
+    pose_at,
+    pose_fields,
+    write_mcap,
+)
 
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
@@ -241,3 +254,21 @@ def test_odometry_that_stands_still_while_ground_truth_moves_is_said(tmp_path: P
     assert [line.partition(": ")[2] for line in ctx.warnings] == [
         "odometry stands still at 19 images, ground truth moves 1.6 m"
     ]
+
+
+def test_images_that_the_truth_places_elsewhere_for_a_while_have_none(tmp_path: Path) -> None:
+    def jumped(made: Made) -> list[Made]:
+        seconds = (made.stamp - START) / 1e9
+        if made.topic != TRUTH or not 3.0 < seconds < 6.0:
+            return [made]
+        x, y, heading = pose_at(seconds)
+        content = make_message("geometry_msgs/msg/PoseStamped", {"pose": pose_fields(x, y + 3.0, heading)}, made.stamp)
+        return [made._replace(content=content)]
+
+    ctx = Context("source")
+    outs = list(ticks(LogSource(log=str(write_mcap(tmp_path / "log.mcap", messages(jumped)))), ctx))
+    without = [(out.tick.stamp - START) / 1e9 for out in outs if out.truth is None]
+    assert len(outs) == FRAMES
+    assert len(without) == ctx.counts["truth_jump"] == 6
+    assert 3.0 < min(without) < max(without) < 6.0
+    assert "ground truth jumps by 3.0 m, where odometry does not, and back" in ctx.details["truth_jump"]
