@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omninav.stages.geometry.arrays import Array, Bools, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.pose_graph import optimised_poses
-from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
+from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
 from .map_making import LocalViews, pair_matches
@@ -32,21 +32,6 @@ DISTANCE_SIGMAS_M = (2.0, 0.3, 0.3)
 away it is, the next have the distance of the round before."""
 MAX_DISTANCE_M = 4.0
 """Distance of a pair, m, beyond which it is not believed."""
-CARRIED_SIGMAS = (100.0, 100.0, math.pi)
-"""Standard deviations (m, m, rad) of a motion in which the robot was carried."""
-CARRIED_M, CARRIED_RAD = 0.5, math.radians(20.0)
-"""Smallest difference from odometry that tells that the robot was carried: distance (m) and turn (rad)."""
-MISS_M, ROUNDS = 0.5, 10
-"""Distance of a place from where a pair sees it at which the pair counts by half (m), and rounds of weighing pairs."""
-UNSEEN_M = 0.5
-"""Distance by odometry within which two consecutive images should share something, m."""
-MAX_DOUBTFUL = 10
-"""Largest number of steps of a drive in which the robot may have been carried: with more its images show too little."""
-MIN_DISAGREEING = 6
-"""Smallest number of pairs that must cease to disagree once the robot was carried in a step, and by which fewer must be
-left than with any other step."""
-AGREED_TURN, AGREED_DIRECTION = math.radians(2.0), math.radians(15.0)
-"""Largest differences from poses of a pair that agrees with them: of its turn and its direction (rad)."""
 
 
 class VerifiedPairs(NamedTuple):
@@ -147,91 +132,3 @@ def _distances(poses: Array, verified: VerifiedPairs) -> Array:
     one, other = verified.pairs.T
     distances: Array = np.hypot(*(poses[other] - poses[one])[:, :2].T)
     return np.minimum(distances, MAX_DISTANCE_M)
-
-
-class CarriedDrive(NamedTuple):
-    """Motions (R - 1, 3) of a drive and their standard deviations, and the steps (S,) in which the robot was carried,
-    whose motions are those that the closures show. `unseen` (U,): short steps by odometry without a near pair, though
-    neither they nor their contrary can be shown."""
-
-    motions: Array
-    sigmas: Array
-    steps: Ints
-    unseen: Ints
-
-
-def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedPairs) -> CarriedDrive:
-    """Finds the steps of a drive in which the robot was carried, as while its recording paused.
-
-    `poses` (R, 3): the drive straightened by `straightened_drive` of the same `steps`, `sigmas` and `verified`. No near
-    pair spans such a step, and with the motion that closures give it, which is not odometry's, at most half of the
-    pairs disagree that span it and did so before. Where another step explains the closures as well nobody knows.
-    """
-    doubtful = _unspanned(steps, verified)
-    short = [step for step in doubtful if math.hypot(steps[step, 0], steps[step, 1]) < UNSEEN_M]
-    found = same = CarriedDrive(steps, sigmas, np.empty(0, np.int64), np.array(short, np.int64))
-    disagreeing, is_clear = ~_agreeing(poses, verified), True
-    while 0 < len(doubtful) <= MAX_DOUBTFUL:
-        tried = [_carried(poses[0], found, step, verified) for step in doubtful]
-        freed = [straightened_drive(poses[0], *each[:2], verified, is_near=True) for each in tried]
-        wrong = [~_agreeing(each, verified) for each in freed]
-        left = np.array([np.count_nonzero(each) for each in wrong])
-        best = int(np.argmin(left))
-        step = doubtful.pop(best)
-        off = tried[best].motions[step] - steps[step]
-        moved = math.hypot(off[0], off[1]) > CARRIED_M or abs(float(wrap(off[2]))) > CARRIED_RAD
-        doubted = disagreeing & _spanning(step, verified)
-        fewer = np.count_nonzero(doubted) - np.count_nonzero(doubted & wrong[best])
-        if not moved or fewer < max(MIN_DISAGREEING, np.count_nonzero(doubted) / 2):
-            break
-        is_clear = bool((np.delete(left, best) - left[best] >= MIN_DISAGREEING).all())
-        disagreeing, found = wrong[best], tried[best]
-    if not is_clear:
-        return same
-    return found._replace(unseen=np.setdiff1d(found.unseen, found.steps))
-
-
-def _spanning(step: int, verified: VerifiedPairs) -> Bools:
-    return (verified.pairs[:, 0] <= step) & (verified.pairs[:, 1] > step)
-
-
-def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPairs) -> CarriedDrive:
-    """The drive with another motion in a step: that with which most of the pairs agree that span it."""
-    poses = np.concatenate([first[None], compose(first, chain(drive.motions))])
-    spanning = _spanning(step, verified)
-    motions, sigmas = drive.motions.copy(), drive.sigmas.copy()
-    sigmas[step] = CARRIED_SIGMAS
-    if np.count_nonzero(spanning) >= MIN_DISAGREEING:
-        one, other = verified.pairs[spanning].T
-        start, then = poses[step], poses[step + 1]
-        turns = poses[one, 2] + verified.turns[spanning] - poses[other, 2]
-        near = np.abs(wrap(turns[:, None] - turns)) < AGREED_DIRECTION
-        turn = turns[np.argmax(near.sum(axis=1))]
-        agreeing = np.abs(wrap(turns - turn)) < AGREED_DIRECTION
-        one, other, towards = one[agreeing], other[agreeing], (poses[one, 2] + verified.directions[spanning])[agreeing]
-        ends = compose(np.array([*then[:2], then[2] + turn]), between(then, poses[other]))
-        across = np.column_stack([-np.sin(towards), np.cos(towards)])
-        missing = np.einsum("pi,pi->p", across, poses[one, :2] - ends[:, :2])
-        by, weights = np.zeros(2), np.ones(len(missing))
-        for _ in range(ROUNDS):
-            by = np.linalg.lstsq(across * weights[:, None], missing * weights, rcond=None)[0]
-            weights = 1.0 / np.sqrt(1.0 + ((across @ by - missing) / MISS_M) ** 2)
-        motions[step] = between(start, np.array([*(then[:2] + by), then[2] + turn]))
-    return CarriedDrive(motions, sigmas, np.sort(np.append(drive.steps, step)), drive.unseen)
-
-
-def _unspanned(steps: Array, verified: VerifiedPairs) -> list[int]:
-    """Steps of a drive that no pair of references near to each other along it spans."""
-    driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-    one, other = verified.pairs[np.diff(driven[verified.pairs], axis=1)[:, 0] <= FAR_M].T
-    spans = np.bincount(one, minlength=len(driven)) - np.bincount(other, minlength=len(driven))
-    return [int(step) for step in np.flatnonzero(np.cumsum(spans)[:-1] == 0)]
-
-
-def _agreeing(poses: Array, verified: VerifiedPairs) -> Bools:
-    """Which pairs (P,) have the motion that poses (R, 3) give them."""
-    one, other = verified.pairs.T
-    motions = between(poses[one], poses[other])
-    ahead = np.arctan2(motions[:, 1], motions[:, 0])
-    turns, directions = np.abs(wrap(motions[:, 2] - verified.turns)), np.abs(wrap(ahead - verified.directions))
-    return (turns < AGREED_TURN) & (directions < AGREED_DIRECTION)

@@ -13,7 +13,8 @@ from omninav.stages.geometry.plane.mount import camera_poses, found_mount
 from omninav.stages.geometry.plane.se2 import between, compose, distances_along, wrap
 
 from .adjustment import Lens, Motions, adjusted
-from .closures import FAR_M, CarriedDrive, candidate_pairs, carried_drive, straightened_drive, verified_pairs
+from .carried_drive import CarriedDrive, carried_drive
+from .closures import FAR_M, candidate_pairs, straightened_drive, verified_pairs
 from .floor import floor_depth, lowest_plane
 from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
 from .pair_lengths import Steps, driven_steps, pair_lengths

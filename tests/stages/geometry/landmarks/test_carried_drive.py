@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+from landmark_world import driven, misplaced
+
+from omninav.stages.geometry.landmarks.carried_drive import carried_drive
+from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
+from omninav.stages.geometry.landmarks.map_making import local_views
+from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
+from omninav.stages.geometry.plane.se2 import between, chain, compose, distances_along
+
+LAPS = np.concatenate([np.arange(0, 120, 2), np.arange(1, 120, 2)])
+"""Two laps around the house, each with every second image."""
+
+
+@pytest.fixture(scope="module")
+def laps(world, views, similarity):
+    """True poses of two laps, their odometry and their verified pairs."""
+    shown = [views.rows(each) for each in LAPS.tolist()]
+    two = local_views([views.bearings[rows] for rows in shown], [views.descriptors[rows] for rows in shown])
+    poses = world.poses[LAPS]
+    pairs = candidate_pairs(iter(similarity[np.ix_(LAPS, LAPS)]), distances_along(poses))
+    return poses, verified_pairs(two, pairs, np.random.default_rng(2))
+
+
+def straightened(odometry, verified):
+    steps = between(odometry[:-1], odometry[1:])
+    return straightened_drive(odometry[0], steps, odometry_sigmas(steps), verified)
+
+
+def carried_in(laps, rows):
+    """What tells of a robot that was carried over some steps: its drive as found, straightened, and the true poses."""
+    poses, verified = laps
+    steps, _ = driven(poses)
+    steps[rows] = 0.0
+    start = np.concatenate([poses[:1], compose(poses[0], chain(steps))])
+    bent = straightened(start, verified)
+    found = carried_drive(bent, steps, odometry_sigmas(steps), verified)
+    return found, bent, straightened_drive(poses[0], *found[:2], verified, is_near=True), poses
+
+
+@pytest.mark.parametrize("rows", [[23], [23, 71]])
+def test_a_robot_that_was_carried_between_rooms_is_told_and_its_drive_is_straight(laps, rows):
+    found, bent, straight, poses = carried_in(laps, rows)
+    assert found.steps.tolist() == rows
+    assert not len(found.unseen)
+    assert misplaced(bent, poses)[0] > 1.0
+    assert misplaced(straight, poses)[0] < 0.1
+    others = np.delete(np.arange(len(found.motions)), rows)
+    steps, _ = driven(poses)
+    assert (found.motions[others] == steps[others]).all()
+
+
+def test_a_robot_that_drove_between_rooms_unseen_was_not_carried(laps):
+    found, _, straight, poses = carried_in(laps, [])
+    assert not len(found.steps)
+    assert not len(found.unseen)  # rooms are several metres from each other
+    assert misplaced(straight, poses)[0] < 0.1
+
+
+def test_where_several_steps_explain_the_closures_none_is_told(world, views, similarity):
+    """One lap comes back to its first room alone: any passage between two rooms may be the one."""
+    pairs = candidate_pairs(iter(similarity), distances_along(world.poses))
+    verified = verified_pairs(views, pairs, np.random.default_rng(2))
+    steps, _ = driven(world.poses)
+    steps[47] = 0.0
+    start = np.concatenate([world.poses[:1], compose(world.poses[0], chain(steps))])
+    found = carried_drive(straightened(start, verified), steps, odometry_sigmas(steps), verified)
+    assert not len(found.steps)
+    assert found.unseen.tolist() == [47]
+    assert (found.motions == steps).all()
