@@ -87,7 +87,7 @@ def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPai
         one, other = verified.pairs[spanning].T
         start, then = poses[step], poses[step + 1]
         turns = poses[one, 2] + verified.turns[spanning] - poses[other, 2]
-        turn = _most_common(turns, AGREED_DIRECTION)
+        turn = _mode(turns, AGREED_DIRECTION)
         agreeing = np.abs(wrap(turns - turn)) < AGREED_DIRECTION
         one, other, towards = one[agreeing], other[agreeing], (poses[one, 2] + verified.directions[spanning])[agreeing]
         ends = compose(np.array([*then[:2], then[2] + turn]), between(then, poses[other]))
@@ -101,7 +101,7 @@ def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPai
     return CarriedDrive(motions, sigmas, np.sort(np.append(drive.steps, step)), drive.unseen)
 
 
-def _most_common(angles: Array, within: float) -> float:
+def _mode(angles: Array, within: float) -> float:
     """The middle of the arc of twice `within` (rad) that holds most of the angles (N,)."""
     ordered = np.sort(wrap(angles))
     around = np.concatenate([ordered, ordered + 2.0 * math.pi])
