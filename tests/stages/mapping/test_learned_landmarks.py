@@ -169,7 +169,7 @@ CAMERA = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_
     ],
 )
 def test_where_a_camera_sits_on_the_robot_is_found_and_its_map_is_as_exact(source, mount) -> None:
-    poses = tour_poses(0.2)
+    poses = tour_poses(0.3)
     robot = robot_poses(poses, np.array(mount))
     ctx, out = learned(robot, source, seen_along(poses), camera=CAMERA)
     landmarks = out.map.landmarks
@@ -189,14 +189,17 @@ def swinging(seconds: np.ndarray) -> np.ndarray:
     return np.column_stack([1.0 + 0.5 * there, 2.5 + (seconds > 20.0), wrap(0.7 * seconds + np.sin(seconds))])
 
 
+STAMPS = np.arange(12.0, 28.0, 0.2)
+TICKS = [Tick(n, round(at * 1e9)) for n, at in enumerate(STAMPS.tolist())]
+
+
 @pytest.mark.parametrize(("source", "beside"), [("truth", 0.0), ("truth", 0.3), ("odometry", 0.3)])
 def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside) -> None:
-    stamps, camera = np.arange(1.0, 39.0, 0.2), replace(CAMERA, delay=0.05)
-    features = seen_along(camera_poses(swinging(stamps - 0.15), np.array([beside, 0.0, 0.0])))
-    robot = [Pose(*pose) for pose in swinging(stamps).tolist()]
-    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
+    camera = replace(CAMERA, delay=0.05)
+    features = seen_along(camera_poses(swinging(STAMPS - 0.15), np.array([beside, 0.0, 0.0])))
+    robot = [Pose(*pose) for pose in swinging(STAMPS).tolist()]
     poses = {"odometry": robot, "truth": robot if source == "truth" else [None] * len(robot)}
-    ctx, out = learned(swinging(stamps), source, features, camera=camera, ticks=ticks, **poses)
+    ctx, out = learned(swinging(STAMPS), source, features, camera=camera, ticks=TICKS, **poses)
     landmarks = out.map.landmarks
     assert landmarks.late_by(0.05) == pytest.approx(0.15, abs=0.01)
     assert landmarks.late_by(0.2) == 0.0  # another description is believed
@@ -205,31 +208,27 @@ def test_how_late_images_are_is_found_with_where_the_camera_sits(source, beside)
     for yaw in (camera.yaw, camera.yaw + 0.5):
         assert landmarks.mounted(np.array([0.0, 0.0, yaw]), False) == pytest.approx([beside, 0.0, 0.0], abs=0.02)
     assert landmarks.mount == pytest.approx([beside, 0.0, 0.0], abs=0.02)
-    assert np.median(np.hypot(*(out.map.poses - swinging(stamps - 0.15))[:, :2].T)) < 0.04
+    assert np.median(np.hypot(*(out.map.poses - swinging(STAMPS - 0.15))[:, :2].T)) < 0.04
     assert parse_camera(landmarks.camera, "camera.yaml").delay == pytest.approx(0.2, abs=0.01)
     assert "its images are stamped 0.1" in ctx.warnings[0]
     assert out.metrics.values["camera"]["delay_beside_s"] == pytest.approx(0.15, abs=0.01)
 
 
 def test_true_poses_that_are_late_are_not_taken_for_early_images() -> None:
-    stamps = np.arange(1.0, 39.0, 0.2)
-    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
-    odometry, late = ([Pose(*pose) for pose in swinging(stamps - by).tolist()] for by in (0.0, 0.15))
-    for measured, delay in ((odometry, 0.0), ([None] * len(ticks), -0.15)):
+    odometry, late = ([Pose(*pose) for pose in swinging(STAMPS - by).tolist()] for by in (0.0, 0.15))
+    for measured, delay in ((odometry, 0.0), ([None] * len(TICKS), -0.15)):
         _, out = learned(
-            swinging(stamps - 0.15), "truth", seen_along(swinging(stamps)),
-            camera=CAMERA, ticks=ticks, odometry=measured, truth=late,
+            swinging(STAMPS - 0.15), "truth", seen_along(swinging(STAMPS)),
+            camera=CAMERA, ticks=TICKS, odometry=measured, truth=late,
         )  # fmt: skip
         assert out.map.landmarks.delay_s == pytest.approx(delay, abs=0.01)
 
 
 def test_the_images_of_several_logs_and_of_a_way_with_gaps_are_taken_to_be_in_time() -> None:
-    stamps = np.arange(1.0, 39.0, 0.2)
-    features, robot = seen_along(swinging(stamps - 0.15)), [Pose(*pose) for pose in swinging(stamps).tolist()]
-    ticks = [Tick(n, round(at * 1e9)) for n, at in enumerate(stamps.tolist())]
-    two_logs = [replace(tick, log=int(tick.index > 50)) for tick in ticks]
-    for way, times in ((robot, two_logs), ([None, *robot[1:]], ticks), (robot[1:], ticks)):
-        _, out = learned(swinging(stamps), "truth", features, camera=CAMERA, ticks=times, truth=way)
+    features, robot = seen_along(swinging(STAMPS - 0.15)), [Pose(*pose) for pose in swinging(STAMPS).tolist()]
+    two_logs = [replace(tick, log=int(tick.index > 25)) for tick in TICKS]
+    for way, times in ((robot, two_logs), ([None, *robot[1:]], TICKS), (robot[1:], TICKS)):
+        _, out = learned(swinging(STAMPS), "truth", features, camera=CAMERA, ticks=times, truth=way)
         assert out.map.landmarks.delay_s == 0.0
 
 
@@ -251,6 +250,6 @@ def test_a_camera_that_is_as_it_is_described_is_mounted_so_to_the_last_bit() -> 
 
 
 def test_motion_that_was_seen_in_the_images_tells_no_mount() -> None:
-    poses = tour_poses(0.2)
+    poses = tour_poses(0.3)
     _, out = learned(robot_poses(poses, np.array([0.5, 0.0, 0.0])), "guess", seen_along(poses), camera=CAMERA)
     assert not out.map.landmarks.mount.any()
