@@ -262,7 +262,8 @@ def learned(tour: str) -> ReferenceGraph:
 
 def said(map: ReferenceGraph, drive: str) -> list[Found]:
     """What is said of a map and during a drive in it, by the stages that `omninav` takes."""
-    ctx = Context("conflicts")
+    ctx, matching = Context("conflicts"), Context("match")
+    matching.read = frozenset({"similarities"})  # their calibration takes most of the time
     scale = AppearanceLengthScale().step(ctx, map).length_scale
     of_map = CheckMap().step(ctx, map).conflicts
     found = [Found(0, sentence) for sentence in ctx.warnings]
@@ -275,7 +276,7 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
         features = describe.step(ctx, panorama=panorama).features
         watch.step(
             ctx, state, strip.step(ctx, panorama).strip, out.odometry, out.motion,
-            match.step(ctx, features, map).similarities, map, scale, of_map,
+            match.step(matching, features, map).similarities, map, scale, of_map,
         )  # fmt: skip
         found += [Found(number, sentence) for sentence in ctx.warnings[len(found) :]]
     return found
