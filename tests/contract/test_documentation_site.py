@@ -19,9 +19,12 @@ ELSEWHERE = re.compile(r"^(https?:|data:|mailto:|javascript:|//)")
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Builds it in this process, which has composed many of the configurations that its pages describe."""
-    built = tmp_path_factory.mktemp("site")
-    with patch.dict(os.environ, NO_MKDOCS_2_WARNING="1", OMNINAV_EXECUTE="false"):
+    """Builds it in this process, which has composed many of the configurations that its pages describe.
+
+    Its plots are drawn, but their pixels are not: `tests/pipeline/experiment/test_plots.py` looks at some.
+    """
+    built, environment = tmp_path_factory.mktemp("site"), {"NO_MKDOCS_2_WARNING": "1", "OMNINAV_EXECUTE": "false"}
+    with patch.dict(os.environ, environment), patch("matplotlib.figure.Figure.savefig"):
         build(load_config(str(ROOT / "mkdocs.yml"), strict=True, site_dir=str(built)))
     return built
 
