@@ -142,11 +142,16 @@ def test_an_option_without_a_file_says_what_it_is_and_states_what_differs():
     no_default_is_repeated(OPTIONS)
     found = re.findall(r"^  # (.{10,}\.)  omninav (.*)\n  (\w+):", OPTIONS.read_text(), re.MULTILINE)
     options = [(role, name) for role, listed in yaml.safe_load(OPTIONS.read_text()).items() for name in listed]
+    together: dict[tuple[str, ...], dict[str, list[str]]] = {}
     for (role, name), (_, typed, described) in zip(options, found, strict=True):
-        words = shlex.split(typed)
+        words, own = shlex.split(typed), f"{role}={name}"
         assert described == name
-        assert f"{role}={name}" in words
-        compose(with_unlisted_parameters(words, []))
+        assert own in words
+        rest = tuple(word for word in words if word != own)
+        together.setdefault(rest, {}).setdefault(role, []).append(own)
+    for rest, of_role in together.items():  # a composition takes an option of each role
+        for chosen in itertools.zip_longest(*of_role.values()):
+            compose(with_unlisted_parameters([*filter(None, chosen), *rest], []))
 
 
 def test_every_variant_builds():
