@@ -11,7 +11,6 @@ import platform
 import re
 import subprocess
 import sys
-import sysconfig
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -118,6 +117,10 @@ def module_version(module: str, without: str = "") -> str:
     return digest_text(*(text for name in sorted(found) for text in (name.removeprefix(outer), found[name])))
 
 
+INSTALLED = {"site-packages", "dist-packages"}
+"""Folders of installed packages, of whichever Python: those of a system, a user or another environment count too."""
+
+
 @functools.cache
 def _not_installed(name: str) -> Path | None:
     """The file of a module that is neither installed nor of Python or omninav, and so has no version."""
@@ -127,8 +130,7 @@ def _not_installed(name: str) -> Path | None:
     except (ImportError, ValueError):
         spec = None
     file = Path(spec.origin if spec is not None and spec.origin else "").resolve()
-    installed = (Path(sysconfig.get_path(kind)).resolve() for kind in ("purelib", "platlib"))
-    if file.suffix != ".py" or any(file.is_relative_to(folder) for folder in installed):
+    if file.suffix != ".py" or INSTALLED & {*file.parts}:
         return None
     return _file_of(file.parent if file.name == "__init__.py" else file.with_suffix(""), rest)
 

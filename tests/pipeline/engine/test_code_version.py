@@ -153,3 +153,15 @@ def test_another_version_of_any_library_is_another_digest(library: str, monkeypa
     monkeypatch.undo()
     code_version.surroundings.cache_clear()
     assert changed != before == code_version.surroundings()
+
+
+@pytest.mark.parametrize("folder", ["site-packages", "dist-packages"])
+def test_what_another_python_has_installed_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    """A system's packages beside an environment's, as with ROS: the source of numpy takes 15 s at each start."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "of_another_python.py").touch()
+    monkeypatch.syspath_prepend(str(tmp_path / folder))
+    code_version._not_installed.cache_clear()
+    assert code_version._not_installed("of_another_python") is None
