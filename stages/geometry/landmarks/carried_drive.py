@@ -44,8 +44,8 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
     """Finds the steps of a drive in which the robot was carried, as while its recording paused.
 
     `poses` (R, 3): the drive straightened by `straightened_drive` of the same `steps`, `sigmas` and `verified`. No near
-    pair spans such a step, and with the motion that closures give it, which is not odometry's, at most half of the
-    pairs disagree that span it and did so before. Where another step explains the closures as well nobody knows.
+    pair spans such a step, and with the motion that closures give it, which is not odometry's, fewer pairs disagree, by
+    half of those at least that span it and disagreed. Where another step explains the closures as well nobody knows.
     """
     doubtful = _unspanned(steps, verified)
     if len(doubtful) > MAX_DOUBTFUL:
@@ -62,9 +62,8 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
         step = doubtful.pop(best)
         off = tried[best].motions[step] - steps[step]
         moved = math.hypot(off[0], off[1]) > CARRIED_M or abs(float(wrap(off[2]))) > CARRIED_RAD
-        doubted = disagreeing & _spanning(step, verified)
-        fewer = np.count_nonzero(doubted) - np.count_nonzero(doubted & wrong[best])
-        if not moved or fewer < max(MIN_DISAGREEING, np.count_nonzero(doubted) / 2):
+        doubted = np.count_nonzero(disagreeing & _spanning(step, verified))
+        if not moved or np.count_nonzero(disagreeing) - left[best] < max(MIN_DISAGREEING, doubted / 2):
             break
         is_clear = bool((np.delete(left, best) - left[best] >= MIN_DISAGREEING).all())
         disagreeing, found = wrong[best], tried[best]
