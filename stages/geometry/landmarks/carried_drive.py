@@ -12,8 +12,6 @@ from .closures import FAR_M, VerifiedPairs, straightened_drive
 
 CARRIED_SIGMAS = (100.0, 100.0, math.pi)
 """Standard deviations (m, m, rad) of a motion in which the robot was carried."""
-CARRIED_M, CARRIED_RAD = 0.5, math.radians(20.0)
-"""Smallest difference from odometry that tells that the robot was carried: distance (m) and turn (rad)."""
 MISS_M, ROUNDS = 0.5, 10
 """Distance of a place from where a pair sees it at which the pair counts by half (m), and rounds of weighing pairs."""
 UNSEEN_M = 0.5
@@ -44,7 +42,7 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
     """Finds the steps of a drive in which the robot was carried, as while its recording paused.
 
     `poses` (R, 3): the drive straightened by `straightened_drive` of the same `steps`, `sigmas` and `verified`. No near
-    pair spans such a step, and with the motion that closures give it, which is not odometry's, fewer pairs disagree, by
+    pair spans such a step, and with the motion that closures give it in place of odometry's, fewer pairs disagree, by
     half of those at least that span it and disagreed. Where another step explains the closures as well nobody knows.
     """
     doubtful = _unspanned(steps, verified)
@@ -60,10 +58,8 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
         left = np.array([np.count_nonzero(each) for each in wrong])
         best = int(np.argmin(left))
         step = doubtful.pop(best)
-        off = tried[best].motions[step] - steps[step]
-        moved = math.hypot(off[0], off[1]) > CARRIED_M or abs(float(wrap(off[2]))) > CARRIED_RAD
         doubted = np.count_nonzero(disagreeing & _spanning(step, verified))
-        if not moved or np.count_nonzero(disagreeing) - left[best] < max(MIN_DISAGREEING, doubted / 2):
+        if np.count_nonzero(disagreeing) - left[best] < max(MIN_DISAGREEING, doubted / 2):
             break
         is_clear = bool((np.delete(left, best) - left[best] >= MIN_DISAGREEING).all())
         disagreeing, found = wrong[best], tried[best]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from landmark_world import driven, misplaced
 
-from omninav.stages.geometry.landmarks.carried_drive import carried_drive
+from omninav.stages.geometry.landmarks.carried_drive import _mode, carried_drive
 from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import local_views
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
@@ -28,7 +28,8 @@ def straightened(odometry, verified):
 
 
 def carried_in(laps, rows):
-    """What tells of a robot that was carried over some steps: its drive as found, straightened, and the true poses."""
+    """What tells of a robot that was carried over some steps: its drive as found, straightened before and after, and
+    the true poses."""
     poses, verified = laps
     steps, _ = driven(poses)
     steps[rows] = 0.0
@@ -45,6 +46,8 @@ def test_a_robot_that_was_carried_between_rooms_is_told_and_its_drive_is_straigh
     assert not len(found.unseen)
     assert misplaced(bent, poses)[0] > 1.0
     assert misplaced(straight, poses)[0] < 0.1
+    true = between(poses[:-1], poses[1:])
+    assert between(straight[:-1], straight[1:])[rows] == pytest.approx(true[rows], abs=0.2)
     others = np.delete(np.arange(len(found.motions)), rows)
     steps, _ = driven(poses)
     assert (found.motions[others] == steps[others]).all()
@@ -55,6 +58,13 @@ def test_a_robot_that_drove_between_rooms_unseen_was_not_carried(laps):
     assert not len(found.steps)
     assert not len(found.unseen)  # rooms are several metres from each other
     assert misplaced(straight, poses)[0] < 0.1
+
+
+@pytest.mark.parametrize("turned", [0.0, 3.0])
+def test_the_mode_of_angles_is_that_of_most_across_the_half_turn_too(turned):
+    angles = np.concatenate([np.linspace(-0.2, 0.2, 21), np.linspace(1.0, 1.1, 20)]) + turned
+    assert np.exp(1j * _mode(angles, 0.25)) == pytest.approx(np.exp(1j * turned), abs=1e-6)
+    assert np.exp(1j * _mode(angles, 0.05)) == pytest.approx(np.exp(1j * (1.05 + turned)), abs=1e-6)
 
 
 def test_where_several_steps_explain_the_closures_none_is_told(world, views, similarity):
