@@ -51,7 +51,7 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
     short = [step for step in doubtful if math.hypot(steps[step, 0], steps[step, 1]) < UNSEEN_M]
     found = same = CarriedDrive(steps, sigmas, np.empty(0, np.int64), np.array(short, np.int64))
     disagreeing, is_clear = ~_agreeing(poses, verified), True
-    while doubtful:
+    while doubtful := [step for step in doubtful if _is_contradicted(step, disagreeing, verified)]:
         tried = [_carried(poses[0], found, step, verified) for step in doubtful]
         freed = [straightened_drive(poses[0], *each[:2], verified, is_near=True) for each in tried]
         wrong = [~_agreeing(each, verified) for each in freed]
@@ -66,6 +66,13 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
     if not is_clear:
         return same
     return found._replace(unseen=np.setdiff1d(found.unseen, found.steps))
+
+
+def _is_contradicted(step: int, disagreeing: Bools, verified: VerifiedPairs) -> bool:
+    """Tells whether at least a quarter of the pairs that span a step disagree, and enough of them."""
+    spanning = _spanning(step, verified)
+    doubted = np.count_nonzero(disagreeing & spanning)
+    return bool(doubted >= max(MIN_DISAGREEING, np.count_nonzero(spanning) / 4))
 
 
 def _spanning(step: int, verified: VerifiedPairs) -> Bools:
