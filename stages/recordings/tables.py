@@ -337,7 +337,10 @@ def _in_base_unit(text: str, unit: str) -> Decimal | None:
         return None
     match = _CELL.match(text)
     if match is None and unit in TIMES and _ISO.match(text):
-        return _moment(text)
+        moment = _moment(text)
+        if moment is not None and abs(moment) > _MAX_MAGNITUDE["ns"]:
+            raise OutOfProportion(f"{cut(text)} is out of all proportion")
+        return moment
     if match is None:
         if text.count(",") == 1 and "." not in text and _CELL.match(pointed := text.replace(",", ".")):
             raise UnreadableRecording(f"{cut(text)} has a decimal comma, expected a point: {pointed}")

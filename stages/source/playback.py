@@ -198,17 +198,17 @@ class Playback(Source, ABC):
                     recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
                 )
                 self._doubts += doubts
-            if recording.odometry is not None and truth is not None:
-                truth = _without_excursions(recording, truth, recording.odometry)
+            if truth is not None and not isinstance(recording, LiveRecording):  # whose replay has what the run had
+                truth = _without_excursions(recording, truth)
             self._parts += parts_of(recording, truth, self.cuts, selected, self.rate_hz, self._guesses())
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
 
 
-def _without_excursions(recording: Recording, truth: Array, odometry: Array) -> Array:
+def _without_excursions(recording: Recording, truth: Array) -> Array:
     """True poses (N, 3) without those of images where the truth jumps and odometry does not, which are counted."""
     truth = truth.copy()
-    while (found := truth_excursion(odometry, truth)) is not None:
+    while recording.odometry is not None and (found := truth_excursion(recording.odometry, truth)) is not None:
         first, last, metres = found
         recording.dropped["truth_jump"] += last - first + 1
         recording.details.setdefault(

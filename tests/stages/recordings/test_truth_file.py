@@ -122,6 +122,16 @@ def test_rows_in_another_order_are_read_in_that_of_their_times(tmp_path: Path, o
     assert not other.lost
 
 
+@pytest.mark.parametrize("year", ["0001", "9999"])
+def test_a_date_that_no_stamp_holds_is_refused(tmp_path: Path, year: str) -> None:
+    rows = [f"{year}-01-01T00:00:0{number}.123456789Z,{number},0,0" for number in range(5)]
+    (tmp_path / "truth.csv").write_text("\n".join(["time,x,y,yaw", *rows]))
+    with refused(f"column 'time': '{year}-01-01T00:00:00.123456789Z' is out of all proportion"):
+        read_trajectory(tmp_path / "truth.csv")
+    (tmp_path / "truth.csv").write_text("\n".join(["time,x,y,yaw", *rows]).replace(year, "2026"))
+    assert read_trajectory(tmp_path / "truth.csv").stamps[1] % 10**9 == 123_456_000
+
+
 def test_times_of_too_few_digits_are_named(tmp_path: Path) -> None:
     rows = [f"{START / 1e9 + at:.6e} {at} 0 0 0 0 0 1" for at in SECONDS]
     (tmp_path / "truth.tum").write_text("\n".join(rows))
