@@ -1,9 +1,16 @@
+import math
+
 import numpy as np
 import pytest
 from landmark_world import driven, misplaced
 
-from omninav.stages.geometry.landmarks.carried_drive import _mode, carried_drive
-from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
+from omninav.stages.geometry.landmarks.carried_drive import CarriedDrive, _carried, _mode, carried_drive
+from omninav.stages.geometry.landmarks.closures import (
+    VerifiedPairs,
+    candidate_pairs,
+    straightened_drive,
+    verified_pairs,
+)
 from omninav.stages.geometry.landmarks.map_making import local_views
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, chain, compose, distances_along
@@ -58,6 +65,32 @@ def test_a_robot_that_drove_between_rooms_unseen_was_not_carried(laps):
     assert not len(found.steps)
     assert not len(found.unseen)  # rooms are several metres from each other
     assert misplaced(straight, poses)[0] < 0.1
+
+
+def test_the_motion_of_a_carried_step_is_what_most_of_the_spanning_pairs_show():
+    rng, step = np.random.default_rng(1), 9
+    steps = rng.normal(size=(19, 3)) * [0.5, 0.5, 0.4]
+    steps[step] = 4.0, -3.0, 2.5
+    first = np.array([1.0, 2.0, 0.5])
+    poses = np.concatenate([first[None], compose(first, chain(steps))])
+    pairs = np.array([(one, other) for one in range(step + 1) for other in range(step + 1, 20)])
+    motions = between(poses[pairs[:, 0]], poses[pairs[:, 1]])
+    turns, directions = motions[:, 2].copy(), np.arctan2(motions[:, 1], motions[:, 0])
+    wrong = rng.random(len(pairs)) < 0.3
+    turns[wrong], directions[wrong] = rng.uniform(-math.pi, math.pi, (2, np.count_nonzero(wrong)))
+    nothing = np.empty(0, np.int64)
+    verified = VerifiedPairs(pairs, turns, directions, nothing, nothing, np.empty(0), nothing)
+    measured = steps.copy()
+    measured[step] = 0.0
+    drive = CarriedDrive(measured, np.full((19, 3), 0.01), nothing, nothing)
+    found = _carried(first, drive, step, verified)
+    assert found.motions[step, :2] == pytest.approx(steps[step, :2], abs=0.1)
+    assert found.motions[step, 2] == pytest.approx(steps[step, 2], abs=math.radians(3.0))
+    assert (np.delete(found.motions, step, axis=0) == np.delete(steps, step, axis=0)).all()
+    assert found.steps.tolist() == [step]
+    assert (found.sigmas[step] > 1.0).all()
+    few = VerifiedPairs(pairs[:5], turns[:5], directions[:5], nothing, nothing, np.empty(0), nothing)
+    assert (_carried(first, drive, step, few).motions == measured).all()
 
 
 @pytest.mark.parametrize("turned", [0.0, 3.0])
