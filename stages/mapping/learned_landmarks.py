@@ -219,8 +219,7 @@ def _slipped(adjusted: AdjustedMap, odometry: Array) -> str:
 
 
 def _carried(after: Ints, is_shown: bool, events: Sequence[ReferenceEvent | None], ticks: Sequence[Tick]) -> str:
-    """The sentence on a tour in which the robot was carried, by the references after which it was or, unless the rest
-    of the tour shows where to, may have been."""
+    """The warning that the robot was carried in the tour after some references or, unless `is_shown`, may have been."""
     first = int(after[0])
     rows = [row for row, event in enumerate(events) if event is not None][first : first + 2]
     when = f" ({_clock(ticks, rows[0])} to {_clock(ticks, rows[1])})" if len(ticks) == len(events) else ""

@@ -13,7 +13,7 @@ from .closures import FAR_M, VerifiedPairs, straightened_drive
 CARRIED_SIGMAS = (100.0, 100.0, math.pi)
 """Standard deviations (m, m, rad) of a motion in which the robot was carried."""
 MISS_M, ROUNDS = 0.5, 10
-"""Distance of a place from where a pair sees it at which the pair counts by half (m), and rounds of weighing pairs."""
+"""Distance (m) of a place from a pair's line of sight at which the pair counts by half, and number of reweightings."""
 UNSEEN_M = 0.5
 """Distance by odometry within which two consecutive images should share something, m."""
 MAX_DOUBTFUL = 10
@@ -26,12 +26,13 @@ AGREED_TURN, AGREED_DIRECTION = math.radians(2.0), math.radians(15.0)
 
 
 class CarriedDrive(NamedTuple):
-    """Motions (R - 1, 3) of a drive and their standard deviations (R - 1, 3).
+    """Poses (R, 3) of a straightened drive, its motions (R - 1, 3) and their standard deviations (R - 1, 3).
 
     `steps` (S,): those in which the robot was carried, whose motions are what the closures show. `unseen` (U,): those
     that are short by odometry and spanned by no near pair, of which the closures show nothing else.
     """
 
+    poses: Array
     motions: Array
     sigmas: Array
     steps: Ints
@@ -49,12 +50,11 @@ def carried_drive(poses: Array, steps: Array, sigmas: Array, verified: VerifiedP
     if len(doubtful) > MAX_DOUBTFUL:
         doubtful = []
     short = [step for step in doubtful if math.hypot(steps[step, 0], steps[step, 1]) < UNSEEN_M]
-    found = same = CarriedDrive(steps, sigmas, np.empty(0, np.int64), np.array(short, np.int64))
+    found = same = CarriedDrive(poses, steps, sigmas, np.empty(0, np.int64), np.array(short, np.int64))
     disagreeing, is_clear = ~_agreeing(poses, verified), True
     while doubtful := [step for step in doubtful if _is_contradicted(step, disagreeing, verified)]:
-        tried = [_carried(poses[0], found, step, verified) for step in doubtful]
-        freed = [straightened_drive(poses[0], *each[:2], verified, is_near=True) for each in tried]
-        wrong = [~_agreeing(each, verified) for each in freed]
+        tried = [_carried(found, step, verified) for step in doubtful]
+        wrong = [~_agreeing(each.poses, verified) for each in tried]
         left = np.array([np.count_nonzero(each) for each in wrong])
         best = int(np.argmin(left))
         step = doubtful.pop(best)
@@ -79,28 +79,29 @@ def _spanning(step: int, verified: VerifiedPairs) -> Bools:
     return (verified.pairs[:, 0] <= step) & (verified.pairs[:, 1] > step)
 
 
-def _carried(first: Array, drive: CarriedDrive, step: int, verified: VerifiedPairs) -> CarriedDrive:
+def _carried(drive: CarriedDrive, step: int, verified: VerifiedPairs) -> CarriedDrive:
     """The drive with another motion in a step: that with which most of the pairs agree that span it."""
+    first = drive.poses[0]
     poses = np.concatenate([first[None], compose(first, chain(drive.motions))])
     spanning = _spanning(step, verified)
+    one, other = verified.pairs[spanning].T
+    start, then = poses[step], poses[step + 1]
+    turns = poses[one, 2] + verified.turns[spanning] - poses[other, 2]
+    turn = _mode(turns, AGREED_DIRECTION)
+    agreeing = np.abs(wrap(turns - turn)) < AGREED_DIRECTION
+    one, other, towards = one[agreeing], other[agreeing], (poses[one, 2] + verified.directions[spanning])[agreeing]
+    ends = compose(np.array([*then[:2], then[2] + turn]), between(then, poses[other]))
+    across = np.column_stack([-np.sin(towards), np.cos(towards)])
+    missing = np.einsum("pi,pi->p", across, poses[one, :2] - ends[:, :2])
+    by, weights = np.zeros(2), np.ones(len(missing))
+    for _ in range(ROUNDS):
+        by = np.linalg.lstsq(across * weights[:, None], missing * weights, rcond=None)[0]
+        weights = 1.0 / np.sqrt(1.0 + ((across @ by - missing) / MISS_M) ** 2)
     motions, sigmas = drive.motions.copy(), drive.sigmas.copy()
+    motions[step] = between(start, np.array([*(then[:2] + by), then[2] + turn]))
     sigmas[step] = CARRIED_SIGMAS
-    if np.count_nonzero(spanning) >= MIN_DISAGREEING:
-        one, other = verified.pairs[spanning].T
-        start, then = poses[step], poses[step + 1]
-        turns = poses[one, 2] + verified.turns[spanning] - poses[other, 2]
-        turn = _mode(turns, AGREED_DIRECTION)
-        agreeing = np.abs(wrap(turns - turn)) < AGREED_DIRECTION
-        one, other, towards = one[agreeing], other[agreeing], (poses[one, 2] + verified.directions[spanning])[agreeing]
-        ends = compose(np.array([*then[:2], then[2] + turn]), between(then, poses[other]))
-        across = np.column_stack([-np.sin(towards), np.cos(towards)])
-        missing = np.einsum("pi,pi->p", across, poses[one, :2] - ends[:, :2])
-        by, weights = np.zeros(2), np.ones(len(missing))
-        for _ in range(ROUNDS):
-            by = np.linalg.lstsq(across * weights[:, None], missing * weights, rcond=None)[0]
-            weights = 1.0 / np.sqrt(1.0 + ((across @ by - missing) / MISS_M) ** 2)
-        motions[step] = between(start, np.array([*(then[:2] + by), then[2] + turn]))
-    return CarriedDrive(motions, sigmas, np.sort(np.append(drive.steps, step)), drive.unseen)
+    straight = straightened_drive(first, motions, sigmas, verified, is_near=True)
+    return CarriedDrive(straight, motions, sigmas, np.sort(np.append(drive.steps, step)), drive.unseen)
 
 
 def _mode(angles: Array, within: float) -> float:

@@ -187,17 +187,15 @@ def adjusted_drive(
     else:
         lengths = pair_lengths(views.bearings, verified, odometry)
         measured, looseness = driven_steps(steps, sigmas, verified, lengths), np.ones(3)
-    drive = CarriedDrive(measured.motions, measured.sigmas, NOWHERE, NOWHERE)
-    start = straightened_drive(odometry[0], drive.motions, drive.sigmas, verified)
+    straight = straightened_drive(odometry[0], measured.motions, measured.sigmas, verified)
+    drive = CarriedDrive(straight, measured.motions, measured.sigmas, NOWHERE, NOWHERE)
     if not seen_motion:
-        drive = carried_drive(start, drive.motions, drive.sigmas, verified)
-    if len(drive.steps):
-        start = straightened_drive(odometry[0], drive.motions, drive.sigmas, verified, is_near=True)
+        drive = carried_drive(straight, measured.motions, measured.sigmas, verified)
     order = np.argsort(verified.ratio, kind="stable")
     tracks = joined_matches(verified.first[order], verified.second[order], views.owners)
     along = np.arange(len(odometry))
     driven_motions = Motions(np.column_stack([along[:-1], along[1:]]), drive.motions, looseness * drive.sigmas)
-    solution = _Solution(start, None)
+    solution = _Solution(drive.poses, None)
     for miss in MISSES:
         refined = _bundled(views, tracks, solution, seen, miss, None, driven_motions, None)
         if refined is None:

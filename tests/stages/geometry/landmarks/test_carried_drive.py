@@ -35,36 +35,35 @@ def straightened(odometry, verified):
 
 
 def carried_in(laps, rows):
-    """What tells of a robot that was carried over some steps: its drive as found, straightened before and after, and
-    the true poses."""
+    """Carries a robot over some steps. Returns its drive as found and as straightened before, and the true poses."""
     poses, verified = laps
     steps, _ = driven(poses)
     steps[rows] = 0.0
     start = np.concatenate([poses[:1], compose(poses[0], chain(steps))])
     bent = straightened(start, verified)
     found = carried_drive(bent, steps, odometry_sigmas(steps), verified)
-    return found, bent, straightened_drive(poses[0], *found[:2], verified, is_near=True), poses
+    return found, bent, poses
 
 
 def test_a_robot_that_was_carried_between_rooms_is_told_and_its_drive_is_straight(laps):
     rows = [23, 71]
-    found, bent, straight, poses = carried_in(laps, rows)
+    found, bent, poses = carried_in(laps, rows)
     assert found.steps.tolist() == rows
     assert not len(found.unseen)
     assert misplaced(bent, poses)[0] > 1.0
-    assert misplaced(straight, poses)[0] < 0.1
+    assert misplaced(found.poses, poses)[0] < 0.1
     true = between(poses[:-1], poses[1:])
-    assert between(straight[:-1], straight[1:])[rows] == pytest.approx(true[rows], abs=0.2)
+    assert between(found.poses[:-1], found.poses[1:])[rows] == pytest.approx(true[rows], abs=0.2)
     others = np.delete(np.arange(len(found.motions)), rows)
     steps, _ = driven(poses)
     assert (found.motions[others] == steps[others]).all()
 
 
 def test_a_robot_that_drove_between_rooms_unseen_was_not_carried(laps):
-    found, _, straight, poses = carried_in(laps, [])
+    found, _, poses = carried_in(laps, [])
     assert not len(found.steps)
     assert not len(found.unseen)  # rooms are several metres from each other
-    assert misplaced(straight, poses)[0] < 0.1
+    assert misplaced(found.poses, poses)[0] < 0.1
 
 
 def test_the_motion_of_a_carried_step_is_what_most_of_the_spanning_pairs_show():
@@ -82,15 +81,15 @@ def test_the_motion_of_a_carried_step_is_what_most_of_the_spanning_pairs_show():
     verified = VerifiedPairs(pairs, turns, directions, nothing, nothing, np.empty(0), nothing)
     measured = steps.copy()
     measured[step] = 0.0
-    drive = CarriedDrive(measured, np.full((19, 3), 0.01), nothing, nothing)
-    found = _carried(first, drive, step, verified)
+    bent, sigmas = np.concatenate([first[None], compose(first, chain(measured))]), np.full((19, 3), 0.01)
+    found = _carried(CarriedDrive(bent, measured, sigmas, nothing, nothing), step, verified)
     assert found.motions[step, :2] == pytest.approx(steps[step, :2], abs=0.1)
     assert found.motions[step, 2] == pytest.approx(steps[step, 2], abs=math.radians(3.0))
     assert (np.delete(found.motions, step, axis=0) == np.delete(steps, step, axis=0)).all()
     assert found.steps.tolist() == [step]
     assert (found.sigmas[step] > 1.0).all()
     few = VerifiedPairs(pairs[:5], turns[:5], directions[:5], nothing, nothing, np.empty(0), nothing)
-    assert (_carried(first, drive, step, few).motions == measured).all()
+    assert (carried_drive(bent, measured, sigmas, few).motions == measured).all()
 
 
 @pytest.mark.parametrize("turned", [0.0, 3.0])

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from landmark_world import driven, misplaced
 
-from omninav.stages.geometry.landmarks.closures import (
-    candidate_pairs,
-    straightened_drive,
-    verified_pairs,
-)
+from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
 from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, distances_along, wrap
