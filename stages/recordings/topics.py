@@ -42,12 +42,10 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     topics = options.topics
     if odometry_in_transforms := _odometry_in_transforms(feed, topics):
         topics = replace(topics, odometry=ODOMETRY_FRAMES)
-    poses = {
-        each: TransformTopic(each) if ":" in each else PoseTopic(each)
-        for each in (topics.odometry, topics.truth)
-        if each
-    }
-    transforms = [each for each in poses.values() if isinstance(each, TransformTopic)]
+    named = [each for each in (topics.odometry, topics.truth) if each]
+    transforms = {each: TransformTopic(each) for each in named if ":" in each}
+    poses: dict[str, PoseTopic] = {**{each: PoseTopic(each) for each in named}, **transforms}
+    moving = {each.topic for each in transforms.values()}
     wanted = {topic for topic in (topics.camera_info, topics.scan) if topic} | {each.topic for each in poses.values()}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     wanted.add(TF_STATIC)
@@ -56,9 +54,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     fixed, base = StaticTransforms(), ""
     for record in feed.scan(wanted):
         try:
-            if on_topic := [each for each in transforms if each.topic == record.topic]:
-                for each in on_topic:
-                    _add_transforms(feed, name, partial(each.add_message, record), record)
+            if record.topic in moving:
+                taken_by = (each for each in transforms.values() if each.topic == record.topic)
+                _add_transforms(feed, name, record, *(partial(each.add_message, record) for each in taken_by))
                 continue
             if record.topic in poses:
                 message = feed.decode(record.topic, record.data)
@@ -67,7 +65,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
                 poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name, message))
                 continue
             if record.topic == TF_STATIC:
-                _add_transforms(feed, name, fixed.add, record)
+                _add_transforms(feed, name, record, fixed.add)
                 continue
             if record.topic == topics.camera_info:
                 if not infos:
@@ -78,10 +76,10 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
             continue
         records[record.topic].append(record._replace(data=b"", log_time=min(record.log_time, MAX_STAMP)))
 
-    if odometry_in_transforms and not len(poses[ODOMETRY_FRAMES]):
+    if odometry_in_transforms and not len(transforms[ODOMETRY_FRAMES]):
         topics = replace(topics, odometry=None)
-        transforms.remove(poses.pop(ODOMETRY_FRAMES))  # type: ignore[arg-type]
-    for each in transforms:
+        del transforms[ODOMETRY_FRAMES]
+    for each in transforms.values():
         each.require(name, "truth" if each.name == topics.truth else "topics.odometry", feed.topics.get(each.topic, ""))
         base = each.child if each.name == topics.odometry else base
     image_topic = _image_topic(name, feed, topics, records)
@@ -194,13 +192,15 @@ def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
         return ""
 
 
-def _add_transforms(feed: Feed, name: str, add: Callable[[Any], None], record: Record) -> None:
+def _add_transforms(feed: Feed, name: str, record: Record, *adds: Callable[[Any], None]) -> None:
     if feed.topics.get(record.topic) not in TRANSFORMS_TYPES:
         return  # where it is needed, that is reported once the log has been gone through
-    try:
-        add(feed.decode(record.topic, record.data))
-    except (ValueError, AttributeError, TypeError) as error:  # a log may define the type otherwise
-        feed.drop("bad_message", f"{name}: a message on {record.topic}: {error}")
+    message = feed.decode(record.topic, record.data)
+    for add in adds:
+        try:
+            add(message)
+        except (ValueError, AttributeError, TypeError) as error:  # a log may define the type otherwise
+            feed.drop("bad_message", f"{name}: a message on {record.topic}: {error}")
 
 
 def _pose(feed: Feed, record: Record, name: str, message: Any) -> tuple[float, float, float]:

@@ -88,9 +88,7 @@ class GoalImage(Stage):
             raise BadInput(f"goal: no goal is named; type {place}goal=IMAGE.png{wait}")
         if self.goal == GOAL_TOPIC:
             if self.world is not None:
-                raise BadInput(
-                    f"goal: {GOAL_TOPIC} is for a live robot; type nodes.source.goals=[[x,y],…] beside a goal"
-                )
+                raise BadInput(f"goal: {GOAL_TOPIC} is for a live robot; in a simulated world type goal=IMAGE.png")
             return None
         if not str(self.goal).lower().endswith(SUFFIXES):
             if not self.places and not self._has_rooms():

@@ -55,6 +55,8 @@ def parts_of(
     `selected`: of the frames that the cuts leave. Raises `UnreadableRecording` where no frame is left.
     """
     stamps = recording.stamps
+    if truth is not None and not isinstance(recording, LiveRecording):  # whose replay has what the run had
+        truth = _without_excursions(recording, truth)
     check_cuts(cuts, len(stamps), recording.name)
     frames = thinned(remaining_frames(cuts, len(stamps))[selected], stamps, rate_hz)
     if not len(frames):
@@ -130,6 +132,21 @@ def truth_excursion(odometry: Array, truth: Array) -> tuple[int, int, float] | N
         return None
     one, other = int(first[left[0]]), int(last[left[0]])
     return int(known[one + 1]), int(known[other]), float(jumps[one])
+
+
+def _without_excursions(recording: Recording, truth: Array) -> Array:
+    """True poses (N, 3) without those of images where the truth jumps and odometry does not, which are counted."""
+    truth = truth.copy()
+    while recording.odometry is not None and (found := truth_excursion(recording.odometry, truth)) is not None:
+        first, last, metres = found
+        recording.dropped["truth_jump"] += last - first + 1
+        recording.details.setdefault(
+            "truth_jump",
+            f"{recording.name}: ground truth jumps by {metres:.1f} m, where odometry does not, and back: images "
+            f"{first} to {last}; did the tracker lose the robot?",
+        )
+        truth[first : last + 1] = np.nan
+    return truth
 
 
 def _odometry_kind(recording: Recording, truth: Array | None, guess: bool) -> OdometryKind:

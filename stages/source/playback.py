@@ -10,7 +10,6 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Source, Tick, counted, digest_file, user_path
 from omninav.pipeline.engine.code_version import module_version
-from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.plausibility import MotionLimits
@@ -21,7 +20,7 @@ from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
 from .dead_reckoning import DeadReckoning
-from .log_parts import LogPart, frozen_steps, parts_of, pauses, truth_excursion
+from .log_parts import LogPart, frozen_steps, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
@@ -198,23 +197,6 @@ class Playback(Source, ABC):
                     recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
                 )
                 self._doubts += doubts
-            if truth is not None and not isinstance(recording, LiveRecording):  # whose replay has what the run had
-                truth = _without_excursions(recording, truth)
             self._parts += parts_of(recording, truth, self.cuts, selected, self.rate_hz, self._guesses())
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
-
-
-def _without_excursions(recording: Recording, truth: Array) -> Array:
-    """True poses (N, 3) without those of images where the truth jumps and odometry does not, which are counted."""
-    truth = truth.copy()
-    while recording.odometry is not None and (found := truth_excursion(recording.odometry, truth)) is not None:
-        first, last, metres = found
-        recording.dropped["truth_jump"] += last - first + 1
-        recording.details.setdefault(
-            "truth_jump",
-            f"{recording.name}: ground truth jumps by {metres:.1f} m, where odometry does not, and back: images "
-            f"{first} to {last}; did the tracker lose the robot?",
-        )
-        truth[first : last + 1] = np.nan
-    return truth
