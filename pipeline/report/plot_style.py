@@ -16,10 +16,10 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#111111", "#8a8f98", "#E
 """Okabe & Ito's colours (2008), which colour-blind readers tell apart, dark enough on white."""
 
 SOFTWARE = "omninav"
-"""Program that a plot's file names, by which it is told from the pictures of others."""
+"""Name of the program in the file of a plot, which other programs' pictures lack."""
 
-MAX_HEAD = 200
-"""Bytes of a PNG in which its program is named."""
+HEAD_BYTES = 200
+"""Length of the beginning of a PNG that names its program, bytes."""
 
 RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same plot on every machine
@@ -70,6 +70,6 @@ def plot_file(out: str) -> Path:
     path = user_path(out)
     if path.suffix != ".png":
         raise BadInput(f"out={out:.100}: a picture is written to a file that ends in .png; type out=NAME.png")
-    if path.is_file() and f"Software\0{SOFTWARE}".encode() not in path.read_bytes()[:MAX_HEAD]:
+    if path.is_file() and f"Software\0{SOFTWARE}".encode() not in path.read_bytes()[:HEAD_BYTES]:
         raise BadInput(f"out={out:.100}: it is there, and omninav did not draw it; type another name, or delete it")
     return path

@@ -260,7 +260,8 @@ def _line(state: RoadmapPlannerState, map: ReferenceGraph, places: Ints) -> Arra
 
 
 def _route(state: RoadmapPlannerState, now: Literal["locating", "under way", "arrived", "gave up"]) -> PlannedRoute:
-    why, goal = state.why if now == "gave up" else "", GoalPoint(*state.goal[:2].tolist()) if len(state.goal) else None
+    why = state.why if now == "gave up" else ""
+    goal = GoalPoint(*state.goal[:2].tolist()) if len(state.goal) else None
     return PlannedRoute(state.places, now, state.number, why, goal, state.asked)
 
 
