@@ -17,6 +17,8 @@ from omninav.stages.values.maps import ReferenceGraph
 FROM_TOUR = "from_tour"
 CLEARANCE_M = 0.2
 """Least distance of free space from anything occupied, metres."""
+MAX_OFF = 0.1
+"""Share of a map's references outside free cells, above which a run warns that its grid may be another's."""
 PATH_HALF_WIDTH = 2.0
 """Distance from the path up to which a stand-in is free, in length scales of the appearance."""
 
@@ -79,10 +81,15 @@ class OccupancyGridLoader(Stage):
         else:
             raise BadInput(f"grid: none is named; give grid=FOLDER/map.yaml (of ROS map_server), or grid={FROM_TOUR}")
         clearance = 0.0 if grid.made_from == "tour" else CLEARANCE_M
-        space = free_space(grid, clearance, None if map is None else map.poses)
-        if space is None:
-            ctx.count("references_off_the_free_space", detail="grid: no reference is in free cells; all are kept")
-            space = free_space(grid, clearance, None)
+        poses = None if map is None else map.poses
+        if poses is not None and (off := int((~in_cells(grid, poses, grid.cells == FREE)).sum())) > MAX_OFF * len(
+            poses
+        ):
+            ctx.warn(
+                f"{off} of the map's {len(poses)} references are not in free cells of the grid: is it of this place, "
+                "and in the frame of the map's poses?"
+            )
+        space = free_space(grid, clearance, poses) or free_space(grid, clearance, None)
         if space is None:
             raise BadInput(
                 f"grid: no cell is free and {clearance:g} m from obstacles; give a grid in which a robot has room"
@@ -129,10 +136,17 @@ def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) 
         free &= grid.resolution * (gap - 0.5) >= clearance
     if references is not None:
         _, labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
-        row, column = grid.cells_of(references).T
-        inside = (row >= 0) & (row < free.shape[0]) & (column >= 0) & (column < free.shape[1])
-        free &= np.isin(labels, np.setdiff1d(labels[row[inside], column[inside]], 0))
+        row, column = grid.cells_of(references[in_cells(grid, references, free)]).T
+        free &= np.isin(labels, labels[row, column])
     return FreeSpace(grid.centres(*np.nonzero(free)), grid.resolution) if free.any() else None
+
+
+def in_cells(grid: OccupancyGrid, points: Array, chosen: Bools) -> Bools:
+    """Whether points (N, >= 2; m, map frame) are in the grid's chosen cells (rows, columns): (N,)."""
+    cells = grid.cells_of(points)
+    inside = ((cells >= 0) & (cells < chosen.shape)).all(1)
+    inside[inside] = chosen[tuple(cells[inside].T)]
+    return inside
 
 
 def along_path(poses: Array, edges: Ints, reach: float, resolution: float) -> OccupancyGrid:

@@ -200,7 +200,17 @@ def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_pa
     written(tmp_path, [[254] * 4] * 4)
     out = OccupancyGridLoader(grid=str(tmp_path), resolution_m=0.5).step(ctx, map=a_map((50.0, 50.0)))
     assert len(out.free.centres) == 16
-    assert ctx.counts["references_off_the_free_space"] == 1
+    assert "1 of the map's 1 references are not in free cells" in ctx.warnings[0]
+
+
+@pytest.mark.parametrize(("off", "warned"), [(1, []), (2, ["2 of the map's 10 references are not in free cells"])])
+def test_a_grid_in_whose_free_cells_a_map_does_not_lie_is_told_of(tmp_path, monkeypatch, off, warned):
+    monkeypatch.setattr("omninav.stages.source.occupancy_grid_loader.CLEARANCE_M", 0.0)
+    ctx = Context("grid")
+    written(tmp_path, [[254, 254, 0, 205]])
+    places = [(-0.75, 2.25)] * (10 - off) + [(0.25, 2.25), (0.75, 2.25)][:off]
+    OccupancyGridLoader(grid=str(tmp_path), resolution_m=0.5).step(ctx, map=a_map(*places))
+    assert [warning.partition(" of the grid")[0] for warning in ctx.warnings] == warned
 
 
 @needs_data
