@@ -1,6 +1,6 @@
 """Python values as arguments of a command."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from omninav.pipeline.cli.arguments import value_text
@@ -10,12 +10,13 @@ from omninav.pipeline.graph.problems import BadInput, shown
 def arguments_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
     """Words as they would be typed: `"omniview_mcl", seed=3` is `variant=omniview_mcl seed=3`.
 
-    A first word without `=` is a variant's name. Raises `BadInput` for a value that no word can hold.
+    A first word without `=` is a variant's name; a dictionary's keys are names below its own, as in
+    `nodes={"match": {"headings": 72}}`. Raises `BadInput` for a value that no word can hold.
     """
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
         typed[0] = f"variant={typed[0]}"
-    return [*typed, *(setting_argument(name, value) for name, value in settings.items())]
+    return [*typed, *(setting_argument(name, value) for name, value in _flattened(settings))]
 
 
 def setting_argument(name: str, value: Any) -> str:
@@ -24,6 +25,14 @@ def setting_argument(name: str, value: Any) -> str:
         return f"{name}={value_text(value)}"
     except BadInput as refused:
         raise BadInput(f"{name}: {refused}") from None
+
+
+def _flattened(settings: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in settings.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flattened(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def _checked(word: Any) -> str:

@@ -20,6 +20,7 @@ from omninav.pipeline.run.prepared_run import PreparedRun
 from omninav.pipeline.run.resume import reopened
 from omninav.pipeline.run.run_folder import STEPS, RunFolder, start
 
+from .arguments import arguments_of
 from .configuration import Configuration, configured
 from .plain_errors import plain_errors
 from .read_only import read_only
@@ -203,9 +204,10 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
     Words and settings are those of `compose`, or a configuration comes first. `folder`: where the run's files are left;
     None: a new one in `runs`. Raises `BadInput` where the variant is no session, or a setting is not one of sessions.
     """
-    typed = [each for word in words for each in (word.words if isinstance(word, Configuration) else (word,))]
+    given = [each for word in words for each in (word.words if isinstance(word, Configuration) else (word,))]
+    typed = arguments_of(tuple(given), settings)
     pushed = PUSHED in typed or "source" in settings
-    names = {word.partition("=")[0] for word in typed} | set(settings)
+    names = {word.partition("=")[0] for word in typed}
     for name, instead in NOT_PUSHED.items():
         if name in names:
             raise BadInput(f"{name}=…: {instead}")

@@ -144,7 +144,7 @@ def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) 
 def in_cells(grid: OccupancyGrid, points: Array, chosen: Bools) -> Bools:
     """Whether points (N, >= 2; m, map frame) are in the grid's chosen cells (rows, columns): (N,)."""
     cells = grid.cells_of(points)
-    inside = ((cells >= 0) & (cells < chosen.shape)).all(1)
+    inside: Bools = ((cells >= 0) & (cells < chosen.shape)).all(1)
     inside[inside] = chosen[tuple(cells[inside].T)]
     return inside
 

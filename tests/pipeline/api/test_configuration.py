@@ -29,6 +29,7 @@ def test_python_values_become_the_words_that_one_would_type():
         "grid": None,
         "validate": True,
         "cuts": [[1, np.float64(2.5)]],
+        "nodes": {"match": {"headings": 72}},
     }
     assert arguments_of(("omniview_mcl", "match=l2"), settings) == [
         "variant=omniview_mcl",
@@ -38,6 +39,7 @@ def test_python_values_become_the_words_that_one_would_type():
         "grid=null",
         "validate=true",
         "cuts=[[1,2.5]]",
+        "nodes.match.headings=72",
     ]
     with pytest.raises(omninav.BadInput, match="a ndarray cannot be a setting"):
         arguments_of((), {"map": np.zeros(3)})
