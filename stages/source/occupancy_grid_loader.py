@@ -142,10 +142,10 @@ def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) 
 
 
 def in_cells(grid: OccupancyGrid, points: Array, chosen: Bools) -> Bools:
-    """Whether points (N, >= 2; m, map frame) are in the grid's chosen cells (rows, columns): (N,)."""
-    cells = grid.cells_of(points)
-    inside: Bools = ((cells >= 0) & (cells < chosen.shape)).all(1)
-    inside[inside] = chosen[tuple(cells[inside].T)]
+    """Tells which points (N, >= 2; m, map frame) are in the grid's chosen cells (rows, columns): (N,)."""
+    row, column = grid.cells_of(points).T
+    inside: Bools = (row >= 0) & (row < chosen.shape[0]) & (column >= 0) & (column < chosen.shape[1])
+    inside[inside] = chosen[row[inside], column[inside]]
     return inside
 
 
