@@ -102,7 +102,8 @@ class FollowHoming(Stage):
         if not self._approaches(vector, lost_s, sought_s):
             if wander is not None and lost_s >= WANDER_AFTER_S:
                 ctx.count("wandered_lost")
-                return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
+                command = Command(min(wander.speed, self.max_speed), wander.turning)
+                return self.Out(command=command, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
             ctx.count("stood_lost")
             return self._stand("lost", vector.why)
         moving = DrivingStatus("driving")

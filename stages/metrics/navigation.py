@@ -111,7 +111,7 @@ class Navigation(MetricStage):
             "routes": last.number - (former.number if former else -1),
             "goal": goal,
             "state": last.state,
-            "reason": last.why,
+            "reason": last.why or None,
         }
         if map.pose_source == "truth":
             of_goals = goals_reached(drive, routes, map)

@@ -145,7 +145,13 @@ class ClosedLoop(Source):
                 simulation.asked += 1
             else:
                 simulation.ended += 1
-        if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
+        over = simulation.ticks >= int(self.seconds * self.rate_hz)
+        if over and simulation.ended == 0 and (route is not None or progress is not None):
+            ctx.warn(
+                f"The time is over after {self.seconds:g} s, and the robot was still under way; "
+                "nodes.source.seconds=… gives it more."
+            )
+        if over or simulation.ended > self.rest_s * self.rate_hz:
             return None
         motion = None
         if simulation.ticks == 0:

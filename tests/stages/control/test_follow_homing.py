@@ -163,6 +163,13 @@ def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
     assert robot.drive(vector(), progress(), scan()).status.state == "driving"
 
 
+def test_who_wanders_keeps_to_the_robots_largest_speed() -> None:
+    robot = Robot(wanders=True, max_speed=0.05)
+    said = [robot.drive(lost(), progress(), scan()) for _ in range(30)]
+    assert said[29].status.why.startswith("it wanders")
+    assert said[29].command.speed == 0.05
+
+
 def test_towards_a_doubtful_target_it_goes_slowly_for_a_while_and_again_as_it_wanders() -> None:
     robot = Robot(wanders=True)
     doubtful = vector(state="doubtful", why="8 of 20 matches agree")

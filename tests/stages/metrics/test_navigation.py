@@ -53,7 +53,7 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
         "goal": 2,
         "routes": 1,
         "state": "arrived",
-        "reason": "",
+        "reason": None,
     }
 
 
@@ -80,7 +80,7 @@ def test_who_stands_elsewhere_or_does_not_know_that_it_is_there_has_not_reached_
     assert not found["reached"]
     assert (found["reached_rate"], found["collision_free_rate"]) == (0.0, 0.0)
     assert "path_length_ratio" not in found
-    assert found["reason"] == ("tired" if state == "gave up" else "")
+    assert found["reason"] == ("tired" if state == "gave up" else None)
 
 
 def test_who_bumped_into_something_reached_it_but_not_cleanly():

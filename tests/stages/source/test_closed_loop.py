@@ -88,6 +88,14 @@ def test_a_way_that_has_ended_ends_the_drive_a_moment_later(going, ended):
     loop = Loop(seconds=20.0, rest_s=1.0)
     outs = [loop.step(None, *way) for way in [[], *[going] * 5, *[ended] * 9]]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
+    assert loop.ctx.warnings == []
+
+
+@pytest.mark.parametrize("going", [[], [route("under way")], [None, PathProgress(0, 1, 2, 1, True, False, False)]])
+def test_a_drive_whose_time_is_over_on_its_way_warns(going):
+    loop = Loop(seconds=1.0)
+    assert [loop.step(None, *going) is not None for _ in range(6)] == [True] * 5 + [False]
+    assert [warning.startswith("The time is over after 1 s") for warning in loop.ctx.warnings] == [True] * bool(going)
 
 
 def test_it_is_sent_on_from_goal_to_goal_and_ends_after_the_last():
