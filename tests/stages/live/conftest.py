@@ -33,7 +33,7 @@ from omninav.stages.source.log import LogSource
 CAMERA = ROOT / "tests/data/camera.yaml"
 IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odom", "/ground_truth/pose"
 ROS2_PYTHON = Path(os.environ.get("OMNINAV_ROS2_PYTHON", ROOT / ".venv-ros2/bin/python"))
-WAIT_S = 60.0
+WAIT_S = 180.0
 """Until what does not happen has failed: a busy machine is slow."""
 _DOMAINS = itertools.count(10 + (os.getpid() * 7) % 80)
 """A domain for each test, so that neither tests nor a robot in the room hear each other."""
