@@ -43,7 +43,7 @@ class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given.
+    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given. `commands`: so many came.
     """
 
     robot: Array = field(default_factory=lambda: np.zeros(0))
@@ -53,6 +53,7 @@ class ClosedLoopState(State):
     ticks: int = 0
     ended: int = 0
     asked: int = 0
+    commands: int = 0
 
 
 class ClosedLoop(Source):
@@ -106,6 +107,10 @@ class ClosedLoop(Source):
         """Build the world; the bodies in it are looked up by place."""
         if self.goals and not ctx.is_read("goal"):
             raise BadInput("nodes.source.goals: this variant drives to no points; leave them out")
+        if self.carried_m and self.start != "drawn":
+            raise BadInput("nodes.source.carried_m: only a robot with a drawn start is carried; add start=drawn")
+        if self.start is None and self.route in self.world.routes and self.world.routes[self.route].kidnappings:
+            ctx.warn(f"The kidnappings of the route '{self.route}' are for logs of it; here kidnappings=… states them.")
         world = World(self.world, self.day)
         self._world, self._scene = world, world.scene
         self._room = gather(box_array(world.obstacles), world.config.size, reach(self.world.robot))
@@ -145,13 +150,9 @@ class ClosedLoop(Source):
                 simulation.asked += 1
             else:
                 simulation.ended += 1
-        over = simulation.ticks >= int(self.seconds * self.rate_hz)
-        if over and simulation.ended == 0 and (route is not None or progress is not None):
-            ctx.warn(
-                f"The time is over after {self.seconds:g} s, and the robot was still under way; "
-                "nodes.source.seconds=… gives it more."
-            )
-        if over or simulation.ended > self.rest_s * self.rate_hz:
+        simulation.commands += command is not None
+        if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
+            self._warn_at_end(ctx, simulation, route is not None or progress is not None)
             return None
         motion = None
         if simulation.ticks == 0:
@@ -161,6 +162,19 @@ class ClosedLoop(Source):
         out = self._perceive(ctx, simulation, motion, goal)
         simulation.ticks += 1
         return out
+
+    def _warn_at_end(self, ctx: Context, simulation: ClosedLoopState, has_goal: bool) -> None:
+        seconds = simulation.ticks / self.rate_hz
+        if has_goal and simulation.ended == 0:
+            ctx.warn(
+                f"The time is over after {seconds:g} s, and the robot was still under way; "
+                "nodes.source.seconds=… gives it more."
+            )
+        if simulation.commands == 0:
+            ctx.warn(f"No command came in {seconds:g} s, and the robot stood: does its controller give a `command`?")
+        late = [f"{each.at:g}" for each in self._kidnappings if each.at > (simulation.ticks - 1) / self.rate_hz]
+        if late:
+            ctx.warn(f"The drive ended after {seconds:g} s: the robot was not carried at {', '.join(late)} s.")
 
     def _drive(self, ctx: Context, simulation: ClosedLoopState, command: Command) -> Motion:
         """One tick under a command, and what the wheels measure of it."""

@@ -86,16 +86,18 @@ def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
 )
 def test_a_way_that_has_ended_ends_the_drive_a_moment_later(going, ended):
     loop = Loop(seconds=20.0, rest_s=1.0)
-    outs = [loop.step(None, *way) for way in [[], *[going] * 5, *[ended] * 9]]
+    outs = [loop.step(Command(0.0, 0.0), *way) for way in [[], *[going] * 5, *[ended] * 9]]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
     assert loop.ctx.warnings == []
 
 
+@pytest.mark.parametrize("command", [None, Command(0.0, 0.0)])
 @pytest.mark.parametrize("going", [[], [route("under way")], [None, PathProgress(0, 1, 2, 1, True, False, False)]])
-def test_a_drive_whose_time_is_over_on_its_way_warns(going):
+def test_a_drive_whose_time_is_over_on_its_way_warns_and_one_without_commands(going, command):
     loop = Loop(seconds=1.0)
-    assert [loop.step(None, *going) is not None for _ in range(6)] == [True] * 5 + [False]
-    assert [warning.startswith("The time is over after 1 s") for warning in loop.ctx.warnings] == [True] * bool(going)
+    assert [loop.step(command, *going) is not None for _ in range(6)] == [True] * 5 + [False]
+    told = ["The time is over after 1 s"] * bool(going) + ["No command came in 1 s"] * (command is None)
+    assert [warning.partition(", and ")[0] for warning in loop.ctx.warnings] == told
 
 
 def test_it_is_sent_on_from_goal_to_goal_and_ends_after_the_last():
@@ -153,6 +155,17 @@ def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
     after = loop.drive(Command(0.2, 0.0), 6)[5]
     assert after.truth.x == 9.5
     assert abs(after.motion.x) < 0.05
+
+
+def test_kidnappings_that_do_not_happen_are_told_of():
+    loop = Loop(seconds=1.0, kidnappings=(Kidnapping(at=0.8, turn=1.0), Kidnapping(at=0.9, turn=1.0)))
+    loop.drive(Command(0.2, 0.0))
+    assert loop.ctx.warnings == ["The drive ended after 1 s: the robot was not carried at 0.9 s."]
+    carried = replace(EXACT.routes["drive"], kidnappings=(Kidnapping(at=0.4, turn=1.0),))
+    loop = Loop(world=replace(EXACT, routes={**EXACT.routes, "drive": carried}))
+    assert loop.ctx.warnings[0].startswith("The kidnappings of the route 'drive' are for logs of it")
+    with pytest.raises(BadInput, match="only a robot with a drawn start is carried"):
+        Loop(carried_m=1.0)
 
 
 def test_it_is_put_down_anywhere_every_so_many_metres_and_elsewhere_for_each_seed():
