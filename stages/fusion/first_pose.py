@@ -23,7 +23,7 @@ def first_pose(at: KnownStart, truth: Pose | None, sigmas: tuple[float, float] =
         x, y, heading, metres, radians = 0.0, 0.0, 0.0, *sigmas
     elif at == "truth":
         if truth is None:
-            raise BadInput("start: this log has no true pose at its first image; use start=uniform")
+            raise BadInput("start: no true pose is known at the first image here; use start=uniform")
         x, y, heading, metres, radians = truth.x, truth.y, truth.heading, *sigmas
     else:
         x, y, heading, metres, radians = at

@@ -62,11 +62,11 @@ class Publisher:
 class Publish(Publisher, Stage):
     """Publishes the pose, `map -> odom` and the command over ROS 2, before anything that can wait.
 
-    The command is published as it was computed in this tick, zero where there was none, once more zero when the run
-    ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
-    published; one whose type the transport does not have is left out and reported in diagnostics, as are inputs that do
-    not fit each other, for as long as they do not. A robot that searches or is lost has no pose: none is published, and
-    with the old transform a navigation stack stops.
+    The command is published as it was computed in this tick, within the robot's limits; zero where there was none, once
+    more zero when the run ends, and by a watchdog thread when no tick has ended within two periods. A topic whose
+    parameter is null is not published; one whose type the transport does not have is left out and reported in
+    diagnostics, as are inputs that do not fit each other, for as long as they do not. A robot that searches or is lost
+    has no pose: none is published, and with the old transform a navigation stack stops.
     """
 
     pose: str | None = "/estimate/pose"
@@ -88,6 +88,10 @@ class Publish(Publisher, Stage):
     """Topic on which the robot takes commands."""
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
     """As Nav2 has them since Kilted, or without a header."""
+    max_speed: Annotated[float, Bounds(gt=0)] = 0.4
+    """Greatest speed that is commanded (m/s), whatever a controller asks for."""
+    max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
+    """Greatest turning speed that is commanded, rad/s."""
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
@@ -110,7 +114,7 @@ class Publish(Publisher, Stage):
         if not self._transport.status.live:
             return
         if self.command is not None and (command is not None or self._watchdog is not None):
-            self._drive(tick.stamp, command or Command(0.0, 0.0))
+            self._drive(tick.stamp, self._limited(ctx, command or Command(0.0, 0.0)))
         if estimate is not None:
             self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
         if confidence is not None:
@@ -133,6 +137,14 @@ class Publish(Publisher, Stage):
             until = stamp + round(self.tf_tolerance_s * 1e9)
             correction = compose(at, between(pose_row(odometry), np.zeros(3)))
             self._send(self.tf, TF, {"transforms": [transform(until, self.map_frame, self.odom_frame, correction)]})
+
+    def _limited(self, ctx: Context, command: Command) -> Command:
+        speed = max(-self.max_speed, min(self.max_speed, command.speed))
+        turning = max(-self.max_angular_speed, min(self.max_angular_speed, command.turning))
+        if (speed, turning) != (command.speed, command.turning):
+            asked = f"{command.speed:g} m/s and {command.turning:g} rad/s"
+            ctx.count("limited_command", detail=f"{asked} exceed robot.max_speed or robot.max_angular_speed")
+        return Command(speed, turning)
 
     def _drive(self, stamp: int, command: Command) -> None:
         if self._watchdog is None:

@@ -13,7 +13,9 @@ MIN_SPEED = 0.03
 SPECS = {
     "drive.collisions": MetricSpec(title="Collisions", better="lower", most=0.0),
     "drive.distance_m": MetricSpec(title="Distance driven", context=True),
-    "drive.stopped_share": MetricSpec(title="Time standing or turning on the spot between moves", unit="%", better="lower"),
+    "drive.stopped_share": MetricSpec(
+        title="Time standing or turning on the spot between moves", unit="%", better="lower"
+    ),
     "drive.duration_s": MetricSpec(title="Duration", context=True),
 }
 

@@ -290,5 +290,5 @@ def goal_poses(
             agree += f"; {fix.inliers[1]} on another place"
     raise BadInput(
         f"goal: the map's landmarks do not tell where {goal} was taken: it shows {seen} features, and {agree}; "
-        "give an image from closer to where the map was made"
+        "give an image from closer to where the map was made, or the map of that place"
     )

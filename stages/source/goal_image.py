@@ -100,7 +100,10 @@ class GoalImage(Stage):
             return None
         file = Path(str(self.goal))
         if not file.is_file():
-            raise BadInput(f"goal: there is no file {file}; give an image, or a place's number or name")
+            other = (
+                ", or a place's number or name" if self.places else ", or a room's name" if self._has_rooms() else ""
+            )
+            raise BadInput(f"goal: there is no file {file}; give an image{other}")
         return file
 
     def _has_rooms(self) -> bool:

@@ -15,7 +15,7 @@ WRONG = {
     "no true pose to start at": (
         {"map": RECORDINGS / "references_format_1.omap", "nodes.features.segments": 10, "start": "truth",
          "topics.truth": None},
-        "start: this log has no true pose at its first image",
+        "start: no true pose is known at the first image here",
     ),
     "no network": ({"tour": TOUR, "features": "onnx", "model": "/etc/passwd"}, "/etc/passwd: this is no network"),
 }  # fmt: skip

@@ -33,6 +33,11 @@ def test_frames_and_domain_reach_all_nodes_that_speak_to_the_robot() -> None:
     assert [nodes["publish"][name] for name in ("map_frame", "odom_frame", "base_frame")] == ["map", "wheels", "base"]
 
 
+def test_the_robots_limits_reach_what_publishes_commands() -> None:
+    publish = nodes_of(*LIVE, "robot.max_speed=0.3", "robot.max_angular_speed=0.5")["publish"]
+    assert (publish["max_speed"], publish["max_angular_speed"]) == (0.3, 0.5)
+
+
 def test_the_confidence_and_its_calibration_have_one_tolerance() -> None:
     nodes = nodes_of("omniview_mcl", "tolerance.metres=0.3", "tolerance.degrees=20")
     for name in ("monitor", "wrong_pose_agreement", "calibration"):

@@ -13,6 +13,7 @@ from omninav.pipeline.mcap.message_types import standard_types
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.live.publish import Publish
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
@@ -93,6 +94,18 @@ def test_why_a_goal_was_given_up_is_noted_until_the_next_one(wire: Wire):
     for state, why in (("gave up", "no path leads to the goal"), ("under way", "")):
         stage.step(ctx, Tick(0, 0), route=PlannedRoute(np.zeros(0, np.int64), state, 0, why))
         assert wire.status.troubles.get("route", "") == (why and f"the goal was given up: {why}")
+
+
+def test_no_command_exceeds_the_limits_of_the_robot_whatever_its_controller_asks_for(wire: Wire):
+    stage, ctx = Publish(command_type="Twist", max_speed=0.3, max_angular_speed=0.5), Context("publish")
+    stage.setup(ctx)
+    for speed, turning in ((0.2, -0.4), (300.0, -2.0), (-1.0, 0.0)):
+        stage.step(ctx, Tick(0, 0), command=Command(speed, turning))
+    sent = [(message.linear.x, message.angular.z) for message in wire.on("/cmd_vel")]
+    assert sent == [(0.2, -0.4), (0.3, -0.5), (-0.3, 0.0)]
+    assert ctx.counts["limited_command"] == 2
+    for farewell in wire.farewells:
+        farewell()
 
 
 @pytest.mark.parametrize(("taken", "begins_anew"), [("mode", False), ("mean", False), ("mode", True)])
