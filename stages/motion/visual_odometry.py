@@ -8,8 +8,7 @@ import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
-from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
-from omninav.stages.geometry.landmarks.map_making import LocalViews
+from omninav.stages.geometry.arrays import Array, Bytes
 from omninav.stages.geometry.landmarks.visual_odometry import STILL, Keyframes, begun, extended, is_keyframe, tracked
 from omninav.stages.geometry.plane.mount import camera_poses, robot_step
 from omninav.stages.geometry.plane.se2 import between, compose
@@ -36,7 +35,7 @@ UNSCALED_KEYFRAMES = 30
 
 
 class VisualOdometryState(State):
-    """The last keyframes (see `Keyframes`), in a frame of their own, and where the last image was taken in it (3,).
+    """The last keyframes, in a frame of their own, and where the last image was taken in it (3,).
 
     `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: length
     seen over length guessed, of late. `scales` (N,): estimates of what lengths are to be multiplied by, and
@@ -45,12 +44,9 @@ class VisualOdometryState(State):
     motion; `unscaled`: keyframes without scale.
     """
 
-    poses: Array = field(default_factory=lambda: np.empty((0, 3)))
-    starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
-    bearings: Array = field(default_factory=lambda: np.empty((0, 3)))
-    descriptors: Bytes = field(default_factory=lambda: np.empty((0, 0), np.uint8))
-    points: Array = field(default_factory=lambda: np.empty((0, 3)))
-    looks: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    keyframes: Keyframes = field(
+        default_factory=lambda: begun(np.zeros(3), np.empty((0, 3)), np.empty((0, 0), np.uint8))
+    )
     pose: Array = field(default_factory=lambda: np.zeros(3))
     odometry: Array = field(default_factory=lambda: np.zeros(3))
     length: float = 0.0
@@ -62,16 +58,6 @@ class VisualOdometryState(State):
     lost: int = 0
     seen: int = 0
     unscaled: int = 0
-
-    @property
-    def keyframes(self) -> Keyframes:
-        """The last keyframes."""
-        return Keyframes(self.poses, LocalViews(self.starts, self.bearings, self.descriptors), self.points, self.looks)
-
-    @keyframes.setter
-    def keyframes(self, new: Keyframes) -> None:
-        self.poses, (self.starts, self.bearings, self.descriptors), self.points, self.looks = new
-        self.length = 0.0
 
 
 class VisualOdometry(Stage):
@@ -124,20 +110,21 @@ class VisualOdometry(Stage):
             lost, state.lost, state.seen, state.pose = state.lost, 0, state.seen + 1, found.pose
             unit = 1.0 if found.scaled else state.speed_ratio * state.length
             if not found.scaled:
-                away = unit * (found.pose[:2] - state.poses[-1, :2])
-                stood = state.poses[-1, :2] if lost else before[:2]
-                state.pose[:2] = state.poses[-1, :2] + away if away.any() else stood
+                last = state.keyframes.poses[-1, :2]
+                away = unit * (found.pose[:2] - last)
+                stood = last if lost else before[:2]
+                state.pose[:2] = last + away if away.any() else stood
                 unit = unit if away.any() else usual
             known = found.scaled and len(state.scales) > 0
             if is_keyframe(found):
                 keyframes, depth = extended(state.keyframes, state.pose, features.bearings, descriptors)
-                state.keyframes, state.pose = keyframes, keyframes.poses[-1].copy()
+                state.keyframes, state.pose, state.length = keyframes, keyframes.poses[-1].copy(), 0.0
                 if depth is not None and camera.height and not state.by_map:
                     state.scales = np.append(state.scales, camera.height / depth)[-ESTIMATES:]
                 by = _rescale(state)
                 before, unit = before * by, unit * by[0]
                 self._say_scale(ctx, state)
-            elif not len(state.points) and found.parallax < STILL:
+            elif not len(state.keyframes.points) and found.parallax < STILL:
                 state.length = 0.0  # lengths begin where the camera moves off
             x, y, turn = robot_step(between(before, state.pose), camera.arm).tolist()
             length = math.hypot(x, y)
@@ -170,7 +157,7 @@ class VisualOdometry(Stage):
             seen = AssumedMotion(x, y, guess.turn, max(usual, guess.sigma_m), guess.sigma_turn)
         state.pose, state.anchor = compose(state.pose, (seen.x, seen.y, seen.turn)), None
         if state.lost >= MAX_LOST:
-            state.keyframes = begun(state.pose, bearings, descriptors)
+            state.keyframes, state.length = begun(state.pose, bearings, descriptors), 0.0
             state.scales, state.map_scales, state.by_map = np.empty(0), np.empty(0), False
         return seen
 
@@ -190,8 +177,7 @@ class VisualOdometry(Stage):
 
 
 def _begin(state: VisualOdometryState, odometry: Pose | None, bearings: Array, descriptors: Bytes) -> None:
-    fresh = VisualOdometryState()
-    vars(state).update(vars(fresh))
+    vars(state).update(vars(VisualOdometryState()))
     if odometry is not None:
         state.odometry = np.array([odometry.x, odometry.y, odometry.heading])
     state.keyframes = begun(state.pose, bearings, descriptors)
@@ -223,9 +209,7 @@ def _rescale(state: VisualOdometryState) -> Array:
     """Bring the keyframes to the scale that most estimates agree on. Returns what poses (3,) are multiplied by."""
     factor = float(np.median(state.scales)) if len(state.scales) else 1.0
     state.scales, state.map_scales = state.scales / factor, state.map_scales / factor
-    length = state.length
-    state.keyframes = state.keyframes.scaled(factor)
-    state.length, by = length, np.array([factor, factor, 1.0])
+    state.keyframes, by = state.keyframes.scaled(factor), np.array([factor, factor, 1.0])
     state.pose, state.speed_ratio = state.pose * by, state.speed_ratio * factor
     if state.anchor is not None:
         state.anchor = state.anchor * [[factor], [1.0]]

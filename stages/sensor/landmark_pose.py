@@ -58,24 +58,11 @@ WITHOUT_LANDMARKS = (
 
 
 class LandmarkPoseState(State):
-    """Stamp of the last image (ns), and the fields of `jitter`; `told`: whether the run reported it."""
+    """Stamp of the last image (ns), and likelihoods of how much stamps jitter; `told`: whether the run reported it."""
 
     stamp: int = 0
-    pose: Array = field(default_factory=lambda: StampJitter.unknown().pose)
-    covariance: Array = field(default_factory=lambda: StampJitter.unknown().covariance)
-    velocity: Array = field(default_factory=lambda: StampJitter.unknown().velocity)
-    along: Array = field(default_factory=lambda: StampJitter.unknown().along)
-    hypotheses: Array = field(default_factory=lambda: StampJitter.unknown().hypotheses)
+    jitter: StampJitter = field(default_factory=StampJitter.unknown)
     told: bool = False
-
-    @property
-    def jitter(self) -> StampJitter:
-        """Likelihoods of how much stamps jitter."""
-        return StampJitter(self.pose, self.covariance, self.velocity, self.along, self.hypotheses)
-
-    @jitter.setter
-    def jitter(self, new: StampJitter) -> None:
-        self.pose, self.covariance, self.velocity, self.along, self.hypotheses = new
 
 
 class LandmarkPose(Stage):
@@ -215,8 +202,7 @@ def agreeing(poses: list[BearingPose]) -> npt.NDArray[np.int8]:
 def covariance_of(pose: BearingPose, sigma: float, factor: float) -> Array:
     """Covariance (3, 3) of a pose from bearings of this standard deviation (rad), times the map's variance factor."""
     variance = factor * max(sigma, pose.sigma) ** 2
-    covariance: Array = variance * pose.covariance + np.diag(np.square(SIGMA_FLOOR))
-    return covariance
+    return np.asarray(variance * pose.covariance + np.diag(np.square(SIGMA_FLOOR)))
 
 
 def sectors_of(bearings: Array) -> int:
@@ -230,5 +216,4 @@ def probabilities_of(sectors: Ints) -> Array:
     The odds grow by `ODDS_PER_SECTOR` (nats) with each sector, and are even at `EVEN_SECTORS`.
     """
     odds = np.exp(np.minimum(ODDS_PER_SECTOR * (sectors - EVEN_SECTORS), MAX_LOG_ODDS))
-    probabilities: Array = odds / (1.0 + odds.sum())
-    return probabilities
+    return np.asarray(odds / (1.0 + odds.sum()))

@@ -1,9 +1,10 @@
 """Jitter of image stamps: the errors that each has by itself, beside a delay that all share."""
 
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
+from omninav.pipeline import Value
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import compose, turned, wrap
 
@@ -25,7 +26,7 @@ MAX_SQUARE = 16.0
 """Largest squared residual, in its variance, that counts: beyond, a motion is wrong."""
 
 
-class StampJitter(NamedTuple):
+class StampJitter(Value):
     """Likelihoods of standard deviations of stamps, by consecutive images whose poses were measured one by one.
 
     `pose` (3,), `covariance` (3, 3): of the last image, NaN where it has none. `velocity` (3,): of the last motion, in
@@ -48,7 +49,7 @@ class StampJitter(NamedTuple):
 
     def interrupted(self) -> "StampJitter":
         """Gives them after an image without a sure pose."""
-        return self._replace(pose=np.full(3, np.nan), along=np.full(3, np.nan))
+        return replace(self, pose=np.full(3, np.nan), along=np.full(3, np.nan))
 
     def seen(self, pose: Array, covariance: Array, moved: Array, seconds: float) -> "StampJitter":
         """Gives them after an image with `pose` (3,) and `covariance` (3, 3); `moved` (3,): by odometry since the last.
@@ -57,7 +58,7 @@ class StampJitter(NamedTuple):
         one of them with opposite signs, as they share the error of a pose, whose covariance is known, and none of
         odometry. Their likelihood is that of a Gaussian sequence in which neighbours are correlated.
         """
-        new = self._replace(pose=pose, covariance=covariance, along=np.full(3, np.nan))
+        new = replace(self, pose=pose, covariance=covariance, along=np.full(3, np.nan))
         if np.isnan(self.pose[0]) or abs(moved[2]) > MAX_TURN or seconds > MAX_APART_S:
             return new
         missed = pose - compose(self.pose, moved)
@@ -82,7 +83,7 @@ class StampJitter(NamedTuple):
             variance = variance - gain**2 * spread
             off = off - gain * residual
         likelihood = FORGOTTEN * past - 0.5 * (np.log(variance) + np.minimum(off**2 / variance, MAX_SQUARE))
-        return new._replace(velocity=velocity, along=along, hypotheses=np.stack([likelihood, off, variance]))
+        return replace(new, velocity=velocity, along=along, hypotheses=np.stack([likelihood, off, variance]))
 
     def variance(self) -> float:
         """Expected variance of a stamp's error, s²; 0 as long as it is not `SHOWN`."""

@@ -1,13 +1,15 @@
 """Motion from image to image by the bearings of points that the last keyframes have triangulated."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from omninav.pipeline import Value
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
-from omninav.stages.geometry.arrays import Array, Bytes, Floats
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
 from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
 
@@ -34,20 +36,28 @@ KEYFRAME_PARALLAX = math.radians(3.0)
 """The same from which an image becomes a keyframe (rad)."""
 
 
-class Keyframes(NamedTuple):
-    """The last keyframes of a drive: `poses` (K, 3) in a frame of their own (m, m, rad), and `views`, their features.
+class Keyframes(Value):
+    """The last keyframes of a drive: `poses` (K, 3) in a frame of their own (m, m, rad), and their features.
 
-    `points` (L, 3): that they have triangulated, in that frame, with their mean `descriptors` (L, D).
+    `starts` (K + 1,), `bearings` (F, 3), `patches` (F, D): fields of `views`. `points` (L, 3): that they have
+    triangulated, in that frame, with their mean `descriptors` (L, D).
     """
 
     poses: Array
-    views: LocalViews
+    starts: Ints
+    bearings: Array
+    patches: Bytes
     points: Array
     descriptors: Floats
 
+    @property
+    def views(self) -> LocalViews:
+        """The features."""
+        return LocalViews(self.starts, self.bearings, self.patches)
+
     def scaled(self, factor: float) -> "Keyframes":
         """All lengths times a factor."""
-        return Keyframes(self.poses * [factor, factor, 1.0], self.views, factor * self.points, self.descriptors)
+        return replace(self, poses=self.poses * [factor, factor, 1.0], points=factor * self.points)
 
 
 class Tracked(NamedTuple):
@@ -66,8 +76,8 @@ class Tracked(NamedTuple):
 
 def begun(pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
     """One keyframe, of whose points nothing is known."""
-    views = LocalViews(np.array([0, len(bearings)]), bearings, descriptors)
-    return Keyframes(pose[None], views, np.empty((0, 3)), np.empty((0, descriptors.shape[1]), np.float32))
+    starts, unknown = np.array([0, len(bearings)]), np.empty((0, descriptors.shape[1]), np.float32)
+    return Keyframes(pose[None], starts, bearings, descriptors, np.empty((0, 3)), unknown)
 
 
 def tracked(keyframes: Keyframes, bearings: Array, descriptors: Bytes, rng: np.random.Generator) -> Tracked | None:
@@ -157,4 +167,4 @@ def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: By
     found = adjusted(poses, seen.points, owners, seen.landmarks, views.bearings[seen.features], SIGMA, held)
     right = np.bincount(seen.landmarks[found.inliers], minlength=len(seen.points)) > 1
     depth = lowest_plane(found.points, found.poses, owners, seen.landmarks)
-    return Keyframes(found.poses, views, found.points[right], mean_descriptors(views, seen)[right]), depth
+    return Keyframes(found.poses, *views, found.points[right], mean_descriptors(views, seen)[right]), depth

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
@@ -82,7 +84,7 @@ def test_the_variance_is_what_the_likelihoods_expect() -> None:
     assert unknown.variance() == 0.0
     likelihood = np.full(unknown.hypotheses.shape, -50.0)
     likelihood[0, 3] = 0.0
-    assert StampJitter(*unknown[:-1], likelihood).variance() == pytest.approx(JITTERS_S[3] ** 2)
+    assert replace(unknown, hypotheses=likelihood).variance() == pytest.approx(JITTERS_S[3] ** 2)
 
 
 def test_velocities_are_turned_into_the_map() -> None:
@@ -155,7 +157,7 @@ def test_the_velocity_is_that_of_the_middle_of_a_turning_motion() -> None:
 def test_jitter_counts_from_a_fifth_of_probability_on(odds: float, share: float) -> None:
     likelihood = np.full(StampJitter.unknown().hypotheses.shape, -50.0)
     likelihood[0, 0, 2], likelihood[0, 5, 3] = 3.0, 3.0 + np.log(odds)
-    found = StampJitter(*StampJitter.unknown()[:-1], likelihood).variance()
+    found = replace(StampJitter.unknown(), hypotheses=likelihood).variance()
     assert found == pytest.approx(share * 0.02**2, rel=1e-6)
 
 
