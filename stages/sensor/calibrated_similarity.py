@@ -32,19 +32,20 @@ def likelihood_ratios(similarities: Similarities, calibration: SimilarityCalibra
 
 
 def novelty_and_kidnapping(
-    similarities: Similarities, calibration: SimilarityCalibration, motion: Motion | None, independence_distance: float
+    similarities: Similarities, calibration: SimilarityCalibration | None, motion: Motion | None, independence_m: float
 ) -> tuple[float, float]:
     """Gives the novelty of an image, in [0, 1], and the probability that the robot was carried since the last one.
 
-    The novelty follows from the distance driven (`evidence_novelty`), up to `independence_distance` times the
-    calibration's correlation length. But where the robot has hardly moved, as odometry has measured, an image looks
-    like the one before. One that looks like another place instead is all new, and the robot may have been carried.
+    The novelty follows from the distance driven (`evidence_novelty`), up to `independence_m` metres. But where the
+    robot has hardly moved, as odometry has measured, an image looks like the one before. One that looks like another
+    place instead, by a `calibration`, is all new, and the robot may have been carried.
     """
     driven = None if motion is None else math.hypot(motion.x, motion.y)
-    novelty = evidence_novelty(driven, independence_distance * calibration.correlation_m)
+    novelty = evidence_novelty(driven, independence_m)
     measured = motion is not None and not isinstance(motion, AssumedMotion | BridgedMotion)
-    told = calibration.slope > 0.0 and similarities.spread > MIN_SPREAD
-    if similarities.last_view is None or not measured or not told:
+    if calibration is None or similarities.last_view is None or not measured:
+        return novelty, 0.0
+    if calibration.slope <= 0.0 or similarities.spread <= MIN_SPREAD:
         return novelty, 0.0
     score = standard_score(similarities.last_view, similarities.best, similarities.sampling_weight)
     same = float(ratios_of(np.array([score], np.float32), calibration.slope, calibration.middle)[0])

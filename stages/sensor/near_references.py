@@ -10,7 +10,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
-from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
+from omninav.stages.geometry.probability.evidence import contrast_power
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -159,7 +159,7 @@ def background_similarity(
     if not len(there):
         return weighted_median(best, sampling_weight)
     if sampling_weight is None:
-        return hazen_quantile(there, quantile)  # the same, without sorting
+        return float(np.quantile(there, quantile, method="hazen"))  # the same, without sorting
     return weighted_quantile(there, sampling_weight[background], quantile)
 
 
@@ -271,37 +271,22 @@ class NearReferences(Stage):
         candidates, rows = self._rows.of(similarities.candidates)
         near = self._cells.of(particles.poses)
         fade_m = None if self.fade_distance is None else self.fade_distance * unit
+        far_m = self.independence_distance * (unit if calibration is None else calibration.correlation_m)
+        novelty, carried = novelty_and_kidnapping(similarities, calibration, motion, far_m)
         if calibration is not None:
-            new = novelty_and_kidnapping(similarities, calibration, motion, self.independence_distance)
-            return self._calibrated(similarities, particles, map, near, rows, fade_m, calibration, *new)
+            ratios = likelihood_ratios(similarities, calibration)
+            top = max(float(ratios.max()), 1.0)
+            logarithms = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), fade_m, 0.0)
+            field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
+            values = np.exp(novelty * (logarithms - math.log(top)))
+            return self.Out(likelihood=Likelihood(values, field.mean, novelty, carried), field=field)
         best, each = similarities.best, similarities.sampling_weight
         floor = 0.0
         if self.background_quantile is not None:
             places, distance = map.poses[candidates], BACKGROUND_DISTANCE * unit
             floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
-        driven = None if motion is None else math.hypot(motion.x, motion.y)
-        novelty = evidence_novelty(driven, self.independence_distance * unit)
         top = max(float(np.maximum.reduce(best)), 1e-12)
         field = similarity_field(similarities, floor, top, power)
         weights = (expected(near, rows, fade_m, floor) / top) ** (power * novelty)
         return self.Out(likelihood=Likelihood(weights, field.mean, novelty), field=field)
-
-    def _calibrated(
-        self,
-        similarities: Similarities,
-        particles: Particles,
-        map: ReferenceGraph,
-        near: Shorts,
-        rows: Ints,
-        fade_m: float | None,
-        calibration: SimilarityCalibration,
-        novelty: float,
-        carried: float,
-    ) -> Out:
-        ratios = likelihood_ratios(similarities, calibration)
-        top = max(float(ratios.max()), 1.0)
-        expected = expected_similarity(particles.poses, map.poses, near, rows, np.log(ratios), fade_m, 0.0)
-        field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
-        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty, carried)
-        return self.Out(likelihood=likelihood, field=field)

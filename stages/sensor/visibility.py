@@ -8,7 +8,6 @@ import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -106,12 +105,9 @@ class Visibility(Stage):
         window = None if panoramic else math.radians(WINDOW_DEG), sigma
         background = background_level, *window, background_weight
         mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
-        far, carried = self.independence_distance, 0.0
-        if calibration is None:
-            driven = None if motion is None else math.hypot(motion.x, motion.y)
-            novelty = evidence_novelty(driven, far * metres_of(length_scale))
-        else:
-            novelty, carried = novelty_and_kidnapping(similarities, calibration, motion, far)
+        unit = metres_of(length_scale) if calibration is None else calibration.correlation_m
+        far_m = self.independence_distance * unit
+        novelty, carried = novelty_and_kidnapping(similarities, calibration, motion, far_m)
         likelihood = Likelihood(mean**novelty, background_level, novelty, carried)
         weighed = replace(similarities, values=raised.astype(np.float32))
         return self.Out(likelihood=likelihood, field=similarity_field(weighed, floor, 1.0, 1.0))

@@ -90,7 +90,7 @@ def test_a_view_that_does_not_continue_the_last_is_new_and_says_that_the_robot_w
     last_view: float | None, motion: Motion, slope: float, novelty: float, carried: float
 ):
     seen, calibration = replace(similarities(), last_view=last_view), replace(CALIBRATION, slope=slope)
-    assert novelty_and_kidnapping(seen, calibration, motion, 1.0) == pytest.approx(
+    assert novelty_and_kidnapping(seen, calibration, motion, calibration.correlation_m) == pytest.approx(
         (novelty, carried), rel=0.02, abs=1e-5
     )
 
@@ -98,7 +98,7 @@ def test_a_view_that_does_not_continue_the_last_is_new_and_says_that_the_robot_w
 @pytest.mark.parametrize("values", [np.zeros((20, 8)), np.full((1, 8), 0.3), np.full((20, 8), 0.3)])
 def test_similarities_that_are_all_alike_tell_of_no_kidnapping(values: np.ndarray):
     seen = Similarities(values.astype(np.float32), last_view=0.29)
-    assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, 1.0) == (0.1, 0.0)
+    assert novelty_and_kidnapping(seen, CALIBRATION, MOVED, CALIBRATION.correlation_m) == (0.1, 0.0)
 
 
 @pytest.mark.parametrize(("last_view", "novelty", "carried"), [(0.9, 0.1, 0.0), (0.2, 1.0, 0.9 / 21.0)])
