@@ -1,22 +1,15 @@
 """A map of views that adapts: it learns places, weights them by confirmation and forgets them."""
 
+import math
 from typing import Annotated, Literal
 
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.geometry.probability.gaussians import (
-    farther_apart,
-    floored,
-    merged,
-    moments,
-    squared_distance,
-    squared_distances,
-)
+from omninav.stages.geometry.probability.gaussians import floored, merged, moments, squared_distances
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -135,29 +128,10 @@ class AdaptiveViews(Stage):
         turns = np.zeros(len(map))
         turns[rows] = view.turns(map.views[rows])
         self._add_components(state, similarities, turns, map)
-        weights = np.empty(len(map.weights))
         length_scale_m = (
             threshold.metres if threshold is not None and threshold.settled else 0.0
         ) or DEFAULT_LENGTH_SCALE_M
-        _update_weights(
-            state.means,
-            state.covariances,
-            state.weights,
-            map.owner,
-            map.means,
-            map.covariances,
-            map.weights,
-            matched,
-            similarities,
-            turns,
-            self.beta,
-            FITS_BELOW,
-            self.forgetting != "none",
-            self.beta_forget if self.forgetting == "active" else 0.0,
-            length_scale_m,
-            FORGET_GAIN * length_scale_m,
-            weights,
-        )
+        weights = self._updated_weights(state, map, matched, similarities, turns, length_scale_m)
         touched: Ints = map.ids[np.unique(map.owner[weights != map.weights])]
         map.put(weights=weights)
         map.keep_components(map.weights >= MIN_WEIGHT)
@@ -186,6 +160,35 @@ class AdaptiveViews(Stage):
             means, covariances, counts, weights = (np.concatenate(each) for each in zip(*mixtures, strict=True))
             owners = np.repeat(rows, [len(parts[0]) for parts in mixtures])
             map.put_mixtures(owners, means, covariances, np.minimum(weights, 1.0), counts)
+
+    def _updated_weights(
+        self,
+        state: GaussianMixture,
+        map: ViewMixtures,
+        matched: Bools,
+        similarities: Array,
+        turns: Array,
+        length_scale_m: float,
+    ) -> Array:
+        # Phase 3, equations 16 to 19: weights (C,) of the components of all views, by a state of several modes.
+        weights = map.weights.copy()
+        for row in np.flatnonzero(matched).tolist():
+            mine, modes = map.owner == row, state.means - [0.0, 0.0, turns[row]]
+            fits = squared_distances(modes, state.covariances, map.means[mine], map.covariances[mine]) <= FITS_BELOW
+            fitting = (state.weights[:, None] * fits).sum(axis=0)
+            gained = self.beta * similarities[row]
+            fading = gained * fitting if self.forgetting == "none" else gained
+            weights[mine] = np.minimum(gained * fitting + (1.0 - fading) * weights[mine], 1.0)
+        if self.forgetting == "active":
+            others = ~matched[map.owner]
+            retained = np.ones(np.count_nonzero(others))
+            for mean, covariance, share in zip(state.means, state.covariances, state.weights, strict=True):
+                distances = np.hypot(*(map.means[others, :2] - mean[:2]).T)
+                spread = math.sqrt(covariance[0, 0]) + math.sqrt(covariance[1, 1])
+                lost = self.beta_forget * (1.0 - distances / length_scale_m) * (FORGET_GAIN * length_scale_m) / spread
+                retained *= 1.0 - share * np.clip(lost, 0.0, 1.0)
+            weights[others] *= retained
+        return weights
 
 
 def _confirm(known: Components, new: Components, below: float, min_covariance: Array) -> tuple[Components, Components]:
@@ -216,51 +219,3 @@ def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianM
         covariances = floored(covariances, (metres, metres, radians))
     weights = state.weights[present]
     return GaussianMixture(state.means[present], covariances, weights / weights.sum() if len(weights) else weights)
-
-
-@compiled(nogil=True)
-def _update_weights(
-    means: Array,
-    covariances: Array,
-    shares: Array,
-    owner: Ints,
-    places: Array,
-    spreads: Array,
-    weights: Array,
-    matched: Bools,
-    similarities: Array,
-    turns: Array,
-    beta: float,
-    fits_below: float,
-    passive: bool,
-    beta_forget: float,
-    fade: float,
-    gain: float,
-    out: Array,
-) -> None:
-    # Phase 3, equations 16 to 19, for the components (C,) of all views, of a state of several modes.
-    mode = np.empty(3)
-    for c in range(len(owner)):
-        row = owner[c]
-        if matched[row]:
-            fitting = 0.0
-            for k in range(len(shares)):
-                mode[:] = means[k]
-                mode[2] -= turns[row]
-                if farther_apart(mode, covariances[k], places[c], spreads[c], fits_below):
-                    continue
-                if squared_distance(mode, covariances[k], places[c], spreads[c]) <= fits_below:
-                    fitting += shares[k]
-            gained = beta * similarities[row]
-            fading = gained if passive else gained * fitting
-            out[c] = min(gained * fitting + (1.0 - fading) * weights[c], 1.0)
-        else:
-            retained = 1.0
-            if beta_forget > 0.0:
-                for k in range(len(shares)):
-                    distance = np.hypot(places[c, 0] - means[k, 0], places[c, 1] - means[k, 1])
-                    if distance < fade:
-                        spread = np.sqrt(covariances[k, 0, 0]) + np.sqrt(covariances[k, 1, 1])
-                        lost = beta_forget * (1.0 - distance / fade) * gain / spread
-                        retained *= 1.0 - shares[k] * min(lost, 1.0)
-            out[c] = retained * weights[c]
