@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints, Shorts
+from omninav.stages.geometry.plane.mount import MEDIAN_OF_RAYLEIGH
 from omninav.stages.geometry.plane.se2 import between, turned
 
 from .tracks import Tracks, joined_matches
@@ -206,11 +206,7 @@ def bearing_sigma(views: LocalViews, sightings: Sightings, poses: Array) -> floa
     counts = np.bincount(sightings.landmarks)
     free = (2.0 * counts - 3.0) / (2.0 * counts)
     angles = np.arccos(np.clip(cos, -1.0, 1.0)) / np.sqrt(free[sightings.landmarks])
-    return max(float(np.median(angles)) / RAYLEIGH_MEDIAN, 1e-5)
-
-
-RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))
-"""Median of a Rayleigh distribution of scale 1: of an angle whose two parts are normal."""
+    return max(float(np.median(angles)) / MEDIAN_OF_RAYLEIGH, 1e-5)
 
 
 def sightings_by_reference(views: LocalViews, sightings: Sightings) -> tuple[Ints, Shorts]:
@@ -236,25 +232,16 @@ def fit_motion(first: Array, second: Array, motion: Array, tolerance: float) -> 
     `motion` (3,): x, y (m), turn (rad) of the second robot in the frame of the first. Both bearings are within
     `tolerance` (rad) of one plane through both cameras, and meet ahead of both.
     """
-    out = np.zeros(len(first), np.bool_)
     length = math.hypot(motion[0], motion[1])
-    if length > 0.0:
-        _fit(first, second, motion[0] / length, motion[1] / length, motion[2], math.sin(tolerance), out)
-    return out
-
-
-@compiled(nogil=True)
-def _fit(first: Array, second: Array, x: float, y: float, turn: float, sine: float, out: Bools) -> None:
-    cos, sin = math.cos(turn), math.sin(turn)
-    for n in range(len(first)):
-        a = first[n]
-        b0 = cos * second[n, 0] - sin * second[n, 1]
-        b1 = sin * second[n, 0] + cos * second[n, 1]
-        b2 = second[n, 2]
-        n0, n1, n2 = y * b2, -x * b2, x * b1 - y * b0  # normal of the plane: t x b
-        m0, m1, m2 = y * a[2], -x * a[2], x * a[1] - y * a[0]  # t x a
-        normal = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-        flat = abs(a[0] * n0 + a[1] * n1 + a[2] * n2) <= sine * normal
-        same_side = n0 * m0 + n1 * m1 + n2 * m2 > 0.0
-        ahead = a[0] * x + a[1] * y > b0 * x + b1 * y  # a nearer point falls back behind a robot that drives on
-        out[n] = flat and same_side and ahead
+    if length == 0.0:
+        return np.zeros(len(first), np.bool_)
+    x, y, cos, sin = motion[0] / length, motion[1] / length, math.cos(motion[2]), math.sin(motion[2])
+    (a0, a1, a2), (c0, c1, b2) = first.T, second.T
+    b0, b1 = cos * c0 - sin * c1, sin * c0 + cos * c1
+    n0, n1, n2 = y * b2, -x * b2, x * b1 - y * b0  # normal of the plane: t x b
+    m0, m1, m2 = y * a2, -x * a2, x * a1 - y * a0  # t x a
+    normal = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    flat = np.abs(a0 * n0 + a1 * n1 + a2 * n2) <= math.sin(tolerance) * normal
+    same_side = n0 * m0 + n1 * m1 + n2 * m2 > 0.0
+    ahead = a0 * x + a1 * y > b0 * x + b1 * y  # a nearer point falls back behind a robot that drives on
+    return np.asarray(flat & same_side & ahead)
