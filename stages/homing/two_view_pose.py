@@ -11,10 +11,6 @@ from .generate_and_select import generate_and_select
 
 MAX_ERROR_DEG = 0.5
 """Largest angle by which the two bearings of a pair may together miss the pose, degrees."""
-CONFIDENCE = 0.9999
-"""Probability that a sample without a wrong pair is among those that are drawn."""
-MAX_SAMPLES = 5000
-"""Samples that are drawn at most."""
 
 
 class TwoViewPose(Stage):
@@ -41,8 +37,7 @@ class TwoViewPose(Stage):
         if self.solver == "generate_and_select":
             found = generate_and_select(pairs.first, pairs.second, threshold)
         else:
-            by = ctx.rng, self.solver, threshold, CONFIDENCE, MAX_SAMPLES, self.refine
-            found = relative_pose(pairs.first, pairs.second, *by)
+            found = relative_pose(pairs.first, pairs.second, ctx.rng, self.solver, threshold, refine=self.refine)
         if found is None:
             ctx.count("no_relative_pose")
             return self.Out()

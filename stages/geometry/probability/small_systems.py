@@ -39,11 +39,7 @@ def solve(matrix: Array, right: Array) -> Array:
 @compiled(nogil=True)
 def unit(vector: Array) -> Array:
     """A vector (3,) at length 1."""
-    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = vector[i] / length
-    return out
+    return vector / math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @compiled(nogil=True)

@@ -16,7 +16,7 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import rotated_by
 
-from .ransac import BATCH, AgreedPose, refinement, samples_needed, samples_of
+from .ransac import BATCH, AgreedPose, refined, samples_needed, samples_of
 
 CONFIDENCE, MAX_SAMPLES = 0.9999, 2000
 """Probability that a sample without a wrong point is drawn, and the largest number of samples."""
@@ -126,7 +126,6 @@ def refined_camera(
     points: npt.ArrayLike,
     threshold: float,
     planar: bool = False,
-    steps: int = 10,
 ) -> tuple[Array, Array]:
     """The camera's pose at the local optimum of the angles to its points, with Tukey's weights up to `threshold` (rad).
 
@@ -134,7 +133,8 @@ def refined_camera(
     """
     bearings, points = np.ascontiguousarray(bearings, np.float64), np.ascontiguousarray(points, np.float64)
     limit, freedoms = 1.0 - math.cos(threshold), 3 if planar else 6
-    return _refined(np.ascontiguousarray(rotation), translation, bearings, points, limit, freedoms, steps)
+    pose = np.ascontiguousarray(rotation), translation
+    return refined(_tukey, _normal_equations, _moved, pose, bearings, points, limit, freedoms)
 
 
 @compiled(nogil=True)
@@ -185,13 +185,3 @@ def _normal_equations(
                 for j in range(6):
                     square[k, j] += weight * row[i, k] * row[i, j]
     return np.ascontiguousarray(square[:freedoms, :freedoms]), slope[:freedoms]
-
-
-_refinement = refinement(_tukey, _normal_equations, _moved)
-
-
-@compiled(nogil=True)
-def _refined(
-    R: Array, t: Array, bearings: Array, points: Array, limit: float, freedoms: int, steps: int
-) -> tuple[Array, Array]:
-    return _refinement(R, t, bearings, points, limit, freedoms, steps)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array, Bools, Ints
@@ -12,7 +11,8 @@ from omninav.stages.geometry.probability.small_systems import solve
 
 BATCH = 32
 """Samples that are drawn and solved at once."""
-Refinement = Callable[[Array, Array, Array, Array, float, int, int], tuple[Array, Array]]
+STEPS = 10
+"""Steps of a refinement, at most."""
 MAX_DAMPING = 1e6
 """Damping beyond which no step leads further down."""
 
@@ -43,42 +43,34 @@ def samples_needed(share: float, size: int, confidence: float) -> float:
     return math.log(1.0 - confidence) / math.log1p(-good) if good > 1e-12 else math.inf
 
 
-def refinement(
+def refined(
     cost: Callable[[Array, Array, Array, Array, float], float],
     normal_equations: Callable[[Array, Array, Array, Array, float, int], tuple[Array, Array]],
     moved: Callable[[Array, Array, Array], tuple[Array, Array]],
-) -> Refinement:
-    """A compiled function that brings a pose downhill: `refined(R, t, first, second, limit, freedoms, steps)`.
+    pose: tuple[Array, Array],
+    first: Array,
+    second: Array,
+    limit: float,
+    freedoms: int,
+    steps: int = STEPS,
+) -> tuple[Array, Array]:
+    """A pose (R, t) brought downhill by Levenberg and Marquardt's method.
 
-    All three functions are compiled ones. `cost(R, t, first, second, limit)`: with `first` and `second` what is
-    compared, (N, 3) each, and `limit` the residual from which on more costs nothing.
-    `normal_equations(R, t, first, second, limit, freedoms)`: J'WJ (D, D) and J'Wr (D,) of the weighted residuals of D
-    freedoms. `moved(R, t, step)`: the pose after a step (D,).
+    `cost(R, t, first, second, limit)`: with `first` and `second` what is compared, (N, 3) each, and `limit` the
+    residual from which on more costs nothing. `normal_equations(R, t, first, second, limit, freedoms)`: J'WJ (D, D)
+    and J'Wr (D,) of the weighted residuals of D freedoms. `moved(R, t, step)`: the pose after a step (D,).
     """
-
-    @numba.njit(nogil=True)
-    def refined(
-        rotation: Array, translation: Array, first: Array, second: Array, limit: float, freedoms: int, steps: int
-    ) -> tuple[Array, Array]:
-        damping, least = 1e-3, cost(rotation, translation, first, second, limit)
-        for _ in range(steps):
-            square, slope = normal_equations(rotation, translation, first, second, limit, freedoms)
-            improved, new, tried = False, least, (rotation, translation)
-            while damping < MAX_DAMPING and not improved:
-                damped = square.copy()
-                for k in range(freedoms):
-                    damped[k, k] += damping * damped[k, k] + 1e-12
-                tried = moved(rotation, translation, -solve(damped, slope))
-                new = cost(tried[0], tried[1], first, second, limit)
-                improved = new < least
-                if not improved:
-                    damping *= 10.0
-            if not improved:
-                break
-            converged = least - new <= 1e-9 * least
-            (rotation, translation), least, damping = tried, new, max(0.1 * damping, 1e-9)
-            if converged:
-                break
-        return rotation, translation
-
-    return refined
+    damping, least = 1e-3, cost(*pose, first, second, limit)
+    for _ in range(steps):
+        square, slope = normal_equations(*pose, first, second, limit, freedoms)
+        before = least
+        while damping < MAX_DAMPING and least == before:
+            tried = moved(*pose, -solve(square + np.diag(damping * np.diag(square) + 1e-12), slope))
+            new = cost(*tried, first, second, limit)
+            if new < least:
+                pose, least, damping = tried, new, max(0.1 * damping, 1e-9)
+            else:
+                damping *= 10.0
+        if before - least <= 1e-9 * before:
+            break
+    return pose

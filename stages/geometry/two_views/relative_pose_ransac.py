@@ -16,7 +16,7 @@ from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.probability.small_systems import rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
-from .ransac import BATCH, AgreedPose, refinement, samples_needed, samples_of
+from .ransac import BATCH, AgreedPose, refined, samples_needed, samples_of
 
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
@@ -196,7 +196,6 @@ def refined_pose(
     second: npt.ArrayLike,
     threshold: float,
     planar: bool,
-    steps: int = 10,
 ) -> tuple[Array, Array]:
     """The relative pose at the local optimum of the shared residuals, with Tukey's weights up to `threshold` (rad).
 
@@ -204,7 +203,8 @@ def refined_pose(
     """
     first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
     limit, freedoms = math.sin(threshold) ** 2, 2 if planar else 5
-    return _refined(np.ascontiguousarray(rotation), translation, first, second, limit, freedoms, steps)
+    pose = np.ascontiguousarray(rotation), translation
+    return refined(_tukey, _normal_equations, _moved, pose, first, second, limit, freedoms)
 
 
 @compiled(nogil=True)
@@ -251,13 +251,3 @@ def _normal_equations(
             for j in range(freedoms):
                 square[k, j] += weight * row[k] * row[j]
     return square, slope
-
-
-_refinement = refinement(_tukey, _normal_equations, _moved)
-
-
-@compiled(nogil=True)
-def _refined(
-    R: Array, t: Array, first: Array, second: Array, limit: float, freedoms: int, steps: int
-) -> tuple[Array, Array]:
-    return _refinement(R, t, first, second, limit, freedoms, steps)
