@@ -11,7 +11,7 @@ from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .intrinsic_matrix import IntrinsicMatrix
-from .model import MAX_SIDE, Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, OuterRadius, Ring, Skew
+from .model import MAX_SIDE, InnerRadius, OuterRadius, Ring
 from .rays import normalised, turned
 
 MAX_COEFFICIENT = 100.0
@@ -36,22 +36,16 @@ def smallest_root(polynomial: np.polynomial.Polynomial) -> float:
     return float(roots.real[(np.abs(roots.imag) < REAL) & (roots.real > 0.0)].min(initial=np.inf))
 
 
-class CalibratedLens(IntrinsicMatrix, Camera):
+class CalibratedLens(IntrinsicMatrix):
     """A camera whose optical axis is the robot's z; a subclass defines how its lens or mirror projects.
 
     u runs along the camera's x and v along its y, so a pixel's bearing is atan2(v - cy, u - cx) + yaw.
     """
 
-    focal_x: FocalX
-    """Pixels; with the next three and `skew` the matrix K."""
-    focal_y: FocalY
-    centre_x: CentreX
-    centre_y: CentreY
     _: KW_ONLY
     outer_radius_px: OuterRadius | None = None
     """The image is used out to here; if left out, as far as image and model go all around the axis."""
     inner_radius_px: InnerRadius = 0.0
-    skew: Skew = 0.0
     looks: Literal["up", "down"] = "up"
     """Direction of the image's centre: up through a lens, or down by way of a mirror above the camera."""
 

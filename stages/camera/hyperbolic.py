@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .intrinsic_matrix import IntrinsicMatrix
-from .model import Camera, CentreX, CentreY, FocalX, FocalY, InnerRadius, Key, OuterRadius, Ring, Skew
+from .model import InnerRadius, Key, OuterRadius, Ring
 from .rays import normalised, turned
 
 HalfAxis = Bounds(ge=1e-5, le=1e5)
@@ -18,7 +18,7 @@ HalfAxis = Bounds(ge=1e-5, le=1e5)
 millimetres."""
 
 
-class HyperbolicMirror(IntrinsicMatrix, Camera, projection="hyperbolic"):
+class HyperbolicMirror(IntrinsicMatrix, projection="hyperbolic"):
     """A hyperbolic mirror over a perspective camera, by closed forms (Svoboda & Pajdla; erratum 33, docs/papers.md).
 
     Mirror frame: origin at the mirror's focus, z up along the axis; image u runs along mirror x and image v along
@@ -29,11 +29,6 @@ class HyperbolicMirror(IntrinsicMatrix, Camera, projection="hyperbolic"):
 
     sees_itself = True
 
-    focal_x: FocalX
-    """Pixels; with the next three and `skew` the matrix K."""
-    focal_y: FocalY
-    centre_x: CentreX
-    centre_y: CentreY
     a: Annotated[float, Key("mirror", "a"), HalfAxis]
     """Half axis of the hyperbola along the mirror's axis, in the unit of `b`: rays have no length."""
     b: Annotated[float, Key("mirror", "b"), HalfAxis]
@@ -42,7 +37,6 @@ class HyperbolicMirror(IntrinsicMatrix, Camera, projection="hyperbolic"):
     """Inside it, around the principal point, the robot sees itself."""
     outer_radius_px: OuterRadius
     """The mirror's rim."""
-    skew: Skew = 0.0
 
     @property
     def ring(self) -> Ring:

@@ -1,18 +1,23 @@
 """The matrix K of a camera: from the plane at distance 1 to pixels, and back."""
 
+from dataclasses import KW_ONLY
+
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
 
+from .model import Camera, CentreX, CentreY, FocalX, FocalY, Skew
 
-class IntrinsicMatrix:
-    """K = [[focal_x, skew, centre_x], [0, focal_y, centre_y], [0, 0, 1]], of a camera that has these fields."""
 
-    focal_x: float
-    focal_y: float
-    centre_x: float
-    centre_y: float
-    skew: float
+class IntrinsicMatrix(Camera):
+    """A camera with K = [[focal_x, skew, centre_x], [0, focal_y, centre_y], [0, 0, 1]] (pixels)."""
+
+    focal_x: FocalX
+    focal_y: FocalY
+    centre_x: CentreX
+    centre_y: CentreY
+    _: KW_ONLY
+    skew: Skew = 0.0
 
     @property
     def k(self) -> list[float]:

@@ -9,19 +9,11 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array, Bools
 
 from .intrinsic_matrix import IntrinsicMatrix
-from .model import Camera, CentreX, CentreY, FocalX, FocalY, Skew
 from .rays import normalised, turned
 
 
-class Perspective(IntrinsicMatrix, Camera, projection="perspective"):
+class Perspective(IntrinsicMatrix, projection="perspective"):
     """A pinhole camera without distortion, looking along the robot's forward turned by `yaw`."""
-
-    focal_x: FocalX
-    """Pixels; with the next three and `skew` the matrix K."""
-    focal_y: FocalY
-    centre_x: CentreX
-    centre_y: CentreY
-    skew: Skew = 0.0
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
         """p ~ K (-y, -z, x); what is behind is not shown."""

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from omninav.pipeline import BadInput
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 
-HOUSE = HyperbolicMirror(640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, 0.4, height=0.9, yaw=0.3)
+HOUSE = HyperbolicMirror(
+    640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, skew=0.4, height=0.9, yaw=0.3
+)
 MIRRORS = st.tuples(st.floats(5.0, 60.0), st.floats(5.0, 60.0))
 INTRINSICS = st.tuples(
     st.floats(100.0, 900.0), st.floats(100.0, 900.0), st.floats(0.0, 800.0), st.floats(0.0, 800.0), st.floats(-2.0, 2.0)
@@ -26,7 +28,7 @@ def unit(sine: float, bearing: float) -> np.ndarray:
 def mirror(intrinsics: tuple[float, ...], a: float, b: float) -> HyperbolicMirror:
     """One whose image and ring hold whatever it shows."""
     fx, fy, cx, cy, skew = intrinsics
-    return HyperbolicMirror(800, 800, fx, fy, cx, cy, a, b, 0.0, 1e9, skew)
+    return HyperbolicMirror(800, 800, fx, fy, cx, cy, a, b, 0.0, 1e9, skew=skew)
 
 
 def test_the_mask_is_the_ring_of_pixels_that_look_somewhere() -> None:
