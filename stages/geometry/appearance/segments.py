@@ -56,15 +56,13 @@ def _shifted(views: Floats, shifts: Array) -> Floats:
     whole = np.floor(shifts).astype(np.int64)
     part = (shifts - whole).astype(np.float32)[:, None, None]
     first = (np.arange(segments) + whole[:, None]) % segments
-    turned: Floats = views[rows, first] * (1 - part) + views[rows, (first + 1) % segments] * part
-    return turned
+    return np.asarray(views[rows, first] * (1 - part) + views[rows, (first + 1) % segments] * part)
 
 
 def penalties(segments: int, exponent: float) -> Floats:
     """Factor of the sum of the k best segments, k = 1..segments: k^-exponent n^-(1-exponent); at k = n it is 1 / n."""
     k = np.arange(1, segments + 1)
-    factors: Floats = (k**-exponent * float(segments) ** (exponent - 1.0)).astype(np.float32)
-    return factors
+    return np.asarray(k**-exponent * float(segments) ** (exponent - 1.0), np.float32)
 
 
 def _turned_rows(view: Floats, headings: int) -> tuple[Floats, Ints]:
@@ -107,7 +105,7 @@ def _compare(
     total = np.empty(BLOCK, np.float32)
     best = np.empty(BLOCK, np.float32)
     zero = np.float32(0)
-    # The bins of each row that hold anything, since nothing is common in the others; four at least, and by fours.
+    # The bins of each row that hold anything, since nothing is common in the others; they are read by fours.
     filled = np.zeros((len(rows), bins + 4), np.int64)
     held = np.zeros((len(rows), bins + 4), np.float32)
     numbers = np.zeros(len(rows), np.int64)
@@ -125,32 +123,23 @@ def _compare(
                     block[b, n] = reference[b]
             for h in range(headings):
                 row, u = alike[h, j], which[h, j]
+                for n in range(BLOCK):
+                    row[n] = zero
                 if histograms:
                     # Four bins at once load and store the sums a quarter as often; their order stays.
-                    for b in range(0, max(numbers[u], 1), 4):
+                    for b in range(0, numbers[u], 4):
                         r0, r1 = block[filled[u, b]], block[filled[u, b + 1]]
                         r2, r3 = block[filled[u, b + 2]], block[filled[u, b + 3]]
                         v0, v1, v2, v3 = held[u, b], held[u, b + 1], held[u, b + 2], held[u, b + 3]
-                        if b == 0:
-                            for n in range(BLOCK):
-                                row[n] = (
-                                    (r0[n] if r0[n] < v0 else v0)
-                                    + (r1[n] if r1[n] < v1 else v1)
-                                    + (r2[n] if r2[n] < v2 else v2)
-                                    + (r3[n] if r3[n] < v3 else v3)
-                                )
-                        else:
-                            for n in range(BLOCK):
-                                row[n] = (
-                                    row[n]
-                                    + (r0[n] if r0[n] < v0 else v0)
-                                    + (r1[n] if r1[n] < v1 else v1)
-                                    + (r2[n] if r2[n] < v2 else v2)
-                                    + (r3[n] if r3[n] < v3 else v3)
-                                )
+                        for n in range(BLOCK):
+                            row[n] = (
+                                row[n]
+                                + (r0[n] if r0[n] < v0 else v0)
+                                + (r1[n] if r1[n] < v1 else v1)
+                                + (r2[n] if r2[n] < v2 else v2)
+                                + (r3[n] if r3[n] < v3 else v3)
+                            )
                 else:
-                    for n in range(count):
-                        row[n] = zero
                     for b in range(bins):
                         r0, v0 = block[b], rows[u, b]
                         for n in range(count):
