@@ -32,32 +32,23 @@ class ParticleClustering(Stage):
     """
 
     class Out(Outputs):
-        """The belief as Gaussians, none where no cluster is heavy enough."""
+        """The belief as Gaussians, the heaviest first; none where no cluster is heavy enough."""
 
         state: GaussianMixture
 
     def step(self, ctx: Context, particles: Particles) -> Out:
         """Cluster the particles."""
         floor = (MIN_SIGMA_M, MIN_SIGMA_M, math.radians(MIN_SIGMA_DEG))
-        close = (CELL_M, math.radians(CELL_DEG))
-        return self.Out(state=cluster_gaussians(particles, close, MIN_WEIGHT, floor))
-
-
-def cluster_gaussians(
-    particles: Particles, close: tuple[float, float], min_weight: float, floor: tuple[float, float, float]
-) -> GaussianMixture:
-    """Clusters of particles as Gaussians, heaviest first; weights sum to 1."""
-    total = float(particles.weights.sum())
-    labels = clusters(particles.poses, *close)
-    weights = np.bincount(labels, weights=particles.weights) / total
-    chosen = [n for n in np.argsort(-weights, kind="stable") if weights[n] >= min_weight]
-    means, covariances = np.empty((len(chosen), 3)), np.empty((len(chosen), 3, 3))
-    for row, cluster in enumerate(chosen):
-        members = labels == cluster
-        mean, covariance = weighted_moments(particles.poses[members], particles.weights[members])
-        means[row], covariances[row] = mean, floored(covariance, floor)
-    kept = weights[chosen]
-    return GaussianMixture(means, covariances, kept / kept.sum())
+        labels = clusters(particles.poses, CELL_M, math.radians(CELL_DEG))
+        weights = np.bincount(labels, weights=particles.weights) / float(particles.weights.sum())
+        chosen = [n for n in np.argsort(-weights, kind="stable") if weights[n] >= MIN_WEIGHT]
+        means, covariances = np.empty((len(chosen), 3)), np.empty((len(chosen), 3, 3))
+        for row, cluster in enumerate(chosen):
+            members = labels == cluster
+            means[row], covariance = weighted_moments(particles.poses[members], particles.weights[members])
+            covariances[row] = floored(covariance, floor)
+        kept = weights[chosen]
+        return self.Out(state=GaussianMixture(means, covariances, kept / kept.sum()))
 
 
 def clusters(poses: Array, metres: float, radians: float) -> Ints:
@@ -83,5 +74,4 @@ def clusters(poses: Array, metres: float, radians: float) -> Ints:
     pairs = (np.ones(len(one), np.int8), (one, found[one, other]))
     joined: Any = coo_matrix(pairs, shape=(len(cells), len(cells)))
     labels = connected_components(joined, directed=False)[1]
-    label: Ints = labels[inverse.ravel()].astype(np.int64)
-    return label
+    return np.asarray(labels[inverse.ravel()], np.int64)

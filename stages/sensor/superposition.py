@@ -5,31 +5,10 @@ from typing import Literal
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, NoveltyThreshold
-
-
-def superpose(rows: Ints, shares: Array, turns: Array, extents: Array, map: ViewMixtures) -> tuple[Array, Array, Array]:
-    """Superpose the mixtures of a map's views `rows` (J,), weighted by `shares` (J,), turned by `turns` (J,) rad.
-
-    Returns means, covariances and weights of the components with positive weight, in the order of the map. The turn is
-    added to the headings and leaves the covariances as they are (erratum 12 in docs/papers.md). `extents` (J,) m:
-    standard deviations by which each view's components are widened in x and y.
-    """
-    place = np.full(len(map), -1, np.int64)
-    place[rows] = np.arange(len(rows))
-    of_row = place[map.owner]
-    chosen = np.flatnonzero(of_row >= 0)
-    weights = shares[of_row[chosen]] * map.weights[chosen]
-    chosen, weights = chosen[weights > 0.0], weights[weights > 0.0]
-    means = map.means[chosen]
-    means[:, 2] = wrap(means[:, 2] + turns[of_row[chosen]])
-    covariances = map.covariances[chosen]
-    covariances[:, [0, 1], [0, 1]] += (extents[of_row[chosen]] ** 2)[:, None]
-    return means, covariances, weights
 
 
 class Superposition(Stage):
@@ -38,7 +17,8 @@ class Superposition(Stage):
     p(x|y) is the sum over views j and components k of lambda_j w_jk times a Gaussian (Porta & Kroese 2004, equation 5;
     Gross, Koenig & Mueller 2005, section 2.2). Neither the components' own weights w_jk (erratum 13) nor lambda_j = S_j
     are normalised: many similar views weigh more than one. Headings are turned by the robot's turn against its heading
-    in each view (erratum 12). Components without weight (just inserted) do not count. Absent where no view is similar.
+    in each view, and covariances stay as they are (erratum 12). Components without weight (just inserted) do not count.
+    Absent where no view is similar.
     """
 
     views: Literal["all", "nearest"] = "all"
@@ -60,10 +40,15 @@ class Superposition(Stage):
         if neighbours is None or not len(neighbours.rows):
             return self.Out()
         number = 1 if self.views == "nearest" else len(neighbours.rows)
-        shares = neighbours.similarities[:number]
-        rows = neighbours.rows[:number]
-        extents = np.zeros(number)
+        place = np.full(len(map), -1, np.int64)
+        place[neighbours.rows[:number]] = np.arange(number)
+        of_row = place[map.owner]
+        chosen = np.flatnonzero(of_row >= 0)
+        weights = neighbours.similarities[of_row[chosen]] * map.weights[chosen]
+        chosen, weights = chosen[weights > 0.0], weights[weights > 0.0]
+        means, covariances = map.means[chosen], map.covariances[chosen]
+        means[:, 2] = wrap(means[:, 2] + neighbours.turns[of_row[chosen]])
         if self.extent and threshold is not None and threshold.distance > 0.0:
-            extents = neighbours.distances[:number] / threshold.distance * threshold.metres
-        means, covariances, weights = superpose(rows, shares, neighbours.turns[:number], extents, map)
+            extents = neighbours.distances / threshold.distance * threshold.metres
+            covariances[:, [0, 1], [0, 1]] += (extents[of_row[chosen]] ** 2)[:, None]
         return self.Out(hypothesis=GaussianMixture(means, covariances, weights) if len(weights) else None)
