@@ -1,28 +1,28 @@
 """Room around a robot, by a ring of ranges."""
 
 import numpy as np
-import numpy.typing as npt
 
-F64 = npt.NDArray[np.float64]
+from omninav.stages.geometry.arrays import Array
+
 LOOKAHEAD_M = 0.8
 """Free distance that a direction needs where the target is not closer, metres."""
 
 
-def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
+def free_ahead(ranges: Array, azimuths: Array, radius: float, margin: float) -> float:
     """Distance (m) that a disc of `radius` m can go straight on, `margin` m clear to both sides, by ranges (N,)."""
     ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
     in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
     return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
 
 
-def roomier_side(ranges: F64, azimuths: F64) -> float:
+def roomier_side(ranges: Array, azimuths: Array) -> float:
     """Side with more room in front: the mean distance (m) to the left of (N,) ranges, negative to the right."""
     front = np.cos(azimuths) > -0.1
     return float((ranges * np.sin(azimuths))[front].mean())
 
 
 def free_direction(
-    ranges: F64, azimuths: F64, wanted: float, room: float, radius: float, margin: float
+    ranges: Array, azimuths: Array, wanted: float, room: float, radius: float, margin: float
 ) -> float | None:
     """The direction (rad) closest to `wanted` in which a disc can go `room` m straight on.
 

@@ -5,22 +5,20 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.command import Command
 from omninav.stages.values.scan import Scan
 
 from .clearance import free_ahead, roomier_side
-
-F64 = npt.NDArray[np.float64]
 
 
 class WallAvoiderState(State):
     """Which way it turns away (1 left, -1 right, 0 undecided), and the ranges of the tick before."""
 
     side: int = 0
-    ranges: F64 = field(default_factory=lambda: np.zeros(0))
+    ranges: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class WallAvoider(Stage):

@@ -11,9 +11,9 @@ from typing import Any, cast
 import cv2
 import numpy as np
 
-from omninav.stages.geometry.arrays import Array, Bools, Floats
+from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats
 
-from .working_image import Grey, WorkingImage
+from .working_image import WorkingImage
 
 HISTOGRAM_BINS = 16
 """Bins of the histogram of the intensities around a point."""
@@ -49,8 +49,7 @@ def best_nearby(strength: Floats, image: WorkingImage, points: Array) -> Array:
     x, y = near[..., 0] + image.seam, near[..., 1]
     there = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
     found = np.where(there, strength[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)], -1.0)
-    best: Array = near[np.arange(len(points)), np.argmax(found, axis=1)].astype(np.float64)
-    return best
+    return np.asarray(near[np.arange(len(points)), np.argmax(found, axis=1)], np.float64)
 
 
 def histograms(image: WorkingImage, points: Array) -> Floats:
@@ -70,7 +69,7 @@ def histograms(image: WorkingImage, points: Array) -> Floats:
     return (counts / np.count_nonzero(disc)).astype(np.float32)
 
 
-def track(before: Grey, image: WorkingImage, points: Array, guesses: Array) -> tuple[Array, Bools]:
+def track(before: Bytes, image: WorkingImage, points: Array, guesses: Array) -> tuple[Array, Bools]:
     """Tracks points (N, 2) of the image before: where they are now, and whether they were tracked: (N, 2) and (N,).
 
     Forward from `guesses` (N, 2) by Lucas and Kanade, and backward again: a point that does not come back is lost.

@@ -5,15 +5,13 @@ from typing import NamedTuple, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, require_elevations, seen_at
-from omninav.stages.geometry.arrays import Array, Bools
+from omninav.stages.geometry.arrays import Array, Bools, Bytes
 from omninav.stages.values.image import Image, Panorama
 
-Grey = npt.NDArray[np.uint8]
 SEAM = 32
 """Columns of a full circle that are repeated beyond both edges, so that features can be tracked across the seam."""
 
@@ -24,7 +22,7 @@ class WorkingImage(NamedTuple):
     `scale`: pixels of the original per pixel of this one, along columns and rows. `camera`: of the original.
     """
 
-    grey: Grey
+    grey: Bytes
     seam: int
     scale: tuple[float, float]
     camera: Camera
@@ -65,13 +63,13 @@ def working_image(image: Image | Panorama, camera: Camera | None, max_pixels: in
         raise BadInput("homing: a camera's image without its camera; wire it: wires.tracker.camera=source.camera")
     if isinstance(image, Image):
         require_elevations(seen_by)
-    grey = cast(Grey, cv2.cvtColor(image.pixels, cv2.COLOR_BGR2GRAY))
+    grey = cast(Bytes, cv2.cvtColor(image.pixels, cv2.COLOR_BGR2GRAY))
     rows, columns = grey.shape
     size = columns, rows
     shrink = math.sqrt(rows * columns / max_pixels)
     if shrink > 1.0:
         size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
-        grey = cast(Grey, cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+        grey = cast(Bytes, cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
     seam = min(SEAM, size[0]) if seen_by.wraps else 0
     if seam:
         grey = np.concatenate([grey[:, -seam:], grey, grey[:, :seam]], axis=1)
