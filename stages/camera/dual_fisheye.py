@@ -50,8 +50,7 @@ class DualFisheye(Camera, projection="dual_fisheye"):
     def shows(self, pixels: Array) -> Bools:
         """Which pixels are in the image and show what the other lens's axis is not nearer to."""
         radius = min(self.outer_radius_px, self.focal_px * math.pi / 2 + 1e-6)
-        inside: Bools = super().shows(pixels) & (self._away(pixels).min(axis=0) <= radius)
-        return inside
+        return np.asarray(super().shows(pixels) & (self._away(pixels).min(axis=0) <= radius))
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
         """Radius = focal_px x angle from the axis of the lens that is nearer."""
@@ -87,5 +86,4 @@ class DualFisheye(Camera, projection="dual_fisheye"):
     def _away(self, pixels: Array) -> Array:
         """Distances (2, ...) of pixels from the centres of both circles."""
         centres = np.array([[self.ahead_x, self.ahead_y], [self.back_x, self.back_y]])
-        away: Array = np.hypot(*np.moveaxis(pixels - centres.reshape(2, *[1] * (pixels.ndim - 1), 2), -1, 0))
-        return away
+        return np.asarray(np.hypot(*np.moveaxis(pixels - centres.reshape(2, *[1] * (pixels.ndim - 1), 2), -1, 0)))

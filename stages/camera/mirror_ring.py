@@ -38,8 +38,7 @@ def radial_edges(grey: Floats, centre: tuple[float, float], radii: int) -> Array
     inside = (u >= 0) & (u <= grey.shape[1] - 1) & (v >= 0) & (v <= grey.shape[0] - 1)
     around = cv2.blur(step, (max(grey.shape) // 10 | 1, 3), borderType=cv2.BORDER_REFLECT)
     strength = np.where(inside, step / (step + 2.0 * around + 0.3), 0.0)
-    score: Array = strength.sum(axis=0) / np.maximum(inside.sum(axis=0), 0.6 * RAYS)
-    return score
+    return np.asarray(strength.sum(axis=0) / np.maximum(inside.sum(axis=0), 0.6 * RAYS))
 
 
 def find_ring(pixels: Pixels) -> Ring:

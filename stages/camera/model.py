@@ -64,8 +64,7 @@ class Ring(NamedTuple):
     def holds(self, u: Array, v: Array) -> Bools:
         """Which pixels are in it, of columns and rows of any shapes that go together."""
         radius = np.hypot(u - self.centre_x, v - self.centre_y)
-        inside: Bools = (radius >= self.inner) & (radius <= self.outer)
-        return inside
+        return (radius >= self.inner) & (radius <= self.outer)
 
 
 MODELS: dict[str, type["Camera"]] = {}

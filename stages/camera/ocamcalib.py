@@ -87,5 +87,4 @@ class OCamCalib(Camera, projection="ocamcalib"):
         return 1.0 if self.looks == "down" else -1.0
 
     def _height(self, rho: Array) -> Array:
-        height: Array = np.polynomial.Polynomial(self.polynomial)(rho)
-        return height
+        return np.polynomial.Polynomial(self.polynomial)(rho)

@@ -76,8 +76,7 @@ def with_tilt(lens: Lens) -> Lens:
 def leaning(rays: Array, roll: float, pitch: float) -> Array:
     """Rays (N, 3) of a camera that leans (rad), in the frame of the level robot."""
     (mounted,) = rotations_about(np.array([pitch]), 1) @ rotations_about(np.array([roll]), 0)
-    out: Array = rays @ mounted.T
-    return out
+    return np.asarray(rays @ mounted.T)
 
 
 def observed(camera: Camera, poses_given: bool) -> dict[str, float]:

@@ -22,8 +22,7 @@ class Thumbnail(NamedTuple):
 
     def points(self, points: Array) -> Floats:
         """Points (N, 2) of the whole image, columns and rows, in this one's pixels."""
-        there: Floats = ((points - self.corner + 0.5) * self.scale - 0.5).astype(np.float32)
-        return there
+        return ((points - self.corner + 0.5) * self.scale - 0.5).astype(np.float32)
 
     def jpeg(self, quality: int) -> bytes:
         """It as JPEG bytes."""

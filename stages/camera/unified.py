@@ -65,8 +65,7 @@ class Unified(CalibratedLens, projection="unified"):
         k1, k2 = self.distortion[:2]
         turning = smallest_root(np.polynomial.Polynomial([1.0, 3.0 * k1, 5.0 * k2]))
         _, (xx, xy, yy) = self._distorted(points)
-        inside: Bools = ((points**2).sum(axis=-1) < turning) & (xx * yy - xy * xy > 0.0)
-        return inside
+        return np.asarray(((points**2).sum(axis=-1) < turning) & (xx * yy - xy * xy > 0.0))
 
     def _distorted(self, points: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         """Points (..., 2) after distortion, and its derivatives by x and y: xx, xy (the same as yx) and yy."""

@@ -42,8 +42,7 @@ class ExactSearch:
         gaps = np.concatenate([(squares - 2.0 * (short @ part.T)).min(axis=0) for part in parts]) + self._squares
         if number >= len(gaps):
             return np.arange(len(gaps))
-        nearest: Ints = np.sort(np.argpartition(gaps, number)[:number])
-        return nearest
+        return np.sort(np.argpartition(gaps, number)[:number])
 
     def _take(self, vectors: Floats) -> None:
         self._vectors, self._squares = vectors, np.square(vectors).sum(axis=1)

@@ -96,8 +96,7 @@ class InvertedFile:
         distances, found = (distances + left_out[:, None])[found >= 0], found[found >= 0]
         order = np.lexsort((found, distances))
         _, first = np.unique(found[order], return_index=True)
-        nearest: Ints = np.sort(found[order][np.sort(first)[:number]])
-        return nearest
+        return np.sort(found[order][np.sort(first)[:number]])
 
     def _short(self, vectors: Floats) -> Floats:
         return np.asarray((vectors - self.index.mean) @ self.index.axes, np.float32)

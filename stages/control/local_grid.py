@@ -93,14 +93,12 @@ def cell_at(point: Array) -> int:
 
 def on_grid(points: Array) -> Bools:
     """Tells which of some points (N, 2) are on the grid: (N,)."""
-    inside: Bools = np.all(np.abs(points) < CELL_M * CELLS / 2, axis=1)
-    return inside
+    return np.asarray(np.all(np.abs(points) < CELL_M * CELLS / 2, axis=1))
 
 
 def points_of(cells: Ints) -> Array:
     """The middles (N, 2) of flat cells (N,)."""
-    points: Array = np.column_stack([_MIDDLES[cells % CELLS], _MIDDLES[cells // CELLS]])
-    return points
+    return np.column_stack([_MIDDLES[cells % CELLS], _MIDDLES[cells // CELLS]])
 
 
 def ways_from(cell: int, cost: Array) -> Ways:

@@ -16,8 +16,7 @@ def cosine_basis(size: int) -> Array:
     """The orthonormal cosine basis (DCT-II): (size, size), row k the wave of frequency k."""
     waves = np.cos(np.pi / size * np.outer(np.arange(size), np.arange(size) + 0.5))
     waves[0] *= np.sqrt(0.5)
-    basis: Array = waves * np.sqrt(2.0 / size)
-    return basis
+    return np.asarray(waves * np.sqrt(2.0 / size))
 
 
 def lowest_frequencies(rows: int, columns: int, number: int, mean: bool) -> tuple[Ints, Ints]:

@@ -97,8 +97,7 @@ class RotationReducedSift(Stage):
 
     def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> Floats:
         if self.orientation == "own":
-            described: Floats = self._rows[[point.class_id for point in found]].astype(np.float32)
-            return described
+            return np.asarray(self._rows[[point.class_id for point in found]], np.float32)
         return cast(Floats, self._sift.compute(grey, found)[1])
 
     def _strongest(self, found: list[cv2.KeyPoint], read: PreparedImage, seam: int) -> list[cv2.KeyPoint]:

@@ -102,8 +102,7 @@ def averaged_beside(distances: Floats) -> Floats:
     along = np.take_along_axis(distances, skewed[:, :, None], axis=1)  # [i, k]: columns i and i + k
     total = sum((np.roll(along, step, axis=0) for step in range(-HALF_WINDOW, HALF_WINDOW + 1)), np.zeros_like(along))
     back = (np.arange(count) - np.arange(count)[:, None]) % count
-    averaged: Floats = np.take_along_axis(total / np.float32(2 * HALF_WINDOW + 1), back[:, :, None], axis=1)
-    return averaged
+    return np.take_along_axis(total / np.float32(2 * HALF_WINDOW + 1), back[:, :, None], axis=1)
 
 
 def likelihood_ratios(distances: Floats) -> Floats:

@@ -255,8 +255,7 @@ class RoadmapPlanner(Stage):
 
 def _line(state: RoadmapPlannerState, map: ReferenceGraph, places: Ints) -> Array:
     """The path (K, 2) over references to the goal."""
-    line: Array = np.vstack([map.poses[places, :2], state.goal[:2]])
-    return line
+    return np.vstack([map.poses[places, :2], state.goal[:2]])
 
 
 def _route(state: RoadmapPlannerState, now: Literal["locating", "under way", "arrived", "gave up"]) -> PlannedRoute:

@@ -38,8 +38,7 @@ the coverage is counted over `free` where wired, else over all free cells."""
 
 def axes_of(sectors: int) -> Array:
     """Azimuths (rad) of the middles of a panorama's equal parts; one part looks straight ahead. (sectors,)."""
-    axes: Array = np.pi - 2 * np.pi * (np.arange(sectors) + 0.5) / sectors
-    return axes
+    return np.pi - 2 * np.pi * (np.arange(sectors) + 0.5) / sectors
 
 
 @compiled(nogil=True)

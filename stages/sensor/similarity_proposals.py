@@ -84,10 +84,8 @@ def _draw_at_floor(field: SimilarityField, rng: np.random.Generator, number: int
     references = _search(field.floor_cells, rng.random(number) * float(field.floor_cells[-1]))
     low = (field.values[references] <= field.floor).cumsum(axis=1)
     turns = np.add.reduce(low <= (rng.random(number) * low[:, -1])[:, None], axis=1)
-    cells: Ints = references * headings + np.minimum(turns, headings - 1)
-    return cells
+    return np.asarray(references * headings + np.minimum(turns, headings - 1))
 
 
 def _search(cumulative: Array, quantile: Array) -> Ints:
-    at: Ints = np.minimum(cumulative.searchsorted(quantile, side="right"), len(cumulative) - 1)
-    return at
+    return np.minimum(cumulative.searchsorted(quantile, side="right"), len(cumulative) - 1)

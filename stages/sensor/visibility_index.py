@@ -121,5 +121,4 @@ def sees_any(poses: Array, cells: Cells) -> Bools:
     row, column = cells_of(poses, cells.origin, cells.resolution).T
     inside = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
     number = np.where(inside, row * cells.columns + column, 0)
-    sees: Bools = inside & (cells.starts[number + 1] > cells.starts[number])
-    return sees
+    return np.asarray(inside & (cells.starts[number + 1] > cells.starts[number]))

@@ -41,8 +41,7 @@ class BoardFit(NamedTuple):
     @property
     def rms_px(self) -> Array:
         """Root mean square distance of each board's corners (boards,)."""
-        rms: Array = np.sqrt(np.mean(np.sum(self.residuals**2, axis=2), axis=1))
-        return rms
+        return np.asarray(np.sqrt(np.mean(np.sum(self.residuals**2, axis=2), axis=1)))
 
 
 def board_points(columns: int, rows: int) -> Array:
@@ -173,8 +172,7 @@ def _residuals(camera: Camera, poses: Array, board: Array, found: Array) -> Arra
 def _rotations(vectors: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
-    matrices: Array = Rotation.from_rotvec(vectors).as_matrix()
-    return matrices
+    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())
 
 
 def _placed(camera: Camera, found: Array, board: Array) -> Array | None:

@@ -97,8 +97,7 @@ def padded(pixels: Bytes, by: int, wraps_rows: bool, wraps_columns: bool) -> Flo
     scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
     rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
     higher = cv2.copyMakeBorder(scaled, by, by, 0, 0, rows)
-    wider: Floats = cv2.copyMakeBorder(higher, 0, 0, by, by, columns).astype(np.float32, copy=False)
-    return wider
+    return cv2.copyMakeBorder(higher, 0, 0, by, by, columns).astype(np.float32, copy=False)
 
 
 class Kernel(NamedTuple):

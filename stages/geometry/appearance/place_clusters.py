@@ -94,8 +94,7 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     """
     at = frames[medoids].astype(np.float64)
     gaps = np.abs(at[:, None, :, None] - at[None, :, None, :])  # (H, H, 2, 2)
-    either: Array = np.minimum(gaps[..., 0, 0] + gaps[..., 1, 1], gaps[..., 0, 1] + gaps[..., 1, 0])
-    return either
+    return np.asarray(np.minimum(gaps[..., 0, 0] + gaps[..., 1, 1], gaps[..., 0, 1] + gaps[..., 1, 0]))
 
 
 def waypoint_views(matches: Callable[[int, int], int], path: Ints, min_matches: int, max_step: int) -> Ints:

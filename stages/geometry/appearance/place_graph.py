@@ -14,5 +14,4 @@ def links_between(links: Ints, places: int) -> Array:
     one, other = np.asarray(links, np.int64).reshape(-1, 2).T
     beside = np.zeros((places, places))
     beside[one, other] = beside[other, one] = 1.0
-    distances: Array = shortest_path(beside, directed=False, unweighted=True)
-    return distances
+    return np.asarray(shortest_path(beside, directed=False, unweighted=True))

@@ -12,8 +12,7 @@ def all_distances(turned: Floats, kept: Floats) -> Array:
     """Euclidean distances of each row of `turned` (H, D) to each kept vector (R, D): (R, H)."""
     here, there = turned.astype(np.float64), kept.astype(np.float64)
     squares = (there**2).sum(axis=1)[:, None] + (here**2).sum(axis=1) - 2.0 * (there @ here.T)
-    distances: Array = np.sqrt(np.maximum(squares, 0.0))
-    return distances
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
 def turned_distances(turned: Floats, kept: Floats) -> Array:
@@ -34,8 +33,7 @@ def turned_distances(turned: Floats, kept: Floats) -> Array:
         before, after = (squares[rows, (best + step) % len(turned)].astype(np.float64) for step in (-1, 1))
         bend = before + after - 2.0 * least
         least -= np.where(bend > 0.0, 0.125 * (before - after) ** 2 / np.where(bend > 0.0, bend, 1.0), 0.0)
-    distances: Array = np.sqrt(np.maximum(least, 0.0))
-    return distances
+    return np.asarray(np.sqrt(np.maximum(least, 0.0)))
 
 
 def turns_of_nearest(turned: Floats, kept: Floats) -> Array:
@@ -55,5 +53,4 @@ def angles_of_least(values: Array) -> Array:
     before, least, after = (values[rows, (best + step) % number] for step in (-1, 0, 1))
     bend = before + after - 2.0 * least
     part = np.where(bend > 0.0, 0.5 * (before - after) / np.where(bend > 0.0, bend, 1.0), 0.0)
-    angles: Array = (best + part) * (2.0 * math.pi / number)
-    return angles
+    return np.asarray((best + part) * (2.0 * math.pi / number))

@@ -143,8 +143,7 @@ class _Normal(NamedTuple):
     def solved(self, right: Array) -> Array:
         """The inverse of the matrix, with the camera eliminated, times (F R, N)."""
         alone = self.factors.solve(right)
-        found: Array = alone + self.through @ np.linalg.solve(self.corner, self.border.T @ alone)
-        return found
+        return np.asarray(alone + self.through @ np.linalg.solve(self.corner, self.border.T @ alone))
 
 
 class _Problem:

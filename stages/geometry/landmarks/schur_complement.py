@@ -128,8 +128,7 @@ def landmark_steps(system: Eliminated, sightings: Sightings, steps: Array, camer
     back = np.einsum("ofk,of->ok", system.mixed, steps[sightings.references])
     if len(back):
         gradient = gradient + np.add.reduceat(back, sightings.starts[:-1])
-    landmarks: Array = np.einsum("lij,lj->li", system.inverse, -gradient)
-    return landmarks
+    return np.asarray(np.einsum("lij,lj->li", system.inverse, -gradient))
 
 
 @compiled(nogil=True)

@@ -51,8 +51,7 @@ def robot_covariances(covariances: Array, camera: Array, mount: Array) -> Array:
     jacobians = np.tile(np.eye(3), (len(camera), 1, 1))
     dx, dy = (robot_poses(camera, mount) - camera)[:, :2].T
     jacobians[:, 0, 2], jacobians[:, 1, 2] = -dy, dx
-    turned: Array = jacobians @ covariances @ jacobians.transpose(0, 2, 1)
-    return turned
+    return jacobians @ covariances @ jacobians.transpose(0, 2, 1)
 
 
 def found_mount(camera: Array, robot: Array, left: bool = False) -> Array | None:

@@ -71,5 +71,4 @@ def _noise(headings: Array, translation: float, sigmas: Triple) -> Array:
     by_noise[:, 0, 0], by_noise[:, 1, 0], by_noise[:, 2, 0] = -translation * sin, translation * cos, 1.0
     by_noise[:, 0, 1], by_noise[:, 1, 1], by_noise[:, 2, 2] = cos, sin, 1.0
     by_noise *= np.asarray(sigmas, np.float64)
-    spread: Array = by_noise @ np.swapaxes(by_noise, 1, 2)
-    return spread
+    return by_noise @ np.swapaxes(by_noise, 1, 2)

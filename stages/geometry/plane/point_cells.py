@@ -66,8 +66,7 @@ def have_a_point_within(cells: PointCells, places: Array, radius: float) -> Bool
     """Which places (M, >= 2) are less than `radius` metres, at most the width of a cell, from any point: (M,)."""
     own = _numbers(places, cells.width)
     xy = np.ascontiguousarray(cells.points[cells.order, :2])
-    found: Bools = _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)
-    return found
+    return _near_point(np.ascontiguousarray(places[:, :2]), own, xy, *cells[2:4], radius)
 
 
 @compiled(nogil=True)
@@ -88,8 +87,7 @@ def _near_point(places: Array, own: Ints, points: Array, numbers: Ints, starts: 
 
 def _numbers(points: Array, width: float) -> Ints:
     at = np.floor(points[:, :2] / width).astype(np.int64)
-    numbers: Ints = at[:, 0] * ROWS + at[:, 1]
-    return numbers
+    return at[:, 0] * ROWS + at[:, 1]
 
 
 def _points_around(cells: PointCells, centres: Array, radius: float) -> Ints:
@@ -101,8 +99,7 @@ def _points_around(cells: PointCells, centres: Array, radius: float) -> Ints:
     held = at[(at < len(cells.numbers)) & (cells.numbers[np.minimum(at, len(cells.numbers) - 1)] == around)]
     first, number = cells.starts[held], cells.starts[held + 1] - cells.starts[held]
     runs = np.repeat(first - np.cumsum(number) + number, number) + np.arange(number.sum())
-    points: Ints = cells.order[runs].astype(np.int64)
-    return points
+    return np.asarray(cells.order[runs], np.int64)
 
 
 @compiled(nogil=True)

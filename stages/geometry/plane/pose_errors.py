@@ -9,14 +9,12 @@ from .se2 import wrap
 
 def position_errors(poses: Array, truth: Array) -> Array:
     """Distance (m) between poses and truth, both (N, 3): (N,)."""
-    distance: Array = np.hypot(poses[:, 0] - truth[:, 0], poses[:, 1] - truth[:, 1])
-    return distance
+    return np.hypot(poses[:, 0] - truth[:, 0], poses[:, 1] - truth[:, 1])
 
 
 def heading_errors_deg(poses: Array, truth: Array) -> Array:
     """Size of the heading's difference (degrees, 0 to 180) between poses and truth, both (N, 3): (N,)."""
-    size: Array = np.degrees(np.abs(wrap(poses[:, 2] - truth[:, 2])))
-    return size
+    return np.degrees(np.abs(wrap(poses[:, 2] - truth[:, 2])))
 
 
 def first_settled(

@@ -10,8 +10,7 @@ from omninav.stages.geometry.arrays import Array
 
 def wrap(angle: npt.ArrayLike) -> Array:
     """Angles brought into [-pi, pi)."""
-    wrapped: Array = np.mod(np.asarray(angle, dtype=np.float64) + math.pi, 2 * math.pi) - math.pi
-    return wrapped
+    return np.mod(np.asarray(angle, dtype=np.float64) + math.pi, 2 * math.pi) - math.pi
 
 
 def wrap_angle(angle: float) -> float:

@@ -47,8 +47,7 @@ def combine(one: Array, other: Array) -> Array:
     total = yes + no + open_
     if not (total > 0.0).all():
         raise ValueError("two sources of evidence that contradict each other entirely cannot be combined")
-    combined: Array = np.stack([yes, no, open_], axis=-1) / total[..., None]
-    return combined
+    return np.stack([yes, no, open_], axis=-1) / total[..., None]
 
 
 def similarity_of(distance: npt.ArrayLike, spread: float, form: str = "ratio") -> Array:

@@ -141,8 +141,7 @@ def floored(covariance: Array, least: npt.ArrayLike) -> Array:
     if not low.any():
         return covariance
     raised = np.einsum("...ik,...k,...jk->...ij", vectors, np.maximum(values, 1.0), vectors) * units
-    kept: Array = np.where(low[..., None, None], 0.5 * (raised + np.swapaxes(raised, -1, -2)), covariance)
-    return kept
+    return np.where(low[..., None, None], 0.5 * (raised + np.swapaxes(raised, -1, -2)), covariance)
 
 
 def _triangular(covariances: Array) -> Array:
@@ -156,8 +155,7 @@ def _triangular(covariances: Array) -> Array:
 @compiled(nogil=True, inline="always")
 def shorter_turn(angle: float) -> float:
     """An angle brought into [-pi, pi)."""
-    turn: float = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
-    return turn
+    return float(angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi)))
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -192,8 +190,7 @@ def squared_distance(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) -
     third = max(cov_a[2, 2] + cov_b[2, 2] - low2 * low2 * first - low3 * low3 * second, MIN_VARIANCE)
     rest1 = dy - low1 * dx
     rest2 = turn - low2 * dx - low3 * rest1
-    squared: float = dx * dx / first + rest1 * rest1 / second + rest2 * rest2 / third
-    return squared
+    return float(dx * dx / first + rest1 * rest1 / second + rest2 * rest2 / third)
 
 
 @compiled(nogil=True)
@@ -314,8 +311,7 @@ def inverse_into(matrix: Array, out: Array) -> float:
     out[0, 1] = out[1, 0] = g * c + k * h
     out[0, 2] = out[2, 0] = k * f
     out[1, 2] = out[2, 1] = h * f
-    determinant: float = -2.0 * (np.log(a) + np.log(c) + np.log(f))
-    return determinant
+    return float(-2.0 * (np.log(a) + np.log(c) + np.log(f)))
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -25,8 +25,7 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
     """
     logarithms = np.log(np.maximum(similarity, np.float32(MIN_SIMILARITY)))
     centre, spread = centre_and_spread(best_headings(logarithms)[0], sampling_weight)
-    scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, MIN_SPREAD))
-    return scores
+    return (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, MIN_SPREAD))
 
 
 def standard_score(similarity: float, best: Floats, sampling_weight: Array | None = None) -> float:
@@ -59,8 +58,7 @@ def logistic_fit(scores: Array, weights: Array, right: Bools) -> tuple[float, fl
 
 def ratios_of(scores: Floats, slope: float, middle: float) -> Floats:
     """The likelihood ratio of each score: exp(slope (z - middle))."""
-    odds: Floats = np.exp(np.clip(np.float32(slope) * (scores - np.float32(middle)), -MAX_LOG_ODDS, MAX_LOG_ODDS))
-    return odds
+    return np.asarray(np.exp(np.clip(np.float32(slope) * (scores - np.float32(middle)), -MAX_LOG_ODDS, MAX_LOG_ODDS)))
 
 
 def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: float, images: int) -> Floats:
@@ -72,8 +70,7 @@ def saturated_ratios(scores: Floats, slope: float, middle: float, outliers: floa
     """
     odds = ratios_of(scores, slope, middle)
     above = np.power(odds / np.float32(images), np.float32(1.0 - TAIL))
-    ratios: Floats = (np.float32(outliers) + np.float32(1.0 - outliers) * odds) / (np.float32(1) + above)
-    return ratios
+    return np.asarray((np.float32(outliers) + np.float32(1.0 - outliers) * odds) / (np.float32(1) + above))
 
 
 def correlation_length(values: Array, places: Array, compared: Bools | None = None) -> float | None:

@@ -28,8 +28,7 @@ Poses = tuple[Array, Array]
 def essential(rotation: Array, translation: npt.ArrayLike) -> Array:
     """E = [t]x R (3, 3), with [t]x w = t x w."""
     x, y, z = np.asarray(translation, dtype=np.float64)
-    product: Array = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ rotation
-    return product
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ rotation
 
 
 def turn_about_vertical(angle: float) -> Array:

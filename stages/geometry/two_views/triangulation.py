@@ -41,8 +41,7 @@ def triangulate(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, tr
     here, there = depths(first, second, rotation, translation)
     ahead = (here > 0.0) & (there > 0.0) & np.isfinite(here) & np.isfinite(there)
     here, there = np.where(ahead, here, np.nan), np.where(ahead, there, np.nan)
-    points: Array = 0.5 * (here[:, None] * first + there[:, None] * (second @ rotation.T) + translation)
-    return points
+    return np.asarray(0.5 * (here[:, None] * first + there[:, None] * (second @ rotation.T) + translation))
 
 
 def angles_between(one: Array, other: Array) -> Array:
