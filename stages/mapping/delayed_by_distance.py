@@ -33,7 +33,7 @@ class DelayedByDistance(Stage):
     """
 
     distance_m: Annotated[float, Bounds(ge=0)] = 4.0
-    """Distance driven before a view is learned."""
+    """Distance driven before a view is learned; 0: at once, as in Porta & Kroese 2004, section 3.2."""
 
     class Out(Outputs):
         """The updates that are due, in the order in which their views were seen, and those that wait."""

@@ -40,7 +40,7 @@ PRINTED: dict[str, Stages] = {
     # Porta and Kröse: views as they are, learned at once, merged half and half; points for places.
     "particle_cml_as_printed": AS_LEARNED
     | {
-        "map_update": ("ImmediateUpdate", {}),
+        "map_update": ("DelayedByDistance", {"distance_m": 0}),
         "features": ("CosineTransform", {"headings": 1, "contrast": "none", "mean": True}),
         "mapping": ("FusedMixtures", {"average": "halves", "spread": False}),
         "sensor": ("Superposition", {"extent": False, "views": "all"}),
