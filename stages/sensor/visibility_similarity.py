@@ -14,7 +14,9 @@ Single = np.floating[Any]
 
 CUTOFF_SIGMAS = 3.0
 """Standard deviations beyond which a Gaussian is 0."""
-ARC_TANGENT = (0.1590383972660733, -0.05115725038296156, 0.023334547989038373, -0.0062283931965400755)
+ARC_TANGENT = tuple(
+    np.float32(c) for c in (0.1590383972660733, -0.05115725038296156, 0.023334547989038373, -0.0062283931965400755)
+)
 """atan(t) / 2 pi on [0, 1] as t, t^3, t^5, t^7: a least-squares fit that is off by 0.005 degrees at most."""
 EXPONENTIAL = tuple(
     np.float32(c) for c in (0.99999997814, -0.99999741652, 0.49994906235, -0.16629159934, 0.04039209277, -0.00626962699)
@@ -177,12 +179,7 @@ def _turned_past(
 ) -> None:
     # How far angles (in turns) are past the directions to points, as columns of the headings: vector instructions.
     # The arc tangent is a polynomial of the smaller over the larger of two sides.
-    c1, c3, c5, c7 = (
-        np.float32(ARC_TANGENT[0]),
-        np.float32(ARC_TANGENT[1]),
-        np.float32(ARC_TANGENT[2]),
-        np.float32(ARC_TANGENT[3]),
-    )
+    c1, c3, c5, c7 = ARC_TANGENT
     zero, quarter, half, tiny = np.float32(0), np.float32(0.25), np.float32(0.5), np.float32(1e-12)
     last = np.int32(headings) - np.int32(1)
     for k in range(number):
