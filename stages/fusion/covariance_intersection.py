@@ -55,6 +55,7 @@ def fuse(
     matched_a = np.bincount(one, weight_b[other], len(weight_a))[one]
     matched_b = np.bincount(other, weight_a[one], len(weight_b))[other]
     weights = weight_a[one] * weight_b[other] * (1.0 / matched_a + 1.0 / matched_b)
+    # In the order of a's components, then those of b that match none.
     order = np.argsort(np.concatenate([alone_a, one, len(weight_a) + alone_b]), kind="stable")
     return (
         np.concatenate([mean_a[alone_a], means, mean_b[alone_b]])[order],
