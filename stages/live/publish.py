@@ -58,6 +58,9 @@ class Publisher:
         """Join the domain."""
         self._transport: Transport = connect(self.transport, self.domain)
 
+    def _send(self, topic: str, msgtype: str, fields: Fields, latched: bool = False) -> None:
+        send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
+
 
 class Publish(Publisher, Stage):
     """Publishes the pose, `map -> odom` and the command over ROS 2, before anything that can wait.
@@ -168,9 +171,6 @@ class Publish(Publisher, Stage):
         fields: Fields = stamped if self.command_type == "TwistStamped" else twist
         self._send(self.command, f"geometry_msgs/msg/{self.command_type}", fields)
 
-    def _send(self, topic: str, msgtype: str, fields: Fields, latched: bool = False) -> None:
-        send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
-
 
 class PublishBelief(Publisher, Stage):
     """Publishes the belief in few poses over ROS 2, after the pose itself."""
@@ -186,8 +186,7 @@ class PublishBelief(Publisher, Stage):
         """One tick. `belief`: thinned. Nothing while a record is made again."""
         if self.topic is not None and belief is not None and self._transport.status.live:
             kind, fields = self._message(belief)
-            content = encode_message(kind, {"header": header(tick.stamp, self.map_frame)} | fields)
-            send(self._transport, self.topic, kind, content)
+            self._send(self.topic, kind, {"header": header(tick.stamp, self.map_frame)} | fields)
 
     def _message(self, belief: Particles | GaussianMixture) -> tuple[str, Fields]:
         poses = pose_messages(belief.poses if isinstance(belief, Particles) else belief.means)

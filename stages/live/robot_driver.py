@@ -5,13 +5,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State, Tick, write_whole
-from omninav.pipeline.mcap.message_types import encode_message, standard_types
+from omninav.pipeline.mcap.message_types import standard_types
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import interpolate
@@ -22,8 +22,8 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
-from .publish import send
-from .transport import Transport, TransportName, connect
+from .publish import Publisher
+from .transport import TransportName
 
 CAMERA = "omni_camera"
 TWISTS = ("geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist")
@@ -62,7 +62,7 @@ class RobotDriverState(State):
     commanded: int | None = None
 
 
-class RobotDriver(Stage):
+class RobotDriver(Publisher, Stage):
     """Publishes images, odometry, ranges, transforms and the clock, and takes commands, as a robot's own driver does.
 
     | topic | message |
@@ -78,11 +78,9 @@ class RobotDriver(Stage):
     for the next tick is what has come when the tick is over; it holds until another comes, for `COMMAND_S` at most.
     """
 
-    transport: Literal["ros2"] | TransportName = "ros2"
+    transport: TransportName = "ros2"
     """`ros2` (or `rclpy`): a sourced ROS 2, or omninav[ros2]. Without ROS: `dds`, omninav[live], or `zenoh`,
     omninav[zenoh]."""
-    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
-    """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
     real_time: bool = True
     """A second takes a second, where the computer is fast enough; else ticks follow each other at once."""
     command_topic: str = "/cmd_vel"
@@ -102,7 +100,7 @@ class RobotDriver(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
-        self._transport: Transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
+        super().setup(ctx)
         self._started = self._worked = self._free = 0.0
         self._offset, self._noted = 0, (0.0, 0.0)
         self._subscribed = ""
@@ -220,9 +218,6 @@ class RobotDriver(Stage):
         self._send("/camera/camera_info", "sensor_msgs/msg/CameraInfo", self._info | {"header": header(stamp, CAMERA)})
         fields = {"header": header(stamp, CAMERA), "format": "jpeg", "data": packed.ravel()}
         self._send("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", fields)
-
-    def _send(self, topic: str, msgtype: str, fields: dict[str, Any], latched: bool = False) -> None:
-        send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
 
     def _note(self, ctx: Context, seconds: float) -> None:
         """Every few seconds, report how fast time passes and whether anybody commands."""

@@ -14,9 +14,9 @@ from omninav.pipeline import BadInput
 
 from .status import LiveStatus
 
-TransportName = Literal["dds", "rclpy", "zenoh"]
-"""`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`.
-`zenoh`: a robot with rmw_zenoh, no ROS needed (`omninav[zenoh]`)."""
+TransportName = Literal["dds", "rclpy", "ros2", "zenoh"]
+"""`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy` or `ros2`: a sourced ROS 2, or
+`omninav[ros2]`. `zenoh`: a robot with rmw_zenoh, no ROS needed (`omninav[zenoh]`)."""
 DEPTH, NEWEST_DEPTH = 1000, 16
 """Messages of a topic that DDS keeps until our thread takes them: all of them, or only the newest are wanted."""
 MAX_WAITING = 10_000
@@ -134,6 +134,7 @@ def connect(transport: TransportName, domain: int | None = None) -> Transport:
     `domain`: the ROS domain; None: `ROS_DOMAIN_ID`, else 0. Raises `TransportError` where its library is missing.
     """
     number = _domain() if domain is None else domain
+    transport = "rclpy" if transport == "ros2" else transport
     module = importlib.import_module(f"{__package__}.{transport}_transport")
     made: Transport = opened((transport, number), lambda: module.open_transport(number))
     made.place = f"transport={transport}, ROS_DOMAIN_ID={number}"

@@ -26,7 +26,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.api.run import Run
 from omninav.pipeline.mcap.message_types import make_message, standard_types
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.stages.live import live_source, publish, publish_truth, robot_driver, time_synchronizer, watchdog
+from omninav.stages.live import live_source, publish, time_synchronizer, watchdog
 from omninav.stages.live.transport import RawMessage, Transport, disconnect
 from omninav.stages.source.log import LogSource
 
@@ -108,7 +108,7 @@ def recorded(drive: Path, *topics: str) -> list[RawMessage]:
 
 def joined(monkeypatch: pytest.MonkeyPatch, robot: Wire) -> None:
     """Have every stage join this robot."""
-    for module in (live_source, publish, publish_truth, robot_driver):
+    for module in (live_source, publish):
         monkeypatch.setattr(module, "connect", lambda name, domain: robot)
     monkeypatch.setattr(live_source, "disconnect", lambda: None)
 
