@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -406,11 +406,6 @@ def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> st
     )
 
 
-def misplacing(watched: Watched, length_scale_m: float) -> str:
-    """Images so late that the robot is elsewhere by then."""
-    return late(watched, length_scale_m, MISPLACED_M)
-
-
 def turns_fit(watched: Watched) -> bool:
     """Tells whether odometry turns as the images do."""
     seen = watched.sure_turns
@@ -454,11 +449,6 @@ def moved(watched: Watched, length_scale_m: float, min_metres: float = MOVED_M) 
         f"to the left and turned by {math.degrees(turn):+.0f} degrees from where it is in the map: check whether it "
         "was moved, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
     )
-
-
-def displaced(watched: Watched, length_scale_m: float) -> str:
-    """A camera that was moved so far that poses are not what their confidence says."""
-    return moved(watched, length_scale_m, DISPLACED_M)
 
 
 def tracked(watched: Watched, length_scale_m: float) -> str:
@@ -523,8 +513,8 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "frozen": frozen,
     "blind": blind,
     "turned": turned,
-    "misplacing": misplacing,
-    "displaced": displaced,
+    "misplacing": partial(late, min_metres=MISPLACED_M),
+    "displaced": partial(moved, min_metres=DISPLACED_M),
     "late": late,
     "moved": moved,
     "tracked": tracked,
