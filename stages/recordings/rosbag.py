@@ -98,15 +98,10 @@ class _Sqlite:
         self._limits = limits
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._module, name)
-
-    def connect(self, *arguments: Any, **named: Any) -> Any:
-        """A limited connection, with the name that sqlite3 has for it."""
-        return self._limits.limit(self._module.connect(*arguments, **named))
-
-    def Connection(self, *arguments: Any, **named: Any) -> Any:  # noqa: N802
-        """A limited connection, with the name that apsw has for it."""
-        return self._limits.limit(self._module.Connection(*arguments, **named))
+        found = getattr(self._module, name)
+        if name not in ("connect", "Connection"):  # of sqlite3 and of apsw
+            return found
+        return lambda *arguments, **named: self._limits.limit(found(*arguments, **named))
 
 
 class _Zstd:
