@@ -11,41 +11,23 @@ from omninav.stages.values.floor_plan import FloorPlan
 from .config import WorldConfig
 
 
-class FloorPlanOfWorld(Stage):
-    """Gives the floor plan of a simulated world on a day, for plots."""
-
-    world: WorldConfig | None = None
-    """The simulated world; null: a real one, of which there is no plan."""
-    day: Annotated[int, Bounds(ge=0)] = 1
-    """Day of the simulated world."""
-
-    class Out(Outputs):
-        """`plan`: absent of a real world."""
-
-        plan: FloorPlan | None = None
-
-    def step(self, ctx: Context) -> Out:
-        """Outlines of all obstacles."""
-        return self.Out(plan=None if self.world is None else plan_of(self.world, self.day))
-
-
 class FloorPlanOfLog(Stage):
     """Gives the floor plan of recorded logs, for plots: the grid beside the first log that has one.
 
     Beside `drive.mcap` that is `drive.grid/map.yaml`, as `omninav simulate` writes it, or else `map.yaml`, in the
     format of ROS map_server and in the frame of the true poses. Without a log it is the simulated world's plan on the
-    first day.
+    first day, if there is one.
     """
 
     log: str | tuple[str, ...] | None = None
     """The recorded logs."""
-    world: WorldConfig = WorldConfig()
-    """The simulated world, for runs without a log."""
-    day: int | tuple[int, ...] = 1
+    world: WorldConfig | None = WorldConfig()
+    """The simulated world, for runs without a log; null: a real place, of which there is no plan."""
+    day: Annotated[int, Bounds(ge=0)] | tuple[int, ...] = 1
     """Its days."""
 
     class Out(Outputs):
-        """`plan`: absent where no log has a grid beside it."""
+        """`plan`: absent where no log has a grid beside it, and of a real place without a log."""
 
         plan: FloorPlan | None = None
 
@@ -56,7 +38,7 @@ class FloorPlanOfLog(Stage):
 
     def step(self, ctx: Context) -> Out:
         """Read or make the plan."""
-        if self.log is None:
+        if self.log is None and self.world is not None:
             return self.Out(plan=plan_of(self.world, self.day if isinstance(self.day, int) else self.day[0]))
         grid = grid_beside(self.log)
         return self.Out(plan=None if grid is None else read_grid(grid))

@@ -7,7 +7,7 @@ from world_files import DEMO
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import boxes, read_grid
-from omninav.stages.simulator.floor_plan import FloorPlanOfLog, FloorPlanOfWorld
+from omninav.stages.simulator.floor_plan import FloorPlanOfLog, plan_of
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 
@@ -52,7 +52,8 @@ def test_the_grid_beside_a_log_is_its_plan(tmp_path):
 
 def test_without_a_log_the_plan_is_the_worlds():
     plan = FloorPlanOfLog(world=DEMO, day=(1, 2)).step(CTX).plan
-    np.testing.assert_array_equal(plan.outlines, FloorPlanOfWorld(world=DEMO).step(CTX).plan.outlines)
+    np.testing.assert_array_equal(plan.outlines, plan_of(DEMO, 1).outlines)
+    assert FloorPlanOfLog(world=None).step(CTX).plan is None
 
 
 @pytest.mark.parametrize(
