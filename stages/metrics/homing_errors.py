@@ -57,7 +57,7 @@ class HomingErrors(MetricStage):
         if not len(poses) or not known(poses).all():
             return self.Out()
         targets = between(poses, poses[0])
-        carried = kidnapped_rows(drive, CARRIED_M, 360.0)  # turns do not count: none is so large
+        carried = kidnapped_rows(drive, CARRIED_M)
         away = int(carried[-1] if len(carried) else np.argmax(np.hypot(targets[:, 0], targets[:, 1])))
         after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:

@@ -55,8 +55,8 @@ class KidnapRecovery(MetricStage):
         return self.Out(metrics=Metrics({"lifts": values}, SPECS))
 
 
-def kidnapped_rows(log: Drive, jump_m: float, jump_deg: float) -> Ints:
-    """Rows of a log, all with truth, before which the robot was kidnapped."""
+def kidnapped_rows(log: Drive, jump_m: float, jump_deg: float = 360.0) -> Ints:
+    """Rows of a log before which the robot was kidnapped, where its true pose and odometry are known."""
     true: Array = between(log.truth[:-1], log.truth[1:])
     gap = true - log.motion[1:]
     jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))

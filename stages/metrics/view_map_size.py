@@ -9,11 +9,9 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-SPECS = {
-    "map.references": MetricSpec(title="References in the map", context=True),
-    "map.size_bytes": MetricSpec(title="Map size", better="lower"),
-    "map.pose_source": MetricSpec(setting=True),
-    "map.reference_size_bytes": MetricSpec(title="Size of a reference", better="lower"),
+from . import map_size
+
+SPECS = map_size.SPECS | {
     "map.visited_area_m2": MetricSpec(title="Visited area", unit="m²"),
     "map.references_per_m2": MetricSpec(title="References per m²"),
 }

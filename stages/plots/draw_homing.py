@@ -5,18 +5,16 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Floats, Shorts
-from omninav.stages.values.homing import HomingVector
+from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, HomingVector
 from omninav.stages.values.image import Pixels
 
 from .homing_snapshot import EncodedHomingView
 
 Colour = tuple[int, int, int]
-LOST, TRACKED, AGAIN, MATCHED = range(4)
-"""Kinds of features: lost, tracked, found again, matched again."""
 BRIGHT: dict[int, Colour] = {
     LOST: (0, 94, 255),
     TRACKED: (255, 200, 60),
-    AGAIN: (60, 235, 250),
+    FOUND_AGAIN: (60, 235, 250),
     MATCHED: (110, 235, 90),
 }
 """Blue-green-red, of Okabe & Ito's hues, brighter: they are drawn over photographs."""
@@ -65,7 +63,7 @@ def draw_target_view(pixels: Pixels | None, snapshot: EncodedHomingView, size: t
 
 def _features(drawn: Pixels, points: Floats, kinds: npt.NDArray[np.int8]) -> None:
     size = float(np.clip(drawn.shape[1] / 120, 1.8, 3.5))
-    for kind in (LOST, MATCHED, AGAIN, TRACKED):
+    for kind in (LOST, MATCHED, FOUND_AGAIN, TRACKED):
         for x, y in _finite(points[kinds == kind]):
             if kind == LOST:
                 for side in (-size, size):

@@ -6,13 +6,13 @@ import numpy as np
 
 from omninav.pipeline.report.chart import Layer
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
+from omninav.stages.values.homing import LOST, DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.thumbnails import decoded, encoded
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .draw_homing import LOST, draw_robot_view, draw_target_view, is_known
+from .draw_homing import draw_robot_view, draw_target_view, is_known
 from .homing_snapshot import EncodedHomingView
 
 COLOURS = (
