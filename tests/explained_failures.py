@@ -21,6 +21,7 @@ from omninav.pipeline.mcap.message import Message
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.map_files.references import cut_references
 from omninav.stages.metrics.causes import stretches
+from omninav.stages.metrics.stretches import logs_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.tools.explain import columns_of_run
 
@@ -133,7 +134,7 @@ def found_in(run: Any, name: str) -> str:
     if name == "carried":
         first, last = last - 1, last + frames / 10
     lengths: dict[str, int] = {}
-    for each in stretches(columns, 2.5):
+    for each in stretches(logs_of(columns), 2.5):
         shared = min(each.last, last) - max(each.first, first) + 1
         if shared > 0 and each.cause != "first images":
             lengths[each.cause] = lengths.get(each.cause, 0) + int(shared)

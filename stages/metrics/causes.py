@@ -1,7 +1,7 @@
 """Causes for which a stretch of a drive was not tracked, by fixed rules over the evidence of each image."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch
 
-from .stretches import GAP_M, GAP_SHARE, MIN_PART, NEAR_M, NEAR_SCALES, Columns, Part, logs_of, median, parts
+from .stretches import GAP_M, GAP_SHARE, MIN_PART, NEAR_M, NEAR_SCALES, Log, Part, median, parts
 
 DARK, LIGHT_RATIO = 0.1, 2.0
 """Brightness of dark images; factor between two lights: a stop of exposure, which a camera makes up for by itself."""
@@ -47,13 +47,13 @@ class Verdict(NamedTuple):
     advice: str = ""
 
 
-def stretches(columns: Columns, lost_m: float) -> list[Stretch]:
-    """Stretches of all logs of a drive that were not tracked, each with its cause, from the columns of `frames.csv`.
+def stretches(logs: Iterable[Log], lost_m: float) -> list[Stretch]:
+    """Stretches of all logs of a drive that were not tracked, each with its cause.
 
     `lost_m`: position error above which a sure estimate is wrong, where truth is known.
     """
     found: list[tuple[Part, Verdict]] = []
-    for part in (part for log in logs_of(columns) for part in parts(log, lost_m)):
+    for part in (part for log in logs for part in parts(log, lost_m)):
         verdict = verdict_on(part)
         if found and (before := found[-1][0]).goes_on_with(part) and found[-1][1] == verdict:
             found.pop()

@@ -32,10 +32,10 @@ class ExplainDrive(Stage):
         """The whole run at once; nothing where it has no estimate."""
         if not known(drive.estimate).any():
             return self.Out()
-        columns = [columns_of(log) for log in drive.by_log]
-        found = [stretch for log in columns for stretch in stretches(log, self.lost_m)]
-        rows = tuple(row_of(stretch, len(columns) > 1) for stretch in found)
-        caption = " ".join(summaries([Log(log) for log in columns]))
+        logs = [Log(columns_of(log)) for log in drive.by_log]
+        found = stretches(logs, self.lost_m)
+        rows = tuple(row_of(stretch, len(logs) > 1) for stretch in found)
+        caption = " ".join(summaries(logs))
         return self.Out(
             stretches=Stretches(tuple(found)),
             table=Table("explanation", "What happened, stretch by stretch", caption, COLUMNS, rows, order=5),

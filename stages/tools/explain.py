@@ -32,9 +32,9 @@ class ExplainRun(Tool):
         if ended.status != "complete":
             error = ended.manifest.get("error", "it did not end")
             print(f"the run is {ended.status} ({error:.300}); this is of its first {len(columns['estimate_x'])} images")
-        found, logs = stretches(columns, lost_m), logs_of(columns)
+        logs = logs_of(columns)
         print("\n".join(summaries(logs)))
-        for stretch in found:
+        for stretch in stretches(logs, lost_m):
             images, seconds, metres, state, cause, evidence, advice = row_of(stretch, len(logs) > 1)
             print(f"\nimages {images:<9} {seconds:>12} s {metres:>6} m   {state:<10} {cause}\n  {evidence}")
             if advice:

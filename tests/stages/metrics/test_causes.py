@@ -31,7 +31,7 @@ def drive(**changed):
 
 
 def found(**changed):
-    return [(each.first, each.last, each.state, each.cause) for each in stretches(drive(**changed), 2.5)]
+    return [(each.first, each.last, each.state, each.cause) for each in stretches([Log(drive(**changed))], 2.5)]
 
 
 ALONG = 0.2 * np.arange(N)
@@ -92,7 +92,7 @@ def test_before_the_first_sure_estimate_the_robot_is_searched_for():
 
 
 def test_evidence_has_its_numbers_and_ground_truth_where_there_is_one():
-    (told,) = stretches(drive(**FEW, nearest_m=3.0, nearest_scales=7.5, position_error_m=0.3), 2.5)
+    (told,) = stretches([Log(drive(**FEW, nearest_m=3.0, nearest_scales=7.5, position_error_m=0.3))], 2.5)
     assert "3.0 m from the nearest image of the map (median), 7.5 of its length scales" in told.evidence
     assert told.evidence.endswith("by ground truth the estimate was off by 0.30 m (median)")
     assert told.metres == pytest.approx(2.0)
@@ -102,5 +102,5 @@ def test_evidence_has_its_numbers_and_ground_truth_where_there_is_one():
 def test_without_evidence_of_images_states_are_told_and_causes_are_not():
     sound = drive(confidence=0.1)
     few = {name: sound[name] for name in list(sound)[:12]}
-    assert [each.cause for each in stretches(few, 2.5)] == ["not recorded"]
+    assert [each.cause for each in stretches([Log(few)], 2.5)] == ["not recorded"]
     assert "nodes.evidence" in in_short(Log(few))
