@@ -209,12 +209,11 @@ def _chunk(
                 found[k, 11], found[k, 12], found[k, 13] = enter, leave, face
         for i in range(wedge_start[wedge], wedge_start[wedge + 1]):
             dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
-            ahead = dx * level_x + dy * level_y
-            if column:
-                distance, which, face = _first_hit_in_column(found, fixed, count, ahead, dz, major, z, ceiling)
-            else:
-                ahead = dx * major_x + dy * major_y
-                distance, which, face = _first_hit(found, fixed, count, dx, dy, dz, ahead, z, ceiling)
+            # In a column, distances are those over the floor.
+            along = max(dx * level_x + dy * level_y, 1e-9) if column else 1.0
+            ahead = major if column else dx * major_x + dy * major_y
+            distance, which, face = _first_hit(found, fixed, count, dx, dy, dz / along, ahead, z, ceiling, column)
+            distance /= along
             if distance >= 1e8:
                 continue
             # Where it is, which way its face looks, and where on its surface.
@@ -457,9 +456,21 @@ def _store_box(
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
 def _first_hit(
-    found: Array, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
+    found: Array,
+    fixed: int,
+    count: int,
+    dx: float,
+    dy: float,
+    dz: float,
+    ahead: float,
+    z: float,
+    ceiling: float,
+    column: bool,
 ) -> tuple[float, int, int]:
-    """Distance, note and face of what a ray meets first; note -1 is the floor (face 5) or the ceiling (face 4)."""
+    """Distance, note and face of what a ray meets first; note -1 is the floor (face 5) or the ceiling (face 4).
+
+    Of a wedge of one azimuth (`column`) the found tell how far off boxes begin and end, over the floor.
+    """
     distance, which, face = 1e9, -1, 5
     if dz < 0.0:
         distance = -z / dz
@@ -469,10 +480,13 @@ def _first_hit(
     for k in range(count):
         if distance * ahead <= found[k, 8] and k < fixed:
             continue  # found beyond what was met already
-        enter, leave, side = _enter(
-            found[k, 0], found[k, 1], found[k, 2] * dx + found[k, 3] * dy, found[k, 2] * dy - found[k, 3] * dx,
-            found[k, 4], found[k, 5],
-        )  # fmt: skip
+        if column:
+            enter, leave, side = found[k, 11], found[k, 12], int(found[k, 13])
+        else:
+            enter, leave, side = _enter(
+                found[k, 0], found[k, 1], found[k, 2] * dx + found[k, 3] * dy, found[k, 2] * dy - found[k, 3] * dx,
+                found[k, 4], found[k, 5],
+            )  # fmt: skip
         if enter >= distance or leave <= 0.0:
             continue
         below, above = found[k, 6], found[k, 7]
@@ -490,41 +504,6 @@ def _first_hit(
         else:
             distance, which, face = enter, k, side
     return distance, which, face
-
-
-@compiled(error_model="numpy", fastmath=FAST_MATH)
-def _first_hit_in_column(
-    found: Array, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
-) -> tuple[float, int, int]:
-    """As `_first_hit`, for a ray in a wedge of one azimuth, where the found tell how far off boxes begin and end."""
-    slope = dz / max(ahead, 1e-9)
-    distance, which, face = 1e9, -1, 5
-    if slope < 0.0:
-        distance = -z / slope
-    elif slope > 0.0:
-        distance = (ceiling - z) / slope
-        face = 4
-    for k in range(count):
-        if k < fixed and distance * major <= found[k, 8]:
-            continue
-        enter, leave = found[k, 11], found[k, 12]
-        if enter >= distance or leave <= 0.0:
-            continue
-        below, above = found[k, 6], found[k, 7]
-        if enter < 0.0:
-            enter = 0.0
-            if below <= 0.0 <= above:
-                continue
-        rise = enter * slope
-        if rise > above:
-            if slope < 0.0 and above / slope <= leave and above / slope < distance:
-                distance, which, face = above / slope, k, 5
-        elif rise < below:
-            if slope > 0.0 and below / slope <= leave and below / slope < distance:
-                distance, which, face = below / slope, k, 4
-        else:
-            distance, which, face = enter, k, int(found[k, 13])
-    return distance / max(ahead, 1e-9), which, face
 
 
 @compiled(error_model="numpy", fastmath=FAST_MATH)
@@ -619,21 +598,24 @@ def _light(light: Floats, side: int, column: float, row: float) -> tuple[float, 
     row = min(max(row, 0.0), light.shape[1] - 1.001)
     left, below = int(column), int(row)
     wx, wy = column - left, row - below
-    wa, wb, wc, wd = (1 - wx) * (1 - wy), wx * (1 - wy), (1 - wx) * wy, wx * wy
-    above, right = below + 1, left + 1
+    weights = (1 - wx) * (1 - wy), wx * (1 - wy), (1 - wx) * wy, wx * wy
     return (
-        wa * light[side, below, left, 0]
-        + wb * light[side, below, right, 0]
-        + wc * light[side, above, left, 0]
-        + wd * light[side, above, right, 0],
-        wa * light[side, below, left, 1]
-        + wb * light[side, below, right, 1]
-        + wc * light[side, above, left, 1]
-        + wd * light[side, above, right, 1],
-        wa * light[side, below, left, 2]
-        + wb * light[side, below, right, 2]
-        + wc * light[side, above, left, 2]
-        + wd * light[side, above, right, 2],
+        _between(light, side, left, below, weights, 0),
+        _between(light, side, left, below, weights, 1),
+        _between(light, side, left, below, weights, 2),
+    )
+
+
+@compiled(error_model="numpy", fastmath=FAST_MATH)
+def _between(
+    light: Floats, side: int, left: int, below: int, weights: tuple[float, float, float, float], colour: int
+) -> float:
+    """One colour of the light between four samples."""
+    return float(
+        weights[0] * light[side, below, left, colour]
+        + weights[1] * light[side, below, left + 1, colour]
+        + weights[2] * light[side, below + 1, left, colour]
+        + weights[3] * light[side, below + 1, left + 1, colour]
     )
 
 
@@ -686,17 +668,12 @@ def _expose(
     spread = np.float32(noise)
     for p in numba.prange(len(image)):
         i = ray_of[p]
-        blue = green = red = np.float32(0.5)
-        if i >= 0:
-            share = gain[i] * np.float32(exposure)
-            blue += share * lit[i, 0]
-            green += share * lit[i, 1]
-            red += share * lit[i, 2]
-        if noise > 0.0:
-            drawn = _mixed(start + np.uint64(p) * np.uint64(0x9E3779B97F4A7C15))
-            blue += spread * quantiles[drawn & np.uint64(0xFFF)]
-            green += spread * quantiles[(drawn >> np.uint64(20)) & np.uint64(0xFFF)]
-            red += spread * quantiles[(drawn >> np.uint64(40)) & np.uint64(0xFFF)]
-        image[p, 0] = np.uint8(min(max(blue, np.float32(0.0)), np.float32(255.0)))
-        image[p, 1] = np.uint8(min(max(green, np.float32(0.0)), np.float32(255.0)))
-        image[p, 2] = np.uint8(min(max(red, np.float32(0.0)), np.float32(255.0)))
+        share = gain[i] * np.float32(exposure) if i >= 0 else np.float32(0.0)
+        drawn = _mixed(start + np.uint64(p) * np.uint64(0x9E3779B97F4A7C15))
+        for colour in range(3):
+            value = np.float32(0.5)
+            if i >= 0:
+                value += share * lit[i, colour]
+            if noise > 0.0:
+                value += spread * quantiles[(drawn >> np.uint64(20 * colour)) & np.uint64(0xFFF)]
+            image[p, colour] = np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)))
