@@ -44,16 +44,24 @@ def box_array(boxes: Sequence[Box]) -> Array:
     return np.array(rows, dtype=np.float64).reshape(-1, 9)
 
 
-def boxes_of_cells(low: Ints, high: Ints, rows: int, columns: int) -> tuple[Shorts, Shorts]:
-    """Boxes by the cells of a grid: where those of each cell begin (cells + 1,), and their numbers, ascending in each.
+def boxes_of_cells(
+    boxes: Array, reach: float, corner: Array, size: float, rows: int, columns: int
+) -> tuple[Shorts, Shorts]:
+    """Boxes (B, >= 6) within `reach` m of each cell of a grid, by their bounding rectangles.
 
-    `low` and `high` (B, 2): first and last column, and row, that each box is noted in.
+    `corner` (2,): of the first cell, of `size` m. Returns where those of each cell begin (cells + 1,), and their
+    numbers, ascending in each. Boxes beyond the grid are those of its outer cells.
     """
+    cos, sin = np.abs(boxes[:, 2]), np.abs(boxes[:, 3])
+    extent = np.stack([cos * boxes[:, 4] + sin * boxes[:, 5], sin * boxes[:, 4] + cos * boxes[:, 5]], axis=1) + reach
+    low = np.floor((boxes[:, :2] - extent - corner) / size - 1e-9)
+    high = np.floor((boxes[:, :2] + extent - corner) / size + 1e-9)
+    first, last = (np.clip(ends, 0, [columns - 1, rows - 1]).astype(np.int64).tolist() for ends in (low, high))
     noted = [
         np.add.outer(columns * np.arange(bottom, top + 1), np.arange(left, right + 1)).ravel()
-        for (left, bottom), (right, top) in zip(low.tolist(), high.tolist(), strict=True)
+        for (left, bottom), (right, top) in zip(first, last, strict=True)
     ]
     cells = np.concatenate([np.zeros(0, np.int64), *noted])
-    boxes = np.repeat(np.arange(len(noted), dtype=np.int32), [len(each) for each in noted])
+    numbers = np.repeat(np.arange(len(noted), dtype=np.int32), [len(each) for each in noted])
     order = np.argsort(cells, kind="stable")
-    return np.searchsorted(cells[order], np.arange(rows * columns + 1)).astype(np.int32), boxes[order]
+    return np.searchsorted(cells[order], np.arange(rows * columns + 1)).astype(np.int32), numbers[order]

@@ -37,12 +37,7 @@ def gather(boxes: Array, size: tuple[float, float], reach: float) -> Obstacles:
     """Obstacles from boxes (B, >= 6), as `box_array` has them, on a floor of `size` m, known up to `reach` m away."""
     boxes = np.ascontiguousarray(boxes[:, :6])
     rows, columns = max(1, math.ceil(size[1] / CELL)), max(1, math.ceil(size[0] / CELL))
-    across = np.abs(boxes[:, 2:3]) * boxes[:, 4:5] + np.abs(boxes[:, 3:4]) * boxes[:, 5:6]
-    upward = np.abs(boxes[:, 3:4]) * boxes[:, 4:5] + np.abs(boxes[:, 2:3]) * boxes[:, 5:6]
-    extent = np.hstack([across, upward]) + reach
-    low = np.clip(np.floor((boxes[:, :2] - extent) / CELL).astype(int), 0, None)
-    high = np.minimum(np.floor((boxes[:, :2] + extent) / CELL).astype(int), [columns - 1, rows - 1])
-    start, members = boxes_of_cells(low, high, rows, columns)
+    start, members = boxes_of_cells(boxes, reach, np.zeros(2), CELL, rows, columns)
     return Obstacles(boxes, start, members, rows, columns, float(size[0]), float(size[1]), reach)
 
 

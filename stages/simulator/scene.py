@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.arrays import Array, Bytes, Shorts
+from omninav.stages.geometry.arrays import Bytes
 
 from . import textures
 from .bodies import Box, Coverings, Tiling, box_array, boxes_of_cells
@@ -49,7 +49,7 @@ def build_scene(
     bodies = box_array(boxes)
     grid = np.array([-MARGIN, -MARGIN, CELL])
     columns, rows = (math.ceil((extent + 2 * MARGIN) / CELL) for extent in size)
-    cell_start, cell_boxes = cells(bodies, grid, rows, columns)
+    cell_start, cell_boxes = boxes_of_cells(bodies, 0.0, grid[:2], CELL, rows, columns)
     return Scene(
         boxes=bodies,
         faces=(2 + np.arange(6 * len(boxes), dtype=np.int32)).reshape(-1, 6),
@@ -78,13 +78,3 @@ def packed(texels: Bytes) -> npt.NDArray[np.uint32]:
     """Blue-green-red texels (..., 3) as numbers (...,): blue in the lowest byte."""
     wide = texels.astype(np.uint32)
     return (wide @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)).astype(np.uint32, copy=False)
-
-
-def cells(boxes: Array, grid: Array, rows: int, columns: int) -> tuple[Shorts, Shorts]:
-    """Which boxes touch which cell, by their bounding rectangles: where each begins (cells + 1,), and boxes."""
-    cos, sin = np.abs(boxes[:, 2]), np.abs(boxes[:, 3])
-    reach = np.stack([cos * boxes[:, 4] + sin * boxes[:, 5], sin * boxes[:, 4] + cos * boxes[:, 5]], axis=1)
-    low = np.floor((boxes[:, :2] - reach - grid[:2]) / grid[2] - 1e-9).astype(np.int64)
-    high = np.floor((boxes[:, :2] + reach - grid[:2]) / grid[2] + 1e-9).astype(np.int64)
-    last = np.array([columns - 1, rows - 1])
-    return boxes_of_cells(np.clip(low, 0, last), np.clip(high, 0, last), rows, columns)
