@@ -12,6 +12,7 @@ from omninav.stages.geometry.arrays import Array
 
 from .config import Door, Kidnapping, Point, Room, Route, Side, WallPanel, WorldConfig
 from .mirrored import Mirrored
+from .rooms import FACING, SIDES, wall_of
 from .standing_room import standing_room, within
 from .streams import stream
 
@@ -281,9 +282,8 @@ def _panels(world: WorldConfig, corridors: set[str], rng: np.random.Generator) -
     for panel in world.wall_panels:
         for _ in range(TRIES):
             hall = halls[int(rng.integers(len(halls)))]
-            side = ("east", "north", "west", "south")[int(rng.integers(4))]
-            share = rng.uniform(0.1, 0.9)
-            spot = _spot(world, hall, corridors, side, share, panel.width)  # type: ignore[arg-type]
+            side, share = SIDES[int(rng.integers(4))], rng.uniform(0.1, 0.9)
+            spot = _spot(world, hall, corridors, side, share, panel.width)
             if spot is not None and all(math.dist(spot[0], other) > 2.0 for other in hung):
                 hung.append(spot[0])
                 yield replace(panel, centre=spot[0], facing=spot[1])
@@ -294,25 +294,18 @@ def _spot(
     world: WorldConfig, hall: Room, corridors: set[str], side: Side, share: float, width: float
 ) -> tuple[Point, float] | None:
     """A place on the wall beside a corridor and the direction it faces; None where no wall is, or a door."""
-    (x, y), (wide, deep) = hall.corner, hall.size
-    along_x = side in ("north", "south")
-    outward = 1 if side in ("north", "east") else -1
-    at = (
-        (x + share * wide, y + (deep if outward > 0 else 0.0))
-        if along_x
-        else (x + (wide if outward > 0 else 0.0), y + share * deep)
-    )
-    beyond = (at[0], at[1] + 0.3 * outward) if along_x else (at[0] + 0.3 * outward, at[1])
-    facing = math.atan2(at[1] - beyond[1], at[0] - beyond[0])
+    wall, axis = wall_of(hall, side), 0 if side in ("north", "south") else 1
+    along = wall.low + share * hall.size[axis]
+    at, beyond = wall.on_map(along, wall.line), wall.on_map(along, wall.inside(-0.3))
     if not (0.0 < beyond[0] < world.size[0] and 0.0 < beyond[1] < world.size[1]):
-        return None if hall.walls else (at, facing)  # a walled corridor has windows there
+        return None if hall.walls else (at, FACING[side])  # a walled corridor has windows there
     room = next((room for room in world.rooms if room.name not in corridors and _holds(room, beyond)), None)
     if room is None:
         return None
-    place, extent = (at[0] - room.corner[0], room.size[0]) if along_x else (at[1] - room.corner[1], room.size[1])
-    facing_door = (door for door in room.doors if door.side in (("north", "south") if along_x else ("east", "west")))
-    clear = all(abs(door.at - place) > (door.width + width) / 2 + 0.1 for door in facing_door)
-    return (at, facing) if clear and width / 2 < place < extent - width / 2 else None
+    place, extent = along - room.corner[axis], room.size[axis]
+    doors = (door for door in room.doors if wall_of(room, door.side).along_x == wall.along_x)
+    clear = all(abs(door.at - place) > (door.width + width) / 2 + 0.1 for door in doors)
+    return (at, FACING[side]) if clear and width / 2 < place < extent - width / 2 else None
 
 
 # Routes

@@ -17,11 +17,6 @@ RAYS_PER_CONE = 5
 """Rays that sample a cone."""
 
 
-def azimuths(ring: Ranges) -> tuple[float, float]:
-    """Azimuth of the first reading and the step to the next (rad): the first looks backwards."""
-    return -math.pi, 2 * math.pi / ring.readings
-
-
 def round_bodies(people: Sequence[Person]) -> Array:
     """People as a ring and a robot's bumper know them: (M, 3) x, y, radius."""
     return np.array([(*person.position, person.radius) for person in people]).reshape(-1, 3)

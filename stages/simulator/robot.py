@@ -218,17 +218,12 @@ def _point(points: Array, ends: Array, along: float) -> tuple[float, float]:
     """The point `along` metres from the start of a line."""
     if len(points) == 1:
         return points[0, 0], points[0, 1]
-    leg = min(max(_leg(ends, along), 1), len(points) - 1)
+    leg = min(max(int(np.searchsorted(ends, along)), 1), len(points) - 1)
     part = (along - ends[leg - 1]) / (ends[leg] - ends[leg - 1])
     return (
         points[leg - 1, 0] + part * (points[leg, 0] - points[leg - 1, 0]),
         points[leg - 1, 1] + part * (points[leg, 1] - points[leg - 1, 1]),
     )
-
-
-@compiled(error_model="numpy")
-def _leg(ends: Array, along: float) -> int:
-    return np.searchsorted(ends, along)  # type: ignore[return-value]
 
 
 @compiled(error_model="numpy")

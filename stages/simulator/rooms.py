@@ -13,6 +13,8 @@ from .streams import stream
 INNER_WALL_M = 0.12
 """Thickness (m) of an inner wall."""
 SIDES: tuple[Side, ...] = get_args(Side)
+FACING: dict[Side, float] = {"east": math.pi, "north": -math.pi / 2, "west": 0.0, "south": math.pi / 2}
+"""Headings from each wall of a room into it."""
 DOOR_HEIGHT_M = 2.1
 DOOR_CLEARANCE_M = 0.7
 """Metres that furniture keeps from both sides of a door."""
@@ -32,7 +34,7 @@ class Opening(NamedTuple):
         return self.middle - self.width / 2, self.middle + self.width / 2
 
 
-class _Wall(NamedTuple):
+class Wall(NamedTuple):
     """A side of a room: whether it runs along x, where it is across that, and where it begins and ends.
 
     `inward`: 1 where the room is on the side of greater x or y, else -1.
@@ -125,15 +127,16 @@ def openings(config: WorldConfig) -> list[Opening]:
 
 
 def _opening(room: Room, door: Door) -> Opening:
-    wall = _wall(room, door.side)
+    wall = wall_of(room, door.side)
     return Opening(wall.along_x, wall.line, wall.low + door.at, door.width)
 
 
-def _wall(room: Room, side: Side) -> _Wall:
+def wall_of(room: Room, side: Side) -> Wall:
+    """The wall of a room on a side."""
     (x, y), (width, depth) = room.corner, room.size
     if side in ("north", "south"):
-        return _Wall(True, y + depth if side == "north" else y, x, x + width, -1 if side == "north" else 1)
-    return _Wall(False, x + width if side == "east" else x, y, y + depth, -1 if side == "east" else 1)
+        return Wall(True, y + depth if side == "north" else y, x, x + width, -1 if side == "north" else 1)
+    return Wall(False, x + width if side == "east" else x, y, y + depth, -1 if side == "east" else 1)
 
 
 def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
@@ -145,7 +148,7 @@ def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
     blocks = []
     for inset, material, look, overlap in layers:
         for side in SIDES:
-            wall = _wall(room, side)
+            wall = wall_of(room, side)
             gaps = [cut.ends for cut in sorted(wall.cut_by(cuts), key=lambda cut: cut.middle)]
             edges = [wall.low - overlap, *(end for gap in gaps for end in gap), wall.high + overlap]
             pieces = [
@@ -179,7 +182,7 @@ def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]
     for k, door in enumerate(room.doors):
         if not door.leaf:
             continue
-        wall = _wall(room, door.side)
+        wall = wall_of(room, door.side)
         along, across = wall.low + door.at, wall.inside(INNER_WALL_M / 2)
         is_open = bool(stream(config.draw_seed, "door", room.name, k, "day", number).uniform() < day.doors)
         if is_open:
@@ -194,7 +197,7 @@ def windows(room: Room) -> list[WallPanel]:
     """Rows of windows on the named sides, where no door is."""
     panes = []
     for side in room.windows:
-        wall = _wall(room, side)
+        wall = wall_of(room, side)
         count = max(1, math.floor((wall.high - wall.low) / 1.8))
         for k in range(count):
             along = wall.low + (wall.high - wall.low) * (k + 0.5) / count
@@ -207,10 +210,9 @@ def windows(room: Room) -> list[WallPanel]:
 def _on_wall(
     room: Room, side: Side, along: float, width: float, low: float, height: float, material: Material
 ) -> WallPanel:
-    wall = _wall(room, side)
+    wall = wall_of(room, side)
     centre = wall.on_map(along, wall.inside(INNER_WALL_M if room.walls else 0.0))
-    facing = {"east": math.pi, "north": -math.pi / 2, "west": 0.0, "south": math.pi / 2}[side]
-    return WallPanel(centre, facing, width, low, height, material)
+    return WallPanel(centre, FACING[side], width, low, height, material)
 
 
 class Fittings(NamedTuple):
@@ -230,7 +232,7 @@ def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, numb
     wall_panels: list[WallPanel] = []
     pieces = CATALOGUE[room.furniture]
     for side in SIDES if room.walls else ():
-        wall = _wall(room, side)
+        wall = wall_of(room, side)
         corner = 1.0 if side in ("east", "west") else 0.2
         begin, end = wall.low + corner, wall.high - corner
         free = [(low - DOOR_CLEARANCE_M, high + DOOR_CLEARANCE_M) for low, high in (c.ends for c in wall.cut_by(cuts))]
@@ -274,7 +276,7 @@ def _placed_along(
         at = last + gap
 
 
-def _against_wall(room: Room, wall: _Wall, along: float, piece: _Piece, turn: float) -> Iterator[Block]:
+def _against_wall(room: Room, wall: Wall, along: float, piece: _Piece, turn: float) -> Iterator[Block]:
     """A piece of furniture with its back to the wall, what is on it, and the chair in front."""
 
     def body(part: _Piece, depth_at: float, yaw: float = 0.0, look: str = "") -> Block:

@@ -171,10 +171,9 @@ def _through_rooms(world: World, space: "_FreeSpace", route: Route, start: Point
     spots = [spot for room in rooms if (spot := space.roomiest_place(room.corner, room.size)) is not None]
     at: Point = start
     while spots:
-        far = space.distances(np.asarray(at))
-        reach = [space.cost_at(far, spot) for spot in spots]
-        nearest = int(np.argmin(reach))
-        if not math.isfinite(reach[nearest]):
+        costs = space.costs(at, spots)
+        nearest = int(np.argmin(costs))
+        if not math.isfinite(costs[nearest]):
             return  # behind closed doors
         at = spots.pop(nearest)
         yield at
@@ -338,16 +337,12 @@ class _FreeSpace:
         ).astype(np.float64)
         return looked_up
 
-    def distances(self, start: Array) -> Array:
-        """Costs of the shortest ways from a point to all cells; infinite where there is none."""
+    def costs(self, start: Point, points: Sequence[Point]) -> Array:
+        """Costs (N,) of the shortest ways from a point to others; infinite where there is none."""
         from scipy.sparse.csgraph import dijkstra
 
-        cost: Array = dijkstra(self._graph, directed=False, indices=self._cell(start))
-        return cost
-
-    def cost_at(self, costs: Array, point: Point) -> float:
-        """The cost at a point."""
-        return float(costs[self._cell(point)])
+        costs: Array = dijkstra(self._graph, directed=False, indices=self._cell(start))
+        return costs[[self._cell(point) for point in points]]
 
     def roomiest_place(self, corner: Point, size: Point) -> Point | None:
         """The roomiest reachable place in a rectangle, not far from its middle; None where there is none."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +27,7 @@ from .drawn_plan import laid_out
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
 from .people import Person, RobotTrack
-from .ranges import azimuths, measure, round_bodies
+from .ranges import measure, round_bodies
 from .renderer import Scene
 from .robot import NO_PEOPLE, SimulatedDrive, drive, reach
 from .robot_camera import RobotCamera
@@ -208,7 +209,7 @@ class SimulatedRecording(Recording):
 
     def people_at(self, seconds: float) -> tuple[Person, ...]:
         """The people at a time."""
-        return self._world.people_at(seconds, RobotTrack(self._seconds, self.driven))
+        return self._world.crowd.at(seconds, RobotTrack(self._seconds, self.driven))
 
     def digest(self) -> str:
         """sha256 over the days of the world that the drive sees, route, day, kidnappings and the simulator's code."""
@@ -264,5 +265,5 @@ def simulation_digest(world: WorldConfig) -> str:
 
 def scan_value(world: WorldConfig, metres: Array) -> Scan:
     """A range scan as the value that travels on wires."""
-    first, step = azimuths(world.ranges)
-    return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.max_range)
+    step = 2 * math.pi / world.ranges.readings
+    return Scan(metres, -math.pi, step, nearest=0.0, farthest=world.ranges.max_range)

@@ -249,10 +249,6 @@ class World:
         count = self.config.day(self.day).people
         return people.Crowd(self.config.draw_seed, self.day, count, self.config.size, self.clearance)
 
-    def people_at(self, seconds: float, track: people.RobotTrack | None = None) -> tuple[people.Person, ...]:
-        """The people of this day at a time; some keep the robot company where its `track` up to then is known."""
-        return self.crowd.at(seconds, track)
-
     # Room to drive
 
     @cached_property

@@ -38,11 +38,11 @@ def positions(people: tuple[Person, ...]) -> npt.NDArray[np.float64]:
 
 def test_walkers_never_walk_through_anything(busy: World) -> None:
     for seconds in np.arange(0.0, 300.0, 1.3):
-        assert (busy.clearance(positions(busy.people_at(seconds))) > 0.25).all()
+        assert (busy.clearance(positions(busy.crowd.at(seconds))) > 0.25).all()
 
 
 def test_walkers_go_no_faster_than_people_do_and_get_about(busy: World) -> None:
-    paths = np.array([positions(busy.people_at(0.5 * step)) for step in range(600)])
+    paths = np.array([positions(busy.crowd.at(0.5 * step)) for step in range(600)])
     assert np.hypot(*np.diff(paths, axis=0).T).max() < 0.5 * 1.25
     assert (np.ptp(paths, axis=0).max(axis=1) > 3.0).mean() > 0.7
 
@@ -50,17 +50,17 @@ def test_walkers_go_no_faster_than_people_do_and_get_about(busy: World) -> None:
 def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(busy: World, track: RobotTrack) -> None:
     times = (40.0, 3.0, 55.5, 40.0)
     other = World(BUSY)
-    forth = [busy.people_at(seconds, track) for seconds in times]
-    assert forth == [other.people_at(seconds, track) for seconds in times]
+    forth = [busy.crowd.at(seconds, track) for seconds in times]
+    assert forth == [other.crowd.at(seconds, track) for seconds in times]
     assert forth[0] == forth[3]
-    assert forth[0] != World(BUSY, day=1).people_at(40.0, track)
+    assert forth[0] != World(BUSY, day=1).crowd.at(40.0, track)
 
 
 def test_some_keep_the_robot_company_and_nobody_is_run_over_or_trodden_on(busy: World, track: RobotTrack) -> None:
-    walkers, beside = {person.height for person in busy.people_at(0.0)}, 0
+    walkers, beside = {person.height for person in busy.crowd.at(0.0)}, 0
     for seconds in np.arange(10.0, 60.0, 0.5):
         robot = track.poses[np.searchsorted(track.times, seconds), :2]
-        people = busy.people_at(seconds, track)
+        people = busy.crowd.at(seconds, track)
         places = positions(people)
         distance = np.hypot(*(places - robot).T)
         assert distance.min() > 0.55
@@ -95,7 +95,7 @@ def test_over_a_drive_everybody_walks_and_nobody_jumps(route: str) -> None:
 
 def test_nobody_knows_where_the_robot_will_go(busy: World, track: RobotTrack) -> None:
     known = track.times <= 30.0
-    assert busy.people_at(30.0, track) == busy.people_at(30.0, RobotTrack(track.times[known], track.poses[known]))
+    assert busy.crowd.at(30.0, track) == busy.crowd.at(30.0, RobotTrack(track.times[known], track.poses[known]))
 
 
 def test_a_person_is_seen_where_it_stands(busy: World) -> None:
