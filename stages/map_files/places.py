@@ -9,6 +9,7 @@ import numpy as np
 
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Bools, Ints
+from omninav.stages.geometry.runs import chosen_runs
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import StoredViews, TopologicalMap
 
@@ -88,8 +89,8 @@ def _chosen(map: TopologicalMap, places: Bools, links: Ints, ways: Sequence[Ints
 
 
 def _chosen_views(views: StoredViews, used: Ints) -> StoredViews:
-    patches, starts = _parts(views.starts, used)
-    columns, column_starts = _parts(views.column_starts, used)
+    patches, starts = chosen_runs(views.starts, used)
+    columns, column_starts = chosen_runs(views.column_starts, used)
     return StoredViews(
         starts=starts,
         directions=views.directions[patches],
@@ -102,12 +103,6 @@ def _chosen_views(views: StoredViews, used: Ints) -> StoredViews:
         column_weights=views.column_weights[columns],
         moments=views.moments[used],
     )
-
-
-def _parts(starts: Ints, used: Ints) -> tuple[Ints, Ints]:
-    """The rows of some parts, and where each part then begins."""
-    rows = [np.arange(starts[part], starts[part + 1]) for part in used.tolist()]
-    return np.concatenate([np.empty(0, np.int64), *rows]), np.cumsum([0, *map(len, rows)], dtype=np.int64)
 
 
 def _joined_views(views: Sequence[StoredViews]) -> StoredViews:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Covariances, RowsOf, Shape, Starts, Value
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
+from omninav.stages.geometry.runs import chosen_runs
 
 from .visual_words import VisualWords
 
@@ -81,8 +82,7 @@ class Landmarks(Value):
     def seen_by(self, references: Ints) -> Ints:
         """Rows (N,) of the points that any of some references sees, ascending."""
         shown = np.zeros(len(self), np.bool_)
-        for reference in references.tolist():
-            shown[self.seen[self.starts[reference] : self.starts[reference + 1]]] = True
+        shown[self.seen[chosen_runs(self.starts, references)[0]]] = True
         return np.flatnonzero(shown)
 
     def of_references(self, rows: Ints) -> "Landmarks":
@@ -90,13 +90,9 @@ class Landmarks(Value):
 
         A reference that a map has learned since sees none, and its pose is as uncertain as theirs in the mean.
         """
-        sizes = np.append(np.diff(self.starts), 0)
         own = np.minimum(rows, self.references)
-        counts = sizes[own]
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        first = np.append(self.starts[:-1], 0)[own]
-        seen = self.seen[np.repeat(first - starts[:-1], counts) + np.arange(starts[-1])]
-        kept, renumbered = np.unique(seen, return_inverse=True)
+        seen, starts = chosen_runs(self.starts, own)
+        kept, renumbered = np.unique(self.seen[seen], return_inverse=True)
         sigmas = self.pose_sigmas
         if sigmas is not None:
             sigmas = np.vstack([sigmas, sigmas.mean(axis=0) if len(sigmas) else np.zeros(3)])[own]

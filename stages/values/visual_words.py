@@ -11,6 +11,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, RowsOf, Shape, Starts, Value
 from omninav.stages.geometry.appearance import visual_words
 from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
+from omninav.stages.geometry.runs import chosen_runs
 
 from .pose import PoseSource
 
@@ -56,9 +57,7 @@ class VisualWords(Value):
 
     def of_views(self, rows: Ints) -> "VisualWords":
         """The words of some views (N,) in this order, of the same vocabulary; one past the last view has none."""
-        counts = np.append(np.diff(self.starts), 0)[rows]
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        taken = np.repeat(np.append(self.starts[:-1], 0)[rows] - starts[:-1], counts) + np.arange(starts[-1])
+        taken, starts = chosen_runs(self.starts, rows)
         return replace(self, starts=starts, words=self.words[taken], weights=self.weights[taken])
 
 
