@@ -116,7 +116,7 @@ class AisleBlock:
     aisle: Positive = 2.0
     """Minimum width of an aisle."""
     depth: Positive = 1.0
-    """Texture of the shelves, as the next three."""
+    """Depth of its shelves; the next three are theirs, too."""
     height: Positive = 2.0
     levels: Annotated[int, Bounds(ge=1)] = 4
     stock: bool = True

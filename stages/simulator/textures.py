@@ -125,10 +125,9 @@ def _stripes(rng: np.random.Generator) -> Floats:
 def _floor(rng: np.random.Generator) -> Floats:
     canvas = blank((0, 0, 0))
     tone = np.array([148.0, 158.0, 165.0]) + rng.normal(0.0, 3.0, 3)
-    for row in range(2):
-        for column in range(2):
-            tile = tone * (1.0 + rng.normal(0.0, 0.05)) * (0.86 if (row + column) % 2 else 1.0)
-            box(canvas, column / 2, row / 2, (column + 1) / 2, (row + 1) / 2, tuple(tile))
+    for row, column in np.ndindex(2, 2):
+        tile = tone * (1.0 + rng.normal(0.0, 0.05)) * (0.86 if (row + column) % 2 else 1.0)
+        box(canvas, column / 2, row / 2, (column + 1) / 2, (row + 1) / 2, tuple(tile))
     canvas += cloud(rng, 24, 7.0) + grain(rng, 5.0)
     _bars(canvas, (0.0, 0.5), 0.012, (92, 98, 104))
     return canvas
@@ -302,10 +301,9 @@ def _asphalt(rng: np.random.Generator) -> Floats:
 def _paving(rng: np.random.Generator) -> Floats:
     canvas = blank((105, 112, 116))
     tone = np.array([160.0, 166.0, 172.0]) * rng.uniform(0.85, 1.1)
-    for row in range(4):
-        for column in range(4):
-            slab = tuple(tone * rng.uniform(0.9, 1.08))
-            box(canvas, column / 4 + 0.008, row / 4 + 0.008, (column + 1) / 4, (row + 1) / 4, slab)
+    for row, column in np.ndindex(4, 4):
+        slab = tuple(tone * rng.uniform(0.9, 1.08))
+        box(canvas, column / 4 + 0.008, row / 4 + 0.008, (column + 1) / 4, (row + 1) / 4, slab)
     return canvas + cloud(rng, 16, 5.0) + grain(rng, 6.0)
 
 
@@ -366,12 +364,11 @@ def _cabinet(rng: np.random.Generator) -> Floats:
     colour = lit_to(vivid(rng, (0.05, 0.6)), rng.uniform(150.0, 235.0))
     canvas = blank(scaled(colour, 0.6))
     columns, rows = int(rng.integers(1, 3)), int(rng.integers(1, 5))
-    for row in range(rows):
-        for column in range(columns):
-            left, top = column / columns, row / rows * 0.94
-            box(canvas, left + 0.015, top + 0.015, left + 1 / columns - 0.015, top + 0.94 / rows - 0.005, colour)
-            middle = left + 0.5 / columns
-            box(canvas, middle - 0.06, top + 0.04, middle + 0.06, top + 0.06, (70, 70, 72))
+    for row, column in np.ndindex(rows, columns):
+        left, top = column / columns, row / rows * 0.94
+        box(canvas, left + 0.015, top + 0.015, left + 1 / columns - 0.015, top + 0.94 / rows - 0.005, colour)
+        middle = left + 0.5 / columns
+        box(canvas, middle - 0.06, top + 0.04, middle + 0.06, top + 0.06, (70, 70, 72))
     box(canvas, 0, 0.95, 1, 1, (45, 45, 48))
     return canvas + grain(rng, 3.0)
 
@@ -480,14 +477,10 @@ def _rolls(canvas: Floats, rng: np.random.Generator) -> None:
     columns, rows = int(rng.integers(3, 7)), int(rng.integers(2, 5))
     colours = [vivid(rng) for _ in range(3)]
     radius = 0.42 * min(0.94 / columns, 0.85 / rows) * DRAWN
-    for row in range(rows):
-        for column in range(columns):
-            at = (
-                int((0.04 + 0.94 * (column + 0.5) / columns) * DRAWN),
-                int((0.05 + 0.85 * (row + 0.5) / rows) * DRAWN),
-            )
-            cv2.circle(canvas, at, int(radius), colours[int(rng.integers(3))], -1)
-            cv2.circle(canvas, at, int(0.35 * radius), (60, 60, 60), -1)
+    for row, column in np.ndindex(rows, columns):
+        at = int((0.04 + 0.94 * (column + 0.5) / columns) * DRAWN), int((0.05 + 0.85 * (row + 0.5) / rows) * DRAWN)
+        cv2.circle(canvas, at, int(radius), colours[int(rng.integers(3))], -1)
+        cv2.circle(canvas, at, int(0.35 * radius), (60, 60, 60), -1)
 
 
 def _plants(canvas: Floats, rng: np.random.Generator) -> None:
