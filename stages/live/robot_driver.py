@@ -17,6 +17,7 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import interpolate
 from omninav.stages.plots.pose_messages import BASE, ODOM, header, ros_pose, transform
 from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.messages import scan_fields
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
@@ -195,15 +196,7 @@ class RobotDriver(Publisher, Stage):
             self._send("/odom", "nav_msgs/msg/Odometry", frames | moving)
             self._send("/tf", "tf2_msgs/msg/TFMessage", {"transforms": [transform(at + shift, ODOM, BASE, pose)]})
         if scan is not None:
-            ring = {
-                "angle_min": scan.first,
-                "angle_max": scan.first + scan.step * (len(scan.ranges) - 1),
-                "angle_increment": scan.step,
-                "range_min": scan.nearest,
-                "range_max": scan.farthest,
-                "ranges": scan.ranges.astype(np.float32),
-            }
-            self._send("/scan", "sensor_msgs/msg/LaserScan", {"header": header(stamp, BASE)} | ring)
+            self._send("/scan", "sensor_msgs/msg/LaserScan", {"header": header(stamp, BASE)} | scan_fields(scan))
 
     def _odometry(self, robot: RobotDriverState, now: int, pose: Array) -> Iterator[tuple[int, Array]]:
         """Stamps and poses since the tick before, up to this one."""

@@ -98,6 +98,18 @@ def scan_of(message: Any) -> Scan:
     )
 
 
+def scan_fields(scan: Scan) -> dict[str, Any]:
+    """The fields of the LaserScan message that `scan_of` makes the scan of; its header is left out."""
+    return {
+        "angle_min": scan.first,
+        "angle_max": scan.first + scan.step * (len(scan.ranges) - 1),
+        "angle_increment": scan.step,
+        "range_min": scan.nearest,
+        "range_max": scan.farthest,
+        "ranges": scan.ranges.astype(np.float32),
+    }
+
+
 def pixels_of(message: Any) -> Pixels:
     """The image of an Image or CompressedImage message, (height, width, 3) uint8 blue-green-red.
 

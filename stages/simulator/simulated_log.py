@@ -13,6 +13,7 @@ import numpy as np
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.messages import scan_fields
 from omninav.stages.recordings.rooms_yaml import ROOMS, write_rooms
 
 from .simulated_recording import SimulatedRecording
@@ -85,17 +86,8 @@ def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, 
 
 
 def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
-    scan = recording.scan_at(number)
-    message = {
-        "header": {"frame_id": "base_link"},
-        "angle_min": scan.first,
-        "angle_max": scan.first + scan.step * (len(scan.ranges) - 1),
-        "angle_increment": scan.step,
-        "scan_time": 1.0 / recording.world.ranges.rate,
-        "range_min": scan.nearest,
-        "range_max": scan.farthest,
-        "ranges": scan.ranges.astype(np.float32),
-    }
+    head = {"header": {"frame_id": "base_link"}, "scan_time": 1.0 / recording.world.ranges.rate}
+    message = head | scan_fields(recording.scan_at(number))
     log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.scan_times[number]), message, arrival)
 
 
