@@ -5,7 +5,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Context, Tool
 from omninav.stages.map_files.places import thinned_places
 from omninav.stages.map_files.references import thinned_references
-from omninav.stages.map_files.saved import read_saved, target, write_saved
+from omninav.stages.map_files.saved import MapOfPlaces, read_saved, target, write_saved
 from omninav.stages.values.maps import ReferenceGraph
 
 
@@ -29,10 +29,10 @@ class ThinMap(Tool):
         (source,) = read_saved(self.maps, at_most=1)
         path, map = target(self.out, [source]), source.map
         if isinstance(map, ReferenceGraph):
-            thin = thinned_references(map, self.spacing)
-            write_saved(path, thin, [source], f"thin spacing={self.spacing:g}")
-            print(f"{path}: {len(thin)} of {len(map)} references, at least {self.spacing:g} m apart")
+            left: MapOfPlaces = thinned_references(map, self.spacing)
+            kept = f"{len(left)} of {len(map)} references"
         else:
-            few = thinned_places(map, self.spacing)
-            write_saved(path, few, [source], f"thin spacing={self.spacing:g}")
-            print(f"{path}: {len(few.ways)} of {len(map.ways)} path images, at least {self.spacing:g} m apart")
+            left = thinned_places(map, self.spacing)
+            kept = f"{len(left.ways)} of {len(map.ways)} path images"
+        write_saved(path, left, [source], f"thin spacing={self.spacing:g}")
+        print(f"{path}: {kept}, at least {self.spacing:g} m apart")
