@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.geometry.plane.se2 import between, compose, path_length
 from omninav.stages.values.drive import Drive, known
 
 SPECS = {
@@ -104,10 +104,10 @@ def confidence_of(drive: Drive) -> dict[str, Any]:
         values["probability"] = float(np.median(stated))
         values["doubtful_share"] = float((stated < 0.5).mean())
     path = drive.estimate[there]
-    values["path_m"] = float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
+    values["path_m"] = path_length(path)
     odometry = drive.odometry()
     if odometry is not None:
-        values["odometry_path_m"] = float(np.hypot(*np.diff(odometry[:, :2], axis=0).T).sum())
+        values["odometry_path_m"] = path_length(odometry)
         if len(path) > 1:
             expected = compose(path[:-1], between(odometry[there][:-1], odometry[there][1:]))
             values["step_off_odometry_m"] = float(np.median(position_errors(path[1:], expected)))

@@ -8,6 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import path_length
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
 
@@ -124,10 +125,7 @@ def first_map(drive: Drive) -> dict[str, Any]:
     truth = drive.truth[:frames][scored]
     if not len(truth):
         return {}
-    found: dict[str, Any] = {
-        "frames": frames,
-        "driven_m": float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()),
-    }
+    found: dict[str, Any] = {"frames": frames, "driven_m": path_length(truth)}
     for name, poses in (("odometry_alone", drive.odometry_alone()), ("estimate", drive.estimate)):
         if poses is not None:
             found[name] = _errors(poses[:frames][scored], truth)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.plane.se2 import path_length
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.planned_route import PlannedRoute
@@ -180,8 +181,7 @@ def metres_of_first(map: ReferenceGraph, start: Array, routes: Sequence[PlannedR
     first = next((route for route in routes if route.number >= 0 and route.goal is not None), None)
     if first is None or first.goal is None:
         return None
-    way = np.vstack([start, map.poses[first.places, :2], (first.goal.x, first.goal.y)])
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+    return path_length(np.vstack([start, map.poses[first.places, :2], (first.goal.x, first.goal.y)]))
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:

@@ -8,6 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import path_length
 from omninav.stages.values.drive import Drive, known
 
 from .truth_misfit import truth_misfit
@@ -79,7 +80,7 @@ def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) 
         return result
     scored = known(drive.truth) & known(drive.estimate)
     true = drive.truth[known(drive.truth)]
-    result["driven_m"] = float(np.hypot(*np.diff(true[:, :2], axis=0).T).sum())
+    result["driven_m"] = path_length(true)
     result["frames_without_truth"] = int((~known(drive.truth)).sum())
     result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
     if not scored.any():

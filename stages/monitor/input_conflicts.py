@@ -12,7 +12,7 @@ from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.mount import found_mount
-from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
+from omninav.stages.geometry.plane.se2 import between, compose, path_length, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import Reinitialise
@@ -473,10 +473,10 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     if math.log2(fit.scale) > MISSCALED_OCTAVES and np.nanmedian(watched.correlation) > CHANGING:
         return ""  # the robot stands still, and its best match goes back and forth
     if watched.metres < STILL_M:
-        metres = float(np.hypot(*np.diff(matches[:, :2], axis=0).T).sum())
         return (
-            f"odometry stands still while the best matches in the map move on by {metres:.1f} m over {len(matches)} "
-            "images: check that its topic is the robot's own (`topics.odometry=…`) and that the wheels' driver runs"
+            f"odometry stands still while the best matches in the map move on by {path_length(matches):.1f} m over "
+            f"{len(matches)} images: check that its topic is the robot's own (`topics.odometry=…`) and that the "
+            "wheels' driver runs"
         )
     if abs(math.log2(fit.scale)) > MISSCALED_OCTAVES:
         times = float(f"{1.0 / fit.scale:.3g}")

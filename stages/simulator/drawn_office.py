@@ -9,6 +9,7 @@ import numpy as np
 
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.plane.se2 import path_length
 
 from .config import Door, Kidnapping, Point, Room, Route, Side, WallPanel, WorldConfig
 from .mirrored import Mirrored
@@ -360,7 +361,7 @@ def _without_detours(points: tuple[Point, ...]) -> tuple[Point, ...]:
 
 def _round(points: tuple[Point, ...]) -> float:
     """Metres from point to point and back to the first."""
-    return float(np.hypot(*np.diff([*points, points[0]], axis=0).T).sum())
+    return path_length([*points, points[0]])
 
 
 def _relative(point: Point, old: Room, new: Room) -> Point:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from omninav.stages.geometry.plane.se2 import path_length
+
 from .config import AisleBlock, Block, Door, Kidnapping, Point, Room, Route, WallPanel, WorldConfig
 from .layout import expand
 from .mirrored import Mirrored
@@ -269,7 +271,7 @@ def _comb(drawn: WorldConfig, route: Route, spine: MainAisle) -> Route:
     stops = sorted({round(a.ends[0][along], 2) for a in expand(drawn).aisles if a.block in names})
     middle = spine.point((spine.low + spine.high) / 2)
     points = [middle, spine.point(spine.high), spine.point(spine.low)]
-    length = float(np.hypot(*np.diff([*listed, listed[0]], axis=0).T).sum()) * route.laps
+    length = path_length([*listed, listed[0]]) * route.laps
     while sum(math.dist(a, b) for a, b in pairwise(points)) < length:
         for stop in stops:
             sides = [spine.point(stop, side) for side in (right, -left) if abs(side) > 1.0]

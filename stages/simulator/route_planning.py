@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.plane.se2 import distances_along
+from omninav.stages.geometry.plane.se2 import distances_along, path_length
 
 from .config import Point, Route
 from .layout import Aisle
@@ -61,7 +61,7 @@ def plan(world: World, route: Route) -> Array:
         leg = space.between(line[-1], np.asarray(goal))
         legs.append(leg)
         line.append(leg[-1])
-        done += _length(leg)
+        done += path_length(leg)
         if route.length is not None and done >= route.length:
             break
     if not legs:
@@ -373,10 +373,6 @@ class _FreeSpace:
 def _straight(world: World, points: Array, room: float) -> bool:
     """Tells whether straight lines from point to point keep as much room."""
     return bool(world.is_free(_resampled(points, 0.1), room).all())
-
-
-def _length(points: Array) -> float:
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _resampled(points: Sequence[Point] | Array, spacing: float) -> Array:

@@ -50,6 +50,11 @@ def turned(vectors: Array, angles: Array | float) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
 
 
+def path_length(points: npt.ArrayLike) -> float:
+    """Length of the straight lines from each of N points (N, 2 or more) to the next."""
+    return float(np.hypot(*np.diff(np.asarray(points)[:, :2], axis=0).T).sum())
+
+
 def distances_along(points: Array) -> Array:
     """Distance from the first of N points (N, 2 or more) to each along the straight lines between them: (N,)."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
