@@ -2,7 +2,7 @@
 
 import json
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -10,16 +10,15 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from omninav.pipeline import convert_fields
-from omninav.pipeline.mcap.message import BadMessage
+from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.commands import GoalPoint, Reinitialise
-from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .camera_yaml import parse_camera
 from .live_track import LiveTrack
-from .messages import pixels_of, pose_of, scan_of
+from .messages import pose_of, scan_of
 from .plausibility import MotionLimits
 from .recording import UnreadableRecording
 from .topic_recording import STALE, Feed, TopicRecording
@@ -135,7 +134,7 @@ class LiveRecording(TopicRecording):
         header = read_header(feed, name)
         self._frames: list[Frame] = []
         stamps: list[int] = []
-        places: list[tuple[str, Any]] = []
+        images: list[Record] = []
         drive = self.drive = OdometryBuffer(header)
         camera = _camera(name, feed)
         for record in feed.scan(set(header.topics)):
@@ -148,17 +147,12 @@ class LiveRecording(TopicRecording):
                     continue
                 self._frames.append(made[0])
                 stamps.append(taken)
-                places.append((record.topic, record.location))
+                images.append(record._replace(data=b""))
                 continue
             try:
                 drive.add(role, record.stamp, feed.decode(record.topic, record.data))
             except (BadMessage, ValueError, AttributeError) as error:
                 feed.drop("bad_message", f"{name}: a message on {record.topic}: {error!s:.160}")
-
-        def fetch_image(frame: int) -> Callable[[], Pixels]:
-            topic, location = places[frame]
-            message = feed.decode(topic, feed.fetch(location))
-            return lambda: pixels_of(message)
 
         frames = self._frames
         odometry = None if drive.odometry is None else np.array([frame.odometry for frame in frames]).reshape(-1, 3)
@@ -170,7 +164,7 @@ class LiveRecording(TopicRecording):
             truth=None if drive.truth is None else np.array([frame.truth for frame in frames]).reshape(-1, 3),
             unmeasured_s=np.array([frame.unmeasured_s for frame in frames]),
             feed=feed,
-            fetch_image=fetch_image,
+            images=images,
             files=files,
         )
 

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,7 +16,7 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
-from .messages import scan_of
+from .messages import pixels_of, scan_of
 from .recording import DecodeAhead, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 
@@ -41,6 +41,11 @@ class Feed(Protocol):
     def fetch(self, location: Any) -> bytes | memoryview: ...
     def decode(self, topic: str, data: bytes | memoryview) -> Any: ...
     def drop(self, kind: str, detail: str) -> None: ...
+
+
+def message_of(feed: Feed, record: Record) -> Any:
+    """A message that was found by a scan, read again. Raises `BadMessage`."""
+    return feed.decode(record.topic, feed.fetch(record.location))
 
 
 def in_order(
@@ -89,7 +94,7 @@ class TopicRecording(Recording):
         odometry: Array | None,
         truth: Array | None,
         feed: Feed,
-        fetch_image: Callable[[int], Callable[[], Pixels]],
+        images: Sequence[Record],
         files: Sequence[Path],
         scans: Sequence[Record] = (),
         unmeasured_s: Array | None = None,
@@ -98,7 +103,8 @@ class TopicRecording(Recording):
         self.mounted = ""
         """Position of its camera by `/tf_static`, in words; empty where that is not new."""
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
-        self._feed, self._images, self._files, self._scans = feed, DecodeAhead(fetch_image), files, scans
+        self._images = DecodeAhead(lambda frame: partial(pixels_of, message_of(feed, images[frame])))
+        self._feed, self._files, self._scans = feed, files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
@@ -123,7 +129,7 @@ class TopicRecording(Recording):
             return None
         record = self._scans[number]
         try:
-            return scan_of(self._feed.decode(record.topic, self._feed.fetch(record.location)))
+            return scan_of(message_of(self._feed, record))
         except BadMessage as error:
             self._feed.drop("bad_message", str(error))
         except ValueError as error:

@@ -13,7 +13,6 @@ from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Bools
 from omninav.stages.values.encoded_image import Undecodable
-from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .clock_changes import camera_clock_set, set_back
@@ -24,7 +23,7 @@ from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
-from .topic_recording import Feed, TopicRecording, in_order, require_stamps
+from .topic_recording import Feed, TopicRecording, in_order, message_of, require_stamps
 
 FRAMES_ASKED = 4
 """Number of the first images whose cameras are compared."""
@@ -88,13 +87,9 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
     frames = _in_order(feed, name, image_topic, records[image_topic], "duplicate_frame")
 
-    def fetch_image(frame: int) -> Callable[[], Pixels]:
-        message = feed.decode(image_topic, feed.fetch(frames[frame].location))
-        return lambda: pixels_of(message)
-
     stamps, track = np.array([frame.stamp for frame in frames], dtype=np.int64), odometry or truth
-    timed = [] if track is None else np.flatnonzero(within(stamps, track.stamps)).tolist()
-    width, height = _first_size(name, timed or range(len(frames)), fetch_image)
+    timed = [] if track is None else [frames[row] for row in np.flatnonzero(within(stamps, track.stamps))]
+    width, height = _first_size(name, feed, timed or frames)
     view, camera_files = _camera(name, feed, options.camera, (width, height), files, infos)
     by_info = options.camera is None and "camera.yaml" not in feed.attachments and not camera_files
     mounted = fixed.mounted(
@@ -124,7 +119,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         truth=None if truth is None else poses_at(truth.stamps, truth.poses, stamps),
         unmeasured_s=None if odometry is None else seconds_within(odometry.gaps, stamps),
         feed=feed,
-        fetch_image=fetch_image,
+        images=frames,
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, records),
     )
@@ -171,7 +166,7 @@ def _camera(
 def _cameras(feed: Feed, topic: str, images: Sequence[Record]) -> str:
     """Sentence on images of several cameras on one topic, by their frames; else ""."""
     try:
-        named = [feed.decode(topic, feed.fetch(image.location)).header.frame_id for image in images]
+        named = [message_of(feed, image).header.frame_id for image in images]
     except BadMessage:  # it is counted when it is read in its turn
         return ""
     found = list(dict.fromkeys(named))
@@ -187,7 +182,7 @@ def _camera_frame(feed: Feed, image: Record, infos: Sequence[Any]) -> str:
     if infos and infos[0].header.frame_id:
         return str(infos[0].header.frame_id)
     try:
-        return str(feed.decode(image.topic, feed.fetch(image.location)).header.frame_id)
+        return str(message_of(feed, image).header.frame_id)
     except BadMessage:
         return ""
 
@@ -305,16 +300,14 @@ def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps
     return keep
 
 
-def _first_size(
-    name: str, numbers: Sequence[int], fetch_image: Callable[[int], Callable[[], Pixels]]
-) -> tuple[int, int]:
+def _first_size(name: str, feed: Feed, images: Sequence[Record]) -> tuple[int, int]:
     """Width and height of the first of some images that can be decoded. Raises `UnreadableRecording`."""
     reason = ""
-    for frame in numbers:
+    for image in images:
         try:
-            height, width = fetch_image(frame)().shape[:2]
+            height, width = pixels_of(message_of(feed, image)).shape[:2]
         except (BadMessage, Undecodable) as error:
             reason = reason or f": {error}"
         else:
             return width, height
-    raise UnreadableRecording(f"{name}: not one of its {len(numbers)} images can be decoded{reason}")
+    raise UnreadableRecording(f"{name}: not one of its {len(images)} images can be decoded{reason}")
