@@ -52,7 +52,7 @@ class Publisher:
     transport: TransportName = "dds"
     """As the source's."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
-    """As the source's."""
+    """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
