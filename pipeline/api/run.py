@@ -16,7 +16,6 @@ from omninav.pipeline.graph.small_files import read_mapping
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.headlines import headline_rows
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.report.terminal_tables import key_table
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing
 from omninav.pipeline.run.prepared_run import load_stages
@@ -153,6 +152,8 @@ class Run:
         import io
 
         from rich.console import Console
+
+        from omninav.pipeline.report.terminal_tables import key_table
 
         text = io.StringIO()
         Console(file=text, width=100, force_jupyter=False).print(

@@ -5,10 +5,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
+from rich.table import Table as TerminalTable
+from rich.text import Text
 
 from omninav.pipeline.experiment.best import best_condition
 from omninav.pipeline.experiment.conditions import results_by_condition
@@ -26,10 +28,6 @@ from .config_groups import config_file, listed_groups
 from .hydra_session import hydra_started
 from .overrides import composed_of
 from .terminal import show, shown
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
-
 
 MORE_SCENARIOS = "undecided"
 """The profile that adds scenarios for claims which the others leave undecided."""
@@ -56,11 +54,8 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     return 0 if well else 1
 
 
-def verdict_table(experiment: Experiment, verdicts: Mapping[str, Verdict]) -> "TerminalTable":
+def verdict_table(experiment: Experiment, verdicts: Mapping[str, Verdict]) -> TerminalTable:
     """A line for each claim: its verdict, the claim, and how many of its cases hold where not all do."""
-    from rich.table import Table as TerminalTable
-    from rich.text import Text
-
     table = TerminalTable.grid(padding=(0, 3, 0, 0))
     for key, verdict in verdicts.items():
         holding = sum(case.holds is True for case in verdict.cases)

@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.table import Table as TerminalTable
+from rich.text import Text
 
 from omninav.pipeline.graph.results import Metrics, by_path
 
@@ -11,9 +14,6 @@ from .metrics import best_of, head_of, is_detail, metric_values
 from .metrics_table import metrics_table
 from .sweep_table import Overview
 
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
-
 MAX_HEAD_LENGTH = 24
 """Longest run's name at the head of a column, in characters."""
 
@@ -21,21 +21,16 @@ COLUMN_EDGE = 3
 """Columns of the terminal that a table's column takes beside its text."""
 
 
-def key_table(metrics: Metrics, timing: Mapping[str, Any]) -> "TerminalTable":
+def key_table(metrics: Metrics, timing: Mapping[str, Any]) -> TerminalTable:
     """Headlines, a line each with its unit; what is off in colour, where there is any."""
-    from rich.table import Table as TerminalTable
-    from rich.text import Text
-
     table = TerminalTable.grid(padding=(0, 3))
     for row in headline_rows(metrics, timing):
         table.add_row(Text(row.name), Text(row.text, "bold red" if row.off else ""))
     return table
 
 
-def results_table(metrics: Metrics) -> "TerminalTable":
+def results_table(metrics: Metrics) -> TerminalTable:
     """All of a run's metrics with units, without their details."""
-    from rich.table import Table as TerminalTable
-
     found = metrics_table(metrics, details=False)
     table = TerminalTable(title="Results", title_justify="left", header_style="bold")
     table.add_column("")
@@ -56,10 +51,8 @@ def results_table(metrics: Metrics) -> "TerminalTable":
     return table
 
 
-def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
+def sweep_table(sweep: Overview, width: int) -> TerminalTable:
     """Means over the seeds of each condition, with their 95 % intervals: as many metrics as fit in `width` columns."""
-    from rich.table import Table as TerminalTable
-
     table = TerminalTable(title="Means over seeds" if sweep.seeds else None, title_justify="left", header_style="bold")
     rows = sweep.conditions
     for number, name in enumerate(sweep.settings):
@@ -79,13 +72,11 @@ def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
     return table
 
 
-def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
+def compare_table(runs: Sequence[Mapping[str, Any]]) -> TerminalTable:
     """Several runs' metrics side by side, the best of each marked with *, and the settings in which they differ.
 
     A run holds `name`, `metrics` (`Metrics`), `config` and `manifest`.
     """
-    from rich.table import Table as TerminalTable
-
     heads, below = [str(run["name"]) for run in runs], ["* the best in its row"]
     if len({str(run["config"].get("log")) for run in runs}) > 1:
         below.append("these are runs of different logs")
