@@ -148,14 +148,6 @@ def options_with(entry: Entry) -> list[str]:
     if entry.origin != "built in":  # offered to Hydra under its own name
         return [f"{'' if is_group(role) else '+'}{role}={name}"]
     own = [f"{role}={name}"] if node_option(role, name) else []
-    return list(dict.fromkeys([*own, *_options().get(entry.target, [])]))
-
-
-@functools.cache
-def _options() -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    for group, options in _listed().items():
-        for name, node in options.items():
-            if _is_node(node):
-                found.setdefault(node["_target_"], []).append(f"{group}={name}")
-    return found
+    listed = ((group, name, node) for group, options in _listed().items() for name, node in options.items())
+    named = (f"{group}={name}" for group, name, node in listed if node.get("_target_") == entry.target)
+    return list(dict.fromkeys([*own, *named]))

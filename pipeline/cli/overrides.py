@@ -271,18 +271,19 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
     options = [str(key) for key in inside]
     above = ".".join(parents)
     if word.is_delete():
-        yield Problem(path, "there is nothing of that name to take out", _like(name, options, f"~{above}.", ""))
+        hint = suggest(name, options, "there are", f"~{above}.")
+        yield Problem(path, "there is nothing of that name to take out", hint)
         return
     if not parents:
         options = [key for key in {*options, *groups} if key not in ("hydra", "nodes", "wires", "artifacts", "saves")]
-        yield Problem(path, "there is no such setting or group", _like(name, options, "", f"={value}"))
+        yield Problem(path, "there is no such setting or group", suggest(name, options, "there are", "", f"={value}"))
         return
     parameters, stage = _parameters_of(inside)
     if name in parameters:
         return
     rest = path.removeprefix(f"{above}.{name}")
     what = f"{stage} has no parameter '{name}'" if stage else f"there is no '{name}' in '{above}'"
-    hint = _like(name, parameters or options, f"{above}.", f"{rest}={value}")
+    hint = suggest(name, parameters or options, "there are", f"{above}.", f"{rest}={value}")
     yield Problem(path, what, hint if parameters else f"{hint}; to add it, type +{path}={value}")
 
 
@@ -307,7 +308,3 @@ def _parameters_of(node: Mapping[str, Any]) -> tuple[list[str], str]:
         return list(signature(cls).parameters), cls.__name__
     except (KeyError, UnknownStage, BadStage):
         return [], ""
-
-
-def _like(name: str, options: Sequence[str], before: str, after: str) -> str:
-    return suggest(name, options, "there are", before, after)

@@ -15,11 +15,11 @@ from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.arguments import condition_arguments, flags_parser, read_flags, value_text
-from omninav.pipeline.cli.composition import composed, offer_plugins
+from omninav.pipeline.cli.composition import offer_plugins
 from omninav.pipeline.cli.composition_cache import CONFIG, RUN_ALONE
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
-from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.cli.overrides import composed_of, invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.sweep_jobs import is_of_executor
 from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.files import Taken, locked
@@ -48,8 +48,9 @@ def command(
         listed = with_unlisted_parameters(words, folders)
         arguments = [listed[words.index(word)] if word in words else word for word in arguments]
         if flags.multirun:
-            _refuse_misspelled_sweep(listed, folders)
-            if any(map(is_of_executor, listed)) and not _has_launcher(listed):
+            for tried in jobs_to_try(listed, folders):  # Hydra makes a sweep's folder before it reads the words
+                composed_of(tried, folders)
+            if any(map(is_of_executor, listed)) and not any(word.startswith("hydra/launcher") for word in listed):
                 listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
@@ -116,17 +117,6 @@ def _ends(outcomes: Path) -> list[tuple[str, str, str]]:
     """The exit code of each job, and its sweep's page."""
     lines = outcomes.read_text(encoding="utf-8").splitlines() if outcomes.exists() else []
     return [line.partition(" ") for line in lines]
-
-
-def _has_launcher(words: Sequence[str]) -> bool:
-    return any(word.startswith("hydra/launcher") for word in words)
-
-
-def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:
-    """Hydra makes a sweep's folder before it reads the words; so they are read before."""
-    for job in list(jobs_to_try(words, folders)):
-        with composed([*job, *(f"--config-dir={folder}" for folder in folders)], offer=False):
-            pass
 
 
 @contextmanager
