@@ -12,8 +12,8 @@ from typing import Any
 import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
-from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
-from omninav.pipeline.graph.problems import BadInput, counted
+from omninav.pipeline.files import Damaged, read_json, write_json, write_whole
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
 from omninav.pipeline.jobs.job import Job, Outcome
 from omninav.pipeline.jobs.job_progress import JobProgress
@@ -21,6 +21,7 @@ from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.jobs.worker_pool import WorkerPool
 from omninav.pipeline.report.metrics import title, unit
 from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.run.run_folder import RunFolder
 
 from .conditions import (
     Compose,
@@ -59,23 +60,17 @@ class ExperimentRun:
 
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
-        try:
-            with locked(self.folder / ".lock", wait=False), WorkerPool(self.executor, self.folder) as workers:
-                return self._run(workers)
-        except Taken as taken:
-            raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
-
-    def _run(self, workers: WorkerPool) -> bool:
-        write_whole(self.folder / "experiment.yaml", self.file)
-        self._write_state("running")
-        self._record(workers)
-        find_results(self.experiment, self.conditions)
-        self._make_artifacts(workers)
-        self._repeat(workers)
-        well = not any(run.error for run in self.conditions)
-        self._write_state("complete" if well else "failed")
-        self.write_page()
-        return well
+        with RunFolder(self.folder).owned(), WorkerPool(self.executor, self.folder) as workers:
+            write_whole(self.folder / "experiment.yaml", self.file)
+            self._write_state("running")
+            self._record(workers)
+            find_results(self.experiment, self.conditions)
+            self._make_artifacts(workers)
+            self._repeat(workers)
+            well = not any(run.error for run in self.conditions)
+            self._write_state("complete" if well else "failed")
+            self.write_page()
+            return well
 
     def verdicts(self) -> dict[str, Verdict]:
         """The verdict on each claim, by its key."""

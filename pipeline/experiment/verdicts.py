@@ -1,7 +1,7 @@
 """Claims against results: means, intervals of paired differences, shares of runs, and whether each claim holds."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -156,17 +156,16 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     if not ours or limit is None or (theirs is not None and sum(theirs.values()) == 0.0):
         return Case(where, None if ratio else _mean(measure, ours), limit, against, None, None, None)
     found = over_runs(measure, ours.values()) / (over_runs(measure, theirs.values()) if theirs is not None else 1.0)
+    margin, scenarios = measure.margin_beside(limit), _scenarios(ours)
+    interval = kept = None
     if measure.over_runs != "mean":
-        kept = sum(_keeps(side, value - limit, measure.margin_beside(limit)) for value in ours.values())
-        holds = decided_by_share(kept, ran) if _scenarios(ours) > 1 else None
-        case = Case(where, found, limit, against, found - limit, None, holds, len(ours), ran, ratio, _scenarios(ours))
-        return replace(case, kept=kept)
-    low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
-    interval = low - limit, high - limit
-    judged, scenarios = len(ours), _scenarios(ours)
-    few = ratio and scenarios < MIN_GROUPS
-    holds = None if few else decided(side, interval, measure.margin_beside(limit), scenarios)
-    return Case(where, found, limit, against, found - limit, interval, holds, judged, ran, ratio, scenarios)
+        kept = sum(_keeps(side, value - limit, margin) for value in ours.values())
+        holds = decided_by_share(kept, ran) if scenarios > 1 else None
+    else:
+        low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
+        interval = low - limit, high - limit
+        holds = None if ratio and scenarios < MIN_GROUPS else decided(side, interval, margin, scenarios)
+    return Case(where, found, limit, against, found - limit, interval, holds, len(ours), ran, ratio, scenarios, kept)
 
 
 def _against_condition(

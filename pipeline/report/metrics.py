@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from omninav.pipeline.graph.results import Metrics, MetricSpec
 
@@ -123,11 +123,6 @@ class MetricValue:
         return f"{name} ({self.unit})" if self.unit else name
 
     @property
-    def better(self) -> Literal["lower", "higher"] | None:
-        """Which values are better, where that is known."""
-        return self.metric.spec.better
-
-    @property
     def is_context(self) -> bool:
         """True if it states the size of the run."""
         return self.metric.by_path and self.metric.spec.context
@@ -196,7 +191,7 @@ def is_detail(path: str, metrics: Metrics) -> bool:
 
 def best_of(path: str, runs: Sequence[Mapping[str, MetricValue]]) -> set[int]:
     """Which runs have the best value, where it is known which is; none where all have the same."""
-    better = next((run[path].better for run in runs if path in run), None)
+    better = next((run[path].metric.spec.better for run in runs if path in run), None)
     found = {n: run[path].value for n, run in enumerate(runs) if path in run and better}
     known = {n: float(value) for n, value in found.items() if isinstance(value, int | float)}
     if len(set(known.values())) < 2:
