@@ -1,7 +1,6 @@
 """Executors by Dask: a scheduler that runs already, or workers that a batch system such as Slurm starts."""
 
 import logging
-import re
 import sys
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -10,9 +9,9 @@ from typing import Any, TypeVar
 
 from distributed import Client
 
-from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.problems import BadInput
 
-from .executors import ExecutorSettings
+from .executors import WORD, ExecutorSettings, own_options
 
 START_S = 60.0
 """Longest wait for a scheduler's answer, seconds."""
@@ -21,8 +20,6 @@ WORKER_MEMORY = 1_000_000_000
 JOB_MEMORY = 4_000_000_000
 """Memory asked of a batch system where nobody states how much a job takes, bytes."""
 T = TypeVar("T")
-WORD = re.compile(r"[\w.,:@/+-]{1,200}")
-"""Pattern of what may be written into a batch script."""
 
 
 class DaskExecutor(Executor):
@@ -56,7 +53,7 @@ class DaskExecutor(Executor):
 
 def dask_cluster(settings: ExecutorSettings) -> DaskExecutor:
     """`executor=dask`: the scheduler at `executor.address`, with whatever workers it has."""
-    options = _options(settings, ("address",))
+    options = own_options(settings, ("address",))
     if "address" not in options:
         raise BadInput("executor=dask: where is its scheduler? type executor.address=tcp://HOST:8786")
     return DaskExecutor(_client(options["address"]))
@@ -66,7 +63,7 @@ def slurm(settings: ExecutorSettings) -> DaskExecutor:
     """`executor=slurm`: each worker is a batch job of one core; one that dies is started again."""
     from dask_jobqueue import SLURMCluster
 
-    options = _options(settings, ("partition", "time", "account", "interface"))
+    options = own_options(settings, ("partition", "time", "account", "interface"))
     workers = settings.workers or 4
     memory = (settings.memory or JOB_MEMORY) + WORKER_MEMORY
     logs = str(settings.folder / "workers") if settings.folder is not None else ""
@@ -90,20 +87,6 @@ def slurm(settings: ExecutorSettings) -> DaskExecutor:
     except BaseException:
         cluster.close()
         raise
-
-
-def _options(settings: ExecutorSettings, known: tuple[str, ...]) -> dict[str, str]:
-    problems = []
-    given = {name: str(value) for name, value in settings.options.items() if value is not None}
-    for name, value in given.items():
-        if name not in known:
-            hint = suggest(name, ("workers", "memory", *known), "settings")
-            problems.append(Problem(f"executor.{name}", f"the executor '{settings.name}' has no such setting", hint))
-        elif not WORD.fullmatch(value):
-            problems.append(Problem(f"executor.{name}", f"{value!r:.40}, expected a word without spaces"))
-    if problems:
-        raise ProblemsFound(problems)
-    return given
 
 
 def _client(where: Any) -> Any:

@@ -19,6 +19,8 @@ BUILT_IN = {
     "slurm": "omninav.pipeline.jobs.dask_executor:slurm",
     "dask": "omninav.pipeline.jobs.dask_executor:dask_cluster",
 }
+WORD = re.compile(r"[\w.,:@/+-]{1,200}")
+"""Pattern of what may be written into a batch script."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,21 @@ def _factories() -> dict[str, str]:
     return {**{each.name: each.value for each in entry_points(group=ENTRY_POINTS)}, **BUILT_IN}
 
 
+def own_options(settings: ExecutorSettings, known: tuple[str, ...]) -> dict[str, str]:
+    """The options of an executor alone, as texts. Raises `ProblemsFound` for those that are not `known` or no words."""
+    problems = []
+    given = {name: str(value) for name, value in settings.options.items() if value is not None}
+    for name, value in given.items():
+        if name not in known:
+            hint = suggest(name, ("workers", "memory", *known), "settings")
+            problems.append(Problem(f"executor.{name}", f"the executor '{settings.name}' has no such setting", hint))
+        elif not WORD.fullmatch(value):
+            problems.append(Problem(f"executor.{name}", f"{value!r:.40}, expected a word without spaces"))
+    if problems:
+        raise ProblemsFound(problems)
+    return given
+
+
 def cores() -> int:
     """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -95,8 +112,5 @@ def cores() -> int:
 
 def local(settings: ExecutorSettings) -> Executor:
     """Threads of this process, each of which waits for the process of one job."""
-    what, known = f"the executor '{settings.name}' has no such setting", ("workers", "memory")
-    if settings.options:
-        unknown = settings.options
-        raise ProblemsFound(Problem(f"executor.{name}", what, suggest(name, known, "settings")) for name in unknown)
+    own_options(settings, ())
     return ThreadPoolExecutor(settings.workers or cores(), "job")
