@@ -4,7 +4,7 @@ import os
 import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, chdir, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -230,16 +230,13 @@ def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] 
     stages` lists are run, and others only where their module or file is in `trust`, programs (`command=`) only where
     they are. Raises `BadInput`.
     """
-    here, given = os.getcwd(), Path(os.path.realpath(folder))
+    given = Path(os.path.realpath(folder))
     run = RunFolder(given)
-    try:
-        with only_listed(trust):
-            prepared = reopened(run, given)
-            if prepared is None:
-                return Run(given)
-            if prepared.graph.source is not None and isinstance(prepared.graph.source.stage, Pushed):
-                return Session(run, prepared)
-            execute(run, prepared)
+    with chdir("."), only_listed(trust):  # a run continues where it was started, and the program here
+        prepared = reopened(run, given)
+        if prepared is None:
             return Run(given)
-    finally:
-        os.chdir(here)  # a run continues where it was started
+        if prepared.graph.source is not None and isinstance(prepared.graph.source.stage, Pushed):
+            return Session(run, prepared)
+        execute(run, prepared)
+        return Run(given)

@@ -3,6 +3,7 @@
 import os
 import shlex
 import sys
+from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,23 +35,20 @@ def command(arguments: list[str]) -> int:
     if not arguments or any(map(os.path.isdir, arguments[1:])):
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     given, *typed = arguments
-    here, folder = Path.cwd(), Path(os.path.realpath(given))
+    folder = Path(os.path.realpath(given))
     if not folder.is_dir():
         raise no_run(folder)
     with only_listed(typed):
-        return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, here)
+        return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, folder)
 
 
-def _resume_run(given: str, here: Path) -> int:
-    folder = Path(os.path.realpath(given))
+def _resume_run(given: str, folder: Path) -> int:
     try:
-        with Progress() as progress:
+        with chdir("."), Progress() as progress:  # a run continues where it was started, and the command ends here
             run, metrics = resume(folder, progress)
     except StageFailed as failed:
         print(f"{failed}\nthe traceback is in {folder / 'run.log'}", file=sys.stderr)
         return 1
-    finally:
-        os.chdir(here)  # a run continues where it was started
     if run.complete:
         print(f"{given} was complete: there was nothing to continue. Its results:")
     show_results(run.folder, metrics, run.manifest)
