@@ -157,14 +157,10 @@ IMPORT = re.compile(
 
 def _imported(text: str, package: str) -> Iterator[str]:
     try:
-        statements: list[ast.AST] = [ast.parse("\n".join(IMPORT.findall(text)))]  # a tenth of the time
+        tree = ast.parse("\n".join(IMPORT.findall(text)))  # a tenth of the time
     except SyntaxError:  # prose, or brackets within brackets
-        statements = [ast.parse(text)]
-    while statements:
-        node = statements.pop()
-        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
-            inner = getattr(node, part, ())
-            statements += inner if isinstance(inner, list) else ()
+        tree = ast.parse(text)
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

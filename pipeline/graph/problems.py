@@ -29,11 +29,12 @@ class Problem:
 
 
 class ProblemsFound(Exception):
-    """A configuration that cannot be built or run, with everything that is wrong with it."""
+    """A configuration that cannot be built or run, with everything that is wrong with it, below their number."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__(format_problems(self.problems))
+        lines = [f"  {line}" for problem in self.problems for line in str(problem).split("\n")]
+        super().__init__("\n".join([f"{counted(len(self.problems), 'problem')}:", *lines]))
 
 
 class BadInput(Exception):
@@ -109,17 +110,6 @@ def as_bad_input(error: BaseException) -> BadInput | None:
     where = f"{mark.name}, line {mark.line + 1}, column {mark.column + 1}" if mark else "a configuration file"
     return BadInput(
         f"{where}: not valid YAML: {message}; check indentation, colons, quotes and brackets around this place"
-    )
-
-
-def format_problems(problems: Iterable[Problem]) -> str:
-    """All problems as text, one under the other, with their number at the head."""
-    problems = list(problems)
-    return "\n".join(
-        [
-            f"{counted(len(problems), 'problem')}:",
-            *(f"  {line}" for problem in problems for line in str(problem).split("\n")),
-        ]
     )
 
 

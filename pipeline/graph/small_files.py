@@ -105,10 +105,10 @@ class _Reader:
         self._count(event, 1)
         if depth > MAX_DEPTH:
             self._refuse(event, f"more than {MAX_DEPTH} levels within each other")
+        if event.tag not in (None, "!"):
+            self._refuse(event, f"the tag {shown(event.tag)}; write the value without a tag")
         if isinstance(event, yaml.ScalarEvent):
             value = self._scalar(event)
-        elif event.tag not in (None, "!"):
-            self._refuse(event, f"the tag {shown(event.tag)}; write the value without a tag")
         elif isinstance(event, yaml.SequenceStartEvent):
             value = []
             while not isinstance(item := next(self.events), yaml.SequenceEndEvent):
@@ -151,8 +151,6 @@ class _Reader:
         return merged | own
 
     def _scalar(self, event: Any) -> Any:
-        if event.tag not in (None, "!"):
-            self._refuse(event, f"the tag {shown(event.tag)}; write the value without a tag")
         tag = _SCALARS.resolve(yaml.ScalarNode, event.value, event.implicit).removeprefix(_PREFIX)
         if tag not in ("null", "bool", "int", "float"):
             return event.value
