@@ -97,13 +97,13 @@ def _steps(
     stage: Stage, read: Signature, frames: Sequence[Mapping[str, Any]], seed: int, again_at: int | None = None
 ) -> list[dict[str, Any]]:
     """The outputs for all frames; with `again_at` another copy of the stage continues there from what was saved."""
-    ctx = _context(seed)
+    ctx = Context("checked", np.random.default_rng(seed))
     stage, state = _copy_of(stage, read, ctx)
     outputs = []
     for number, frame in enumerate(frames):
         if number == again_at:
             saved = encode([ctx.generator_state(), None if state is None else encode_state(state)])
-            ctx = _context(seed)
+            ctx = Context("checked", np.random.default_rng(seed))
             stage, state = _copy_of(stage, read, ctx)
             generator, fields = decode(saved)
             ctx.rng_unmarked().bit_generator.state = generator
@@ -113,10 +113,6 @@ def _steps(
         out = stage.step(ctx, **frame, **scratch)
         outputs.append({name: None if out is None else getattr(out, name) for name in read.outputs})
     return outputs
-
-
-def _context(seed: int) -> Context:
-    return Context("checked", np.random.default_rng(seed))
 
 
 def _copy_of(stage: Stage, read: Signature, ctx: Context) -> tuple[Stage, State | None]:

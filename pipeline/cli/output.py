@@ -6,29 +6,18 @@ import sys
 from typing import Any
 
 
-class _Output(io.RawIOBase):
+class _Output(io.FileIO):
     """Standard output that keeps the first error of a full disk instead of stopping the program that prints."""
 
-    def __init__(self, stream: io.TextIOWrapper, raw: io.FileIO) -> None:
-        self._stream, self._raw = stream, raw  # a stream that nobody holds closes its file
+    def __init__(self, stream: io.TextIOWrapper) -> None:
+        super().__init__(stream.fileno(), "wb", closefd=False)
+        self._stream = stream  # one that nobody holds closes its file
         self.error: OSError | None = None
 
-    def writable(self) -> bool:
-        """It is."""
-        return True
-
-    def fileno(self) -> int:
-        """The descriptor below."""
-        return self._raw.fileno()
-
-    def isatty(self) -> bool:
-        """Tells whether it is a terminal."""
-        return not self._raw.closed and self._raw.isatty()
-
-    def write(self, data: Any, /) -> int | None:
+    def write(self, data: Any, /) -> int:
         """Write, or keep why not. Raises BrokenPipeError: nobody reads any more."""
         try:
-            return len(data) if self._raw.closed else self._raw.write(data)
+            return super().write(data)
         except BrokenPipeError:
             raise
         except OSError as error:
@@ -44,9 +33,9 @@ def mend_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    stream, raw = sys.stdout, _below(sys.stdout)
-    if isinstance(stream, io.TextIOWrapper) and isinstance(raw, io.FileIO):
-        mended: Any = _Output(stream, raw)
+    stream = sys.stdout
+    if isinstance(stream, io.TextIOWrapper) and isinstance(_below(stream), io.FileIO):
+        mended: Any = _Output(stream)
         buffer = mended if stream.write_through else io.BufferedWriter(mended)
         sys.stdout = io.TextIOWrapper(
             buffer,
