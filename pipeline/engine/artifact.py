@@ -6,8 +6,9 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.files import user_path, whole_file
 from omninav.pipeline.graph.contents import stored_fields, violation
+from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
@@ -159,36 +161,29 @@ def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
     for key, kind in (("type", str), ("arrays", dict), ("facts", dict)):
         if not isinstance(header.get(key), kind):
             raise Unfit(f"its header states no {key}")
-    for key, fits, expected in _FACTS:
-        if key in header["facts"] and not fits(header["facts"][key]):
+    for key, (kind, expected) in _FACTS.items():
+        if key in header["facts"] and convert(header["facts"][key], kind, key)[1]:
             raise Unfit(f"its header's {key} is {shown(header['facts'][key])}, expected {expected}")
     return header
 
 
-def _counts(found: Any) -> bool:
-    """Tells whether it is what was dropped: by kind how many, or how many (`count`) and the first case (`first`)."""
+@dataclass(frozen=True)
+class Dropped:
+    """Number of things of a kind that were dropped, and the first case."""
 
-    def is_count(one: Any) -> bool:
-        whole = one.get("count") if isinstance(one, dict) else one
-        first = one.get("first", "") if isinstance(one, dict) else ""
-        return isinstance(whole, int) and not isinstance(whole, bool) and isinstance(first, str)
-
-    return isinstance(found, dict) and all(map(is_count, found.values()))
+    count: int
+    first: str = ""
 
 
-_FACTS: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
-    ("dropped", _counts, "counts by kind"),
-    ("facts", lambda found: isinstance(found, dict), "facts by name"),
-    (
-        "stages",
-        lambda found: isinstance(found, dict) and all(isinstance(one, dict) for one in found.values()),
-        "parameters by stage",
-    ),
-    ("variant", lambda found: found is None or isinstance(found, str), "a name"),
-    ("made_by", lambda found: isinstance(found, str), "a name"),
-    ("warnings", lambda found: isinstance(found, list) and all(isinstance(one, str) for one in found), "texts"),
-)
-"""Facts that runs and reports read: name, whether a value is one, and what is expected."""
+_FACTS: dict[str, tuple[Any, str]] = {
+    "dropped": (dict[str, int | Dropped], "counts by kind"),
+    "facts": (dict, "facts by name"),
+    "stages": (dict[str, dict], "parameters by stage"),  # type: ignore[type-arg]
+    "variant": (str | None, "a name"),
+    "made_by": (str, "a name"),
+    "warnings": (list[str], "texts"),
+}
+"""Facts that runs and reports read: their types, and what is expected in words."""
 
 
 def _finite(text: str) -> float:

@@ -61,11 +61,8 @@ def identity(graph: Graph, seed: int, *more: str) -> str:
 
 def companions(artifact: PreparedArtifact, artifacts: Sequence[PreparedArtifact]) -> list[PreparedArtifact]:
     """The other artifacts that are outputs of the same graph: one run makes them all."""
-    if artifact.whole is None:
-        return []
-    same = graph_digest(artifact.whole)
-    others = [other for other in artifacts if other is not artifact and other.whole is not None]
-    return [other for other in others if other.whole is not None and graph_digest(other.whole) == same]
+    others = (other for other in artifacts if other is not artifact)
+    return [other for other in others if other.whole is not None and other.whole is artifact.whole]
 
 
 def obtain(
