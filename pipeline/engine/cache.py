@@ -1,7 +1,7 @@
 """The cache: results as files, by the hash of everything that made them."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -72,11 +72,9 @@ class Cache:
             with suppress(FileNotFoundError):
                 file.unlink()
 
-    @contextmanager
-    def lock(self, key: str) -> Iterator[None]:
+    def lock(self, key: str) -> AbstractContextManager[None]:
         """Lock an entry while its result is being computed; others that need it wait."""
-        with locked(self.path(key, ".lock")):
-            yield
+        return locked(self.path(key, ".lock"))
 
     def _entry(self, key: str, suffix: str) -> Path:
         return self.path(key, f"{suffix}.entry")

@@ -31,8 +31,6 @@ class ConditionRun:
     overrides: tuple[str, ...]
     folder: Path
     seeds: tuple[int, ...]
-    shared: bool = True
-    """Whether its repetitions share what does not depend on the seed, and other experiments its results."""
     config: dict[str, Any] = field(default_factory=dict)
     prepared: PreparedRun | None = None
     key: str = ""
@@ -72,9 +70,8 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
             named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
             typed = (*([] if named else [f"variant={experiment.variant}"]), *own, *overrides)
             place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", f"{condition.name} {scenario}").strip("_")
-            run = ConditionRun(condition, scenario, typed, place, of_scenario, experiment.shared)
-            run.development = scenario in experiment.development
-            runs.append(run)
+            development = scenario in experiment.development
+            runs.append(ConditionRun(condition, scenario, typed, place, of_scenario, development=development))
     return runs
 
 
@@ -134,7 +131,7 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
         try:
             run.prepared = prepare_run(run.config)
             run.key = condition_key(run.prepared, timed_groups(experiment))
-            place = run.config.get("cache") if run.shared else None  # what is timed is timed again
+            place = run.config.get("cache") if experiment.shared else None  # what is timed is timed again
             run.results = finished(run.folder, run.key, run.seeds, Cache(Path(place)) if place else None)
         except (ProblemsFound, BadInput) as wrong:
             run.error = str(wrong)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtr, stdtrit
 
 Array = npt.NDArray[np.float64]
 
@@ -55,9 +56,7 @@ def share_interval(met: int, of: int) -> tuple[float, float]:
 
 def student_interval(means: Sequence[float]) -> tuple[float, float]:
     """95 % interval of the mean of a few independent values."""
-    from scipy.stats import t  # type: ignore[attr-defined]
-
-    half = float(t.ppf((1.0 + CONFIDENCE) / 2.0, len(means) - 1)) * float(np.std(means, ddof=1)) / len(means) ** 0.5
+    half = float(stdtrit(len(means) - 1, (1.0 + CONFIDENCE) / 2.0)) * float(np.std(means, ddof=1)) / len(means) ** 0.5
     middle = float(np.mean(means))
     return middle - half, middle + half
 
@@ -84,8 +83,6 @@ def _padded(groups: Sequence[Array]) -> Array:
 
 def _expanded(independent: int) -> tuple[float, float]:
     """The two percentiles, as shares, for this many independent values."""
-    from scipy.stats import norm, t  # type: ignore[attr-defined]
-
     tail = (1.0 - CONFIDENCE) / 2.0
-    share = float(norm.cdf(np.sqrt(independent / (independent - 1)) * t.ppf(tail, independent - 1)))
+    share = float(ndtr(np.sqrt(independent / (independent - 1)) * stdtrit(independent - 1, tail)))
     return share, 1.0 - share

@@ -168,7 +168,7 @@ class ExperimentRun:
                 "key": run.key,
                 "code": run.prepared.digest if run.prepared is not None else "",
                 "seeds": seeds,
-                "shared": run.shared,
+                "shared": self.experiment.shared,
                 "groups": timed_groups(self.experiment),
             }
             function, log = "omninav.pipeline.experiment.repetition:repeat", run.folder / f"run{several}.log"
