@@ -26,20 +26,19 @@ def write_page(experiment: Experiment, result: ExperimentResult, folder: Path) -
     All of it follows from the result alone; conditions that failed or are still to run are named.
     """
     write_whole(folder / f"{experiment.name}{SUFFIX}", result_text(result))
-    for file, written in markdown_page(experiment, result).items():
+    plots = plots_of(experiment, result)
+    for file, written in markdown_page(experiment, result, plots).items():
         write_whole(folder / file, written)
     path = folder / f"{experiment.name}.html"
-    plots = [
-        replace(plot, file=f"data:image/png;base64,{base64.b64encode(plot.content).decode()}")
-        for plot in plots_of(experiment, result)
-    ]
-    write_whole(path, render("experiment.html", **_values(experiment, result, plots)))
+    inside = [replace(p, file=f"data:image/png;base64,{base64.b64encode(p.content).decode()}") for p in plots]
+    write_whole(path, render("experiment.html", **_values(experiment, result, inside)))
     return path
 
 
-def markdown_page(experiment: Experiment, result: ExperimentResult) -> dict[str, str | bytes]:
+def markdown_page(
+    experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]
+) -> dict[str, str | bytes]:
     """The page as Markdown, and its plots, by the names of their files."""
-    plots = plots_of(experiment, result)
     page = render("experiment.md", **_values(experiment, result, plots))
     return {f"{experiment.name}.md": page, **{plot.file: plot.content for plot in plots}}
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from .intervals import CONFIDENCE
 from .page import markdown_page, number
+from .plots import plots_of
 from .result import ExperimentResult
 from .specification import Claim, Experiment
 from .verdicts import Verdict, headline
@@ -21,7 +22,7 @@ def pages(judged: Judged) -> dict[str, str | bytes]:
     """Every page and plot, by the name of its file."""
     found: dict[str, str | bytes] = {INDEX: index_page(judged), CLAIMS: claims_page(judged)}
     for experiment, result in judged:
-        found |= markdown_page(experiment, result)
+        found |= markdown_page(experiment, result, plots_of(experiment, result))
     return found
 
 

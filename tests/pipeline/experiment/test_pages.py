@@ -65,7 +65,7 @@ def test_each_claim_of_a_paper_stands_with_its_place_verdict_and_figure() -> Non
     )
     assert "so we think" not in text  # no paper says it
     assert "it will" not in text  # no result judges it
-    page = str(markdown_page(*found[0])["one.md"])
+    page = str(markdown_page(*found[0], ())["one.md"])
     assert "| … too (Error (cm)): **undecided** | as printed: so (section 2): “so it is” | second | 5.2 |" in page
     assert "| so we think (Error (cm)): **holds** | not said | first | 1.0 |" in page
 
@@ -84,13 +84,15 @@ def test_the_index_and_the_page_say_of_which_draws_a_result_is() -> None:
         "| [One](one.md) | `omninav +experiment=one` | draw 1 to 3 | **1 of 2 hold, 1 undecided** |  | it holds |"
         in index_page(found)
     )
-    assert "1 in each of 3 scenarios (draw 1, draw 2, draw 3)" in str(markdown_page(*found[0])["one.md"])
+    assert "1 in each of 3 scenarios (draw 1, draw 2, draw 3)" in str(markdown_page(*found[0], ())["one.md"])
 
 
 def test_a_table_shows_means_with_what_is_beyond_them_and_the_paper_s_figures() -> None:
     cells = (Cell(("first",), 5.26, 0.5, 6.0, 2, 3, 4.0), Cell(("second",), 7.0, None, 7.04, 3, 3))
     result = ExperimentResult("one", "omninav", "full", "", REPEATED, {}, {"error": cells})
-    page = str(markdown_page(read_experiment(FILE | {"published": {"error": {"first": 9}}}, "full"), result)["one.md"])
+    page = str(
+        markdown_page(read_experiment(FILE | {"published": {"error": {"first": 9}}}, "full"), result, ())["one.md"]
+    )
     assert "| all | 5.3 ± 0.5, median 6.0, 2 of 3, development 4.0 (9.0) | 7.0 |" in page
 
 
@@ -100,7 +102,7 @@ def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:
     found = [(read_experiment(FILE | {"claims": claims}, "full"), result)]
     assert counts(found, "A paper 2004") == "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided."
     assert "* as printed: so ([One](one.md)): the limit is ours" in claims_page(found)
-    assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0])["one.md"])
+    assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0], ())["one.md"])
 
 
 def test_the_claims_say_how_many_verdicts_chance_would_give(committed: Judged) -> None:
@@ -132,7 +134,7 @@ def test_every_committed_result_judges_the_claims_of_its_file_and_shows_its_cond
 def test_a_page_says_what_its_result_file_does(committed: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
     for experiment, result in committed:
-        page = str(markdown_page(experiment, result)[f"{experiment.name}.md"])
+        page = str(markdown_page(experiment, result, ())[f"{experiment.name}.md"])
         said = re.findall(r"\| (holds(?: in \d+ of \d+ runs)?|does not hold|undecided) \|\n", page)
         assert said == [Verdict((each,)).words for key in experiment.claims for each in result.verdicts[key]]
         for key, verdict in result.judged(experiment).items():
