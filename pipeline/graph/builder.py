@@ -44,8 +44,12 @@ class _Builder:
     def __init__(
         self, config: Mapping[str, Any], artifacts: dict[str, Any], prefix: str, shared: frozenset[str]
     ) -> None:
-        self.config, self.artifacts, self.prefix, self.shared = config, artifacts, prefix, shared
+        self.artifacts, self.prefix, self.shared = artifacts, prefix, shared
         self.problems: list[Problem] = []
+        stages = "expected a mapping from names to stages", "write nodes: {match: {_target_: …}}"
+        origins = "expected a mapping: node -> port -> where it comes from", "write wires: {node: {port: other.output}}"
+        self.given_nodes = self._block("nodes", config.get("nodes"), *stages)
+        self.given_wires = self._block("wires", config.get("wires"), *origins)
         self.nodes: dict[str, Node] = {}
         self.broken: set[str] = set()
         self.left_out: set[str] = set()
@@ -67,14 +71,16 @@ class _Builder:
     def _problem(self, where: str, what: str, hint: str = "") -> None:
         self.problems.append(Problem(self.prefix + where, what, hint))
 
+    def _block(self, name: str, given: Any, expected: str, hint: str) -> Mapping[Any, Any]:
+        if given and not isinstance(given, Mapping):
+            self._problem(name, expected, hint)
+            return {}
+        return given or {}
+
     # nodes
 
     def _read_nodes(self) -> None:
-        nodes = self.config.get("nodes") or {}
-        if not isinstance(nodes, Mapping):
-            self._problem("nodes", "expected a mapping from names to stages", "write nodes: {match: {_target_: …}}")
-            return
-        for name, spec in nodes.items():
+        for name, spec in self.given_nodes.items():
             if spec is None:  # a node taken out of a variant
                 continue
             node = self._read_node(str(name), spec)
@@ -125,11 +131,7 @@ class _Builder:
 
     def _leave_out(self) -> None:
         """Leave out nodes with a needed input whose optional wire comes from nowhere, and so on behind them."""
-        wires = self.config.get("wires")
-        while wires and isinstance(wires, Mapping):
-            lacking = {name for name, node in self.nodes.items() if self._lacks(node, wires.get(name))}
-            if not lacking:
-                break
+        while lacking := {name for name, node in self.nodes.items() if self._lacks(node, self.given_wires.get(name))}:
             self.left_out |= lacking
             for name in lacking:
                 del self.nodes[name]
@@ -143,15 +145,7 @@ class _Builder:
         )
 
     def _read_wires(self) -> None:
-        wires = self.config.get("wires") or {}
-        if not isinstance(wires, Mapping):
-            self._problem(
-                "wires",
-                "expected a mapping: node -> port -> where it comes from",
-                "write wires: {node: {port: other.output}}",
-            )
-            return
-        for name, ports in wires.items():
+        for name, ports in self.given_wires.items():
             if ports is None or name in self.left_out:
                 continue
             if not isinstance(ports, Mapping):
@@ -292,10 +286,9 @@ class _Builder:
             self._problem(where, what, self._producers(port))
 
     def _check_missing(self) -> None:
-        wires = self.config.get("wires") or {}
         attempted = {
             (str(name), str(port))
-            for name, ports in (wires.items() if isinstance(wires, Mapping) else ())
+            for name, ports in self.given_wires.items()
             if isinstance(ports, Mapping)
             for port, spec in ports.items()
             if spec is not None and not _is_optional(spec)
