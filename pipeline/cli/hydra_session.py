@@ -213,8 +213,6 @@ def _foreign(given: Any, own: Any) -> Iterator[Problem]:
             except OmegaConfBaseException as error:
                 yield Problem(f"hydra.{key}", str(error).split("\n")[0])
                 continue
-            if part is None and OmegaConf.is_missing(given, key):
-                continue
             yield from _foreign_classes(part, f"hydra.{key}")
 
 
