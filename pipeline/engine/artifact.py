@@ -109,10 +109,14 @@ def artifact_digest(path: Path) -> str:
         return file.read().decode("ascii")
 
 
-def type_of(path: Path) -> type[Value]:
-    """The type of the value in an artifact file. Raises `BadInput` where this version knows no such type."""
+def type_and_facts(path: Path) -> tuple[type[Value], dict[str, Any]]:
+    """The type of the value in an artifact file, and the facts about how it was made.
+
+    Raises `BadInput` where this version knows no such type.
+    """
     with _opened(path) as (archive, _):
-        return _type(_header(archive))
+        header = _header(archive)
+        return _type(header), header["facts"]
 
 
 def read_artifact(path: str | Path) -> Value:

@@ -4,11 +4,11 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, check_artifact, read_header, type_of
+from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, check_artifact, type_and_facts
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
@@ -23,7 +23,7 @@ from .plot_selection import PLOTS, with_plots
 
 @dataclass(frozen=True)
 class PreparedArtifact:
-    """Origin of an artifact: a file, or a graph whose output `origin` is taken.
+    """Origin of an artifact: a file, or a graph whose output `origin` is taken, and the type of its value.
 
     `graph` is the part of the `whole` that this output depends on.
     """
@@ -34,6 +34,9 @@ class PreparedArtifact:
     origin: str = ""
     variant: str = ""
     whole: Graph | None = None
+    type: Any = Any
+    made_by: Mapping[str, Any] = field(default_factory=dict)
+    """The stages that made its file, as `stages_of` gives them."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +90,7 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
             types[name] = Any
             continue
         artifacts.append(made)
-        if made.graph is not None:
-            port = made.graph.port(made.origin)
-            types[name] = port.type if port else Any
-        elif made.file is not None:
-            types[name] = type_of(made.file)
+        types[name] = made.type
     graph: Graph | None = None
     try:
         graph = build(config, types)
@@ -103,10 +102,7 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
         problems.append(Problem("plots", f"{plots!r:.40}, expected {', '.join(PLOTS)}", f"type plots={PLOTS[0]}"))
     if graph is not None:
         for made in artifacts:
-            if made.file is not None:
-                made_by = read_header(made.file)["facts"].get("stages")
-                if isinstance(made_by, Mapping):
-                    problems += mismatches(made.name, made_by, graph, specs[made.name].must_match)
+            problems += mismatches(made.name, made.made_by, graph, specs[made.name].must_match)
         for name, origin in saves.items():
             if graph.port(str(origin)) is None:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
@@ -169,22 +165,23 @@ def _prepare_artifact(name: str, spec: ArtifactSpecification, graph: Graph | Non
     if spec.file is not None:
         file = Path(spec.file)
         try:
-            type_of(file)
+            kind, facts = type_and_facts(file)
         except BadInput as error:
             hint = _how_to_get(name, spec)
             if file.is_file() and file.suffix != ".omap" and spec.made_from:
                 hint = f"if it is what a {name} is made from, type {spec.made_from[0]}={spec.file}; else {hint}"
             raise ProblemsFound([Problem(name, str(error), hint)]) from None
-        return PreparedArtifact(name, file=file)
+        return PreparedArtifact(name, file, type=kind, made_by=facts.get("stages", {}))
     if spec.graph is None:
         what = f"this variant needs a {name}, and none is given"
         raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])
     where = f"artifacts.{name}"
     graph = graph or build(spec.graph, prefix=f"{where}.", shared=spec.inherit)
     origin = spec.output or str((spec.graph.get("saves") or {}).get(name, ""))
-    if graph.port(origin) is None:
+    port = graph.port(origin)
+    if port is None:
         raise ProblemsFound([_no_output(f"{where}.output", origin, graph)])
-    return PreparedArtifact(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph)
+    return PreparedArtifact(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph, port.type)
 
 
 def _how_to_get(name: str, spec: ArtifactSpecification) -> str:

@@ -13,7 +13,7 @@ import pytest
 from memory_peak import memory_peak
 
 from omninav.pipeline import BadInput, Value
-from omninav.pipeline.engine.artifact import read_artifact, read_header, type_of, write_artifact
+from omninav.pipeline.engine.artifact import read_artifact, read_header, type_and_facts, write_artifact
 from omninav.pipeline.graph.contents import Shape
 from toys import Number
 
@@ -71,7 +71,7 @@ def test_a_value_and_how_it_was_made_come_back_and_its_file_opens_in_numpy(tmp_p
     path, points = tmp_path / "map.omap", Points(np.arange(6.0).reshape(3, 2))
     write_artifact(path, points, {"poses": "truth"})
     assert np.array_equal(read_artifact(path).points, points.points)
-    assert type_of(path) is Points
+    assert type_and_facts(path)[0] is Points
     assert read_header(path)["facts"] == {"poses": "truth"}
     with np.load(path, allow_pickle=False) as archive:
         assert np.array_equal(archive["points"], points.points)
