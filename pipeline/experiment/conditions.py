@@ -32,7 +32,8 @@ class ConditionRun:
     folder: Path
     seeds: tuple[int, ...]
     config: dict[str, Any] = field(default_factory=dict)
-    prepared: PreparedRun | None = None
+    prepared: PreparedRun = field(init=False, repr=False)
+    """The run that `check` has made of the configuration."""
     key: str = ""
     """The hash of everything but the seed that decides the results."""
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
@@ -78,6 +79,7 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
 def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose) -> None:
     """Compose and check every run. Raises `ProblemsFound` with everything that is wrong with any of them."""
     problems: list[Problem] = []
+    stages: set[str] = set()
     composed: dict[tuple[str, ...], dict[str, Any]] = {}
     name = f"{experiment.name}: checking"
     with Progress(unit="configurations") as progress:  # one for each condition in each scenario
@@ -89,30 +91,23 @@ def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose
                 plain = json.loads(json.dumps(composed[run.overrides], default=str))
                 run.config = dict(without_plotted(plain))
                 run.prepared = prepare_run(run.config)
+                stages.update(run.prepared.graph.nodes)
             except ProblemsFound as found:
                 problems += [Problem(f"{run.name}: {p.where}", p.what, p.hint) for p in found.problems]
             progress.update(name, number, len(runs))
-    problems += _unknown_stages(experiment, runs)
-    if problems:
-        raise ProblemsFound(dict.fromkeys(problems))
-
-
-def _unknown_stages(experiment: Experiment, runs: Sequence[ConditionRun]) -> list[Problem]:
-    """Stages whose time is measured and that no condition has."""
-    graphs = [run.prepared.graph for run in runs if run.prepared is not None]
-    there = sorted({name for graph in graphs for name in graph.nodes})
-    return [
-        Problem(f"experiment.measures.{name}", f"no condition has a stage '{stage}'", suggest(stage, there, "stages"))
+    problems += [
+        Problem(f"experiment.measures.{name}", f"no condition has a stage '{stage}'", suggest(stage, stages, "stages"))
         for name, measure in experiment.measures.items()
         for stage in measure.stages
-        if graphs and stage not in there
+        if stages and stage not in stages
     ]
+    if problems:
+        raise ProblemsFound(dict.fromkeys(problems))
 
 
 def open_inputs(runs: Sequence[ConditionRun]) -> None:
     """Open every file that the runs read. Raises `BadInput` where one cannot be read."""
     for run in runs:
-        assert run.prepared is not None
         known_digests(run.prepared.graph)
         for artifact in run.prepared.artifacts:
             artifact_key(artifact)

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
-from omninav.pipeline.files import Damaged, read_json, write_json, write_whole
+from omninav.pipeline.files import write_json, write_whole
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.jobs.executors import ExecutorSettings, read_executor
 from omninav.pipeline.jobs.job import Job, Outcome
@@ -57,6 +57,8 @@ class ExperimentRun:
     executor: ExecutorSettings = field(default_factory=ExecutorSettings)
     recordings: list[Recording] = field(default_factory=list)
     started: datetime = field(default_factory=datetime.now)
+    state: dict[str, Any] = field(default_factory=dict)
+    """What its file `STATE` holds."""
 
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
@@ -109,7 +111,7 @@ class ExperimentRun:
         failed = self._run_jobs(workers, jobs, "recording")
         for each in self.recordings:
             if each.name in failed:
-                for run, _ in each.readers:
+                for run, *_ in each.readers:
                     run.error = f"{each.name} could not be recorded: {failed[each.name]}"
             else:
                 each.use()
@@ -166,7 +168,7 @@ class ExperimentRun:
                 "folder": str(run.folder),
                 "part": f"seeds{several}",
                 "key": run.key,
-                "code": run.prepared.digest if run.prepared is not None else "",
+                "code": run.prepared.digest,
                 "seeds": seeds,
                 "shared": self.experiment.shared,
                 "groups": timed_groups(self.experiment),
@@ -203,7 +205,7 @@ class ExperimentRun:
             return {name: outcome.error for name, outcome in ended.items() if outcome.error}
 
     def _write_state(self, status: str) -> None:
-        manifest = {
+        self.state = {
             "omninav": version("omninav"),
             "status": status,
             "experiment": self.experiment.name,
@@ -217,17 +219,13 @@ class ExperimentRun:
             "workers": self.executor.workers,
             "libraries": {name: version(name) for name in LIBRARIES},
         }
-        write_json(self.folder / STATE, manifest)
+        write_json(self.folder / STATE, self.state)
 
     def _made_with(self) -> str:
         """The version and commit that experiment.json states: in 12 digits, and whether it had changes."""
-        try:
-            stated = read_json(self.folder / STATE)
-        except Damaged:
-            return ""
-        known, dirty, _ = (stated.get("git_commit") or "").partition("-dirty")
+        known, dirty, _ = (self.state.get("git_commit") or "").partition("-dirty")
         at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
-        return f"Made with omninav {stated['omninav']}{at}"
+        return f"Made with omninav {self.state['omninav']}{at}" if self.state else ""
 
 
 def _repeated(experiment: Experiment) -> str:

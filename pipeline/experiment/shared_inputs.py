@@ -39,8 +39,8 @@ class Recording:
     stage: Recordable
     artifact: str | None
     """The artifact whose graph the source is of; None: the run's own graph."""
-    readers: list[tuple[ConditionRun, str | None]] = field(default_factory=list)
-    """Runs, each with the artifact whose graph reads the recording."""
+    readers: list[tuple[ConditionRun, dict[str, Any], str]] = field(default_factory=list)
+    """Runs, each with the nodes of the graph that reads the recording, as it is configured, and its source's name."""
 
     @property
     def made(self) -> bool:
@@ -66,21 +66,15 @@ class Recording:
     def use(self) -> None:
         """Let all its readers replay it."""
         parameters = self.stage.replay(self.folder)
-        for run, artifact in self.readers:
-            config = run.config if artifact is None else run.config["artifacts"][artifact]["graph"]
-            assert run.prepared is not None
-            node = _source_of(run.prepared, artifact)
-            assert node is not None
-            kept = {name: value for name, value in config["nodes"][node.name].items() if name not in parameters}
-            changed = {name: value for name, value in parameters.items() if value is not None}
-            config["nodes"][node.name] = kept | changed
+        changed = {name: value for name, value in parameters.items() if value is not None}
+        for _, nodes, source in self.readers:
+            nodes[source] = {name: value for name, value in nodes[source].items() if name not in parameters} | changed
 
 
 def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]:
     """Records what the runs' sources would compute, each once; recordings are in `folder` without a cache."""
     found: dict[str, Recording] = {}
     for run in runs:
-        assert run.prepared is not None
         place = Path(str(run.config.get("cache") or folder)).resolve() / "recordings"
         for artifact in (None, *(each.name for each in run.prepared.artifacts if each.graph is not None)):
             node = _source_of(run.prepared, artifact)
@@ -93,7 +87,8 @@ def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]
                 name = f"{node.stage.recording_name()} {key[:12]}"
                 own = place / re.sub("[^A-Za-z0-9]+", "_", name)
                 found[key] = Recording(name, key, own, node.stage, artifact)
-            found[key].readers.append((run, artifact))
+            graph = run.config if artifact is None else run.config["artifacts"][artifact]["graph"]
+            found[key].readers.append((run, graph["nodes"], node.name))
     return list(found.values())
 
 
@@ -187,7 +182,6 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
     """The artifacts that runs make by a graph, each once."""
     found: dict[str, SharedArtifact] = {}
     for run in runs:
-        assert run.prepared is not None
         for artifact in run.prepared.artifacts:
             if artifact.graph is None:
                 continue

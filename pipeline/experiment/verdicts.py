@@ -136,14 +136,16 @@ def _cases(experiment: Experiment, claim: Claim, results: Results) -> list[Case]
 
 
 def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, results: Results) -> Case:
-    other = getattr(claim, side)
+    other, where, measure = getattr(claim, side), _where(experiment, labels), experiment.measures[claim.measure]
+    ours, theirs = samples(experiment, results, claim.measure, labels), None
     if isinstance(other, Mapping):
-        return _against_condition(experiment, claim, side, labels, other, results)
-    where, against = _where(experiment, labels), "the paper's figure" if other == "published" else "the limit"
-    measure = experiment.measures[claim.measure]
+        facing = _facing(labels, other)
+        against = (f"{claim.scale:g} x " if claim.scale != 1.0 else "") + _changed(labels, facing)
+        beside = {s: claim.scale * v for s, v in samples(experiment, results, claim.measure, facing).items()}
+        return _against_samples(measure, side, where, ours, beside, against, _ran(results, labels, facing))
+    against = "the paper's figure" if other == "published" else "the limit"
     limit = experiment.published_value(claim.measure, labels) if other == "published" else float(other)
     limit = None if limit is None else claim.scale * limit
-    ours, theirs = samples(experiment, results, claim.measure, labels), None
     ran = _ran(results, labels, labels)
     if claim.ratio_to is not None:
         facing = _facing(labels, claim.ratio_to)
@@ -166,18 +168,6 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
         interval = low - limit, high - limit
         holds = None if ratio and scenarios < MIN_GROUPS else decided(side, interval, margin, scenarios)
     return Case(where, found, limit, against, found - limit, interval, holds, len(ours), ran, ratio, scenarios, kept)
-
-
-def _against_condition(
-    experiment: Experiment, claim: Claim, side: Side, labels: Labels, other: Mapping[str, Any], results: Results
-) -> Case:
-    facing = _facing(labels, other)
-    against = _changed(labels, facing)
-    against = f"{claim.scale:g} x {against}" if claim.scale != 1.0 else against
-    ours = samples(experiment, results, claim.measure, labels)
-    theirs = {s: claim.scale * v for s, v in samples(experiment, results, claim.measure, facing).items()}
-    measure, where = experiment.measures[claim.measure], _where(experiment, labels)
-    return _against_samples(measure, side, where, ours, theirs, against, ran=_ran(results, labels, facing))
 
 
 def _against_samples(

@@ -128,7 +128,7 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
     print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     print(f"{counted(runs, 'run')} in all")
     print(f"claims to be judged: {len(experiment.claims)}")
-    readers = sorted({name for each in run.conditions if each.prepared for name in truth_readers(each.prepared.graph)})
+    readers = sorted({name for each in run.conditions for name in truth_readers(each.prepared.graph)})
     print(_said_of_truth(readers))
     return 0
 
