@@ -30,11 +30,6 @@ class StoredRows(Generic[T]):
         """Some rows (N,), by their numbers."""
 
     @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return len(self.shape)
-
-    @property
     def nbytes(self) -> int:
         """Bytes of the whole array, read or not."""
         return math.prod(self.shape) * self.dtype.itemsize
