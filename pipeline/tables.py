@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from .files import whole_file
 from .graph.problems import BadInput
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
 """Largest table in memory: bytes, and bytes more for each of its file."""
@@ -17,7 +17,7 @@ _BATCH = 1000
 """Rows that are unpacked at once."""
 
 
-def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
+def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
     """Write columns of one length as `<path>.csv` and `<path>.parquet`. What is NaN or masked is an empty cell.
 
     Numbers are written with all their digits, so that both files hold the same.
@@ -34,9 +34,8 @@ def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
         parquet.write_table(table, part)
 
 
-def _column(values: "npt.NDArray[Any]") -> Any:
+def _column(values: npt.NDArray[Any]) -> Any:
     """A column whose NaN or masked cells are empty, of numbers and texts as they are: `pa.array` imports pandas."""
-    import numpy as np
     import pyarrow as pa
 
     plain = np.ascontiguousarray(np.ma.getdata(values))

@@ -8,6 +8,7 @@ from typing import Any
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.run.config_text import config_text
 from omninav.pipeline.run.prepared_run import PreparedRun, check_inputs, prepare_run
 
@@ -52,8 +53,6 @@ class Configuration:
         return f"<p><b>{escape(self.variant)}</b> <code>{escape(' '.join(self.words))}</code></p>{self._repr_svg_()}"
 
     def _repr_svg_(self) -> str:
-        from omninav.pipeline.report.graph_svg import svg
-
         return svg(self.prepared.graph)
 
 

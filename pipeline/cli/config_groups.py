@@ -10,6 +10,8 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
+import yaml
+
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role, plugins
 
@@ -137,8 +139,6 @@ def config_file() -> dict[str, Any]:
 
 
 def _read(name: str) -> dict[str, Any]:
-    import yaml
-
     return dict(yaml.load(files(CONF).joinpath(name).read_text(encoding="utf-8"), yaml.CSafeLoader) or {})
 
 

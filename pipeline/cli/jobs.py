@@ -18,7 +18,11 @@ from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.files import locked, write_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
+from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.report.sweep_page import write_sweep_page
+from omninav.pipeline.report.sweep_table import overview_of
 from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.metrics_files import read_metrics
 from omninav.pipeline.run.prepared_run import Prepare, prepare_run
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import Interrupted, start, was_started
@@ -130,8 +134,6 @@ def leave_outcome(end: JobEnd, page: Path | None) -> None:
 
 def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prepare) -> float | None:
     """Run a configuration. Returns its `objective`, None where none is named."""
-    from omninav.pipeline.report.progress import Progress
-
     settings = complete(config)
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
@@ -200,15 +202,12 @@ def note_end(job: SweepJob, end: JobEnd) -> None:
 
 def write_page(sweep: Path) -> Path:
     """Write a sweep's page as far as it has run. Jobs in other processes wait for each other here."""
-    from omninav.pipeline.report.sweep_page import write_sweep_page
-
     with locked(sweep / ".page.lock"):
         return write_sweep_page(sweep, _sweep_rows(sweep))
 
 
 def show_sweep(folder: Path) -> None:
     """Print a sweep's means, what is the same in all of it, and where its page is."""
-    from omninav.pipeline.report.sweep_table import overview_of
     from omninav.pipeline.report.terminal_tables import sweep_table
 
     sweep = overview_of(_sweep_rows(folder))
@@ -221,8 +220,6 @@ def show_sweep(folder: Path) -> None:
 
 def _sweep_rows(sweep: Path) -> list[dict[str, Any]]:
     """Rows of a sweep's tables, in the order of its jobs."""
-    from omninav.pipeline.run.metrics_files import read_metrics
-
     rows = []
     for file in sweep.rglob("manifest.json"):
         manifest, folder = json.loads(file.read_text(encoding="utf-8")), file.parent

@@ -5,9 +5,11 @@ import os
 import sys
 from collections.abc import Sequence
 
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input, nearest, suggest
 from omninav.pipeline.report.terminal_text import cleaned
 
-from .config_groups import LEARN, group_files, learnable
+from .arguments import refuse_twice, refuse_unreadable, without_flags
+from .config_groups import LEARN, group_files, learnable, refuse_null_groups
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
 from .tools import tools
@@ -76,11 +78,6 @@ def _run(arguments: list[str]) -> int:
     else:
         name = "run"
     try:
-        from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
-
-        from .arguments import refuse_twice, refuse_unreadable, without_flags
-        from .config_groups import refuse_null_groups
-
         refuse_unreadable(arguments)
         _refuse_lost_folder()
         refuse_null_groups(arguments)
@@ -89,7 +86,7 @@ def _run(arguments: list[str]) -> int:
             arguments = without_flags(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
-    except KeyboardInterrupt as stopped:  # it may come before anything is imported, so it is first
+    except KeyboardInterrupt as stopped:
         on = "the same command" if hasattr(stopped, "folder") else ""  # of a run that was resumed
         if "-m" in arguments or "--multirun" in arguments:
             on = "the same command with hydra.sweep.dir=FOLDER of this sweep"
@@ -112,8 +109,6 @@ def _run(arguments: list[str]) -> int:
 
 
 def _refuse_lost_folder() -> None:
-    from omninav.pipeline.graph.problems import BadInput
-
     try:
         os.getcwd()
     except OSError:
@@ -121,8 +116,6 @@ def _refuse_lost_folder() -> None:
 
 
 def _unknown_command(name: str, second: str = "") -> int:
-    from omninav.pipeline.graph.problems import nearest, suggest
-
     variants = {file.name.removesuffix(".yaml") for file in group_files("variant")}
     longer = [one.removeprefix(f"{name} ") for one in tools() if one.startswith(f"{name} ")]
     both = f"{name}_{second}"

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput, nearest, suggest
 from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.report.metrics import metric_values
 
 FRAMEWORK = __name__.partition(".pipeline.")[0] + ".pipeline."
 
@@ -38,8 +39,6 @@ def check_objective(path: str | None, graph: Graph) -> None:
 
 def objective_of(metrics: Metrics, path: str) -> float | None:
     """The metric that an optimiser works on; None where it is no number. Raises `BadInput` where there is none."""
-    from omninav.pipeline.report.metrics import metric_values
-
     found = metric_values(metrics)
     if path not in found:
         raise BadInput(f"objective={path}: this run has no such metric; {suggest(path, found, 'metrics')}")

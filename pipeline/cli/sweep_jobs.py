@@ -15,6 +15,7 @@ from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.jobs.worker_pool import WorkerPool
 from omninav.pipeline.report.progress import Progress
 
+from .composition import offer_plugins
 from .hydra_session import hydra_started
 from .jobs import JobEnd, SweepJob, ended, leave_outcome, note_end, report_end, write_page
 
@@ -76,8 +77,6 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
 
 def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
     """Run one job of a sweep, as a job of an executor: Hydra composes it again from its words. Returns a `JobEnd`."""
-    from .composition import offer_plugins
-
     offer_plugins()
     with hydra_started(given["folders"]) as hydra:
         words = [*given["hydra"], *given["overrides"]]

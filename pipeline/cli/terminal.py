@@ -8,6 +8,8 @@ from typing import Any
 
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.report.terminal_text import PlainTexts, Uncleaned
+from omninav.pipeline.report.warning_lines import grouped, warning_lines
+from omninav.pipeline.run.metrics_files import read_timing
 
 NO_TERMINAL = 120
 """Columns of what is printed where there is no terminal."""
@@ -33,8 +35,6 @@ def _console() -> Any:
 def show_results(folder: Path, metrics: Metrics, manifest: Mapping[str, Any]) -> None:
     """Print what one looks for first of a run that has ended, what it warns of, and where all of it is."""
     from omninav.pipeline.report.terminal_tables import key_table
-    from omninav.pipeline.report.warning_lines import grouped, warning_lines
-    from omninav.pipeline.run.metrics_files import read_timing
 
     show(key_table(metrics, read_timing(folder)))
     for sentence in grouped(warning_lines(manifest)):

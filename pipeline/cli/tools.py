@@ -6,6 +6,7 @@ import inspect
 from importlib.resources import files
 from typing import Any
 
+from omninav.pipeline.graph.parameters import first_line, read_parameters
 from omninav.pipeline.graph.tool import Tool
 
 PACKAGE = "omninav.stages.tools"
@@ -26,8 +27,6 @@ def tool_class(name: str) -> type[Tool]:
 
 def tool_help(name: str) -> str:
     """Text of `--help`: what a tool does, an example, and its arguments with their defaults."""
-    from omninav.pipeline.graph.parameters import first_line, read_parameters
-
     cls = tool_class(name)
     lines = [f"omninav {name}     {first_line(cls)}", "", f"  omninav {name} {cls.example}", ""]
     for argument in read_parameters(cls).values():

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
-from .value import Tick
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy as np
+from .value import Tick
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +74,7 @@ class Context:
     `progress` (done, total or None) and `status` (in words) are for a stage whose one step takes long: they are shown.
     """
 
-    def __init__(self, node: str, rng: "np.random.Generator | None" = None, folder: Path | None = None) -> None:
+    def __init__(self, node: str, rng: np.random.Generator | None = None, folder: Path | None = None) -> None:
         self.node = node
         self.folder = folder
         self.tick = Tick(index=0, stamp=0)
@@ -97,7 +96,7 @@ class Context:
         return self.read is None or port in self.read
 
     @property
-    def rng(self) -> "np.random.Generator":
+    def rng(self) -> np.random.Generator:
         """The node's own generator. Touching it marks the run as one whose results depend on the seed."""
         self.used_rng = True
         return self.rng_unmarked() if self._rng is None else self._rng
@@ -124,11 +123,9 @@ class Context:
         """The bit generator's state as plain data."""
         return dict(self.rng_unmarked().bit_generator.state)
 
-    def rng_unmarked(self) -> "np.random.Generator":
+    def rng_unmarked(self) -> np.random.Generator:
         """The generator, for the engine's own bookkeeping."""
         if self._rng is None:
-            import numpy as np
-
             self._rng = np.random.default_rng(0)
         return self._rng
 

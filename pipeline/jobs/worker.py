@@ -17,6 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+
 
 def main() -> None:
     """Run jobs until standard input closes or the parent process dies, even in the middle of one."""
@@ -72,9 +75,6 @@ def _run(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def _in_one_line(error: BaseException) -> str:
-    from omninav.pipeline.engine.call import StageFailed
-    from omninav.pipeline.graph.problems import BadInput, ProblemsFound
-
     known = isinstance(error, StageFailed | BadInput | ProblemsFound)
     return str(error) if known else f"{type(error).__name__}: {error}"
 

@@ -22,6 +22,7 @@ from omninav.pipeline.files import DISK, digest_file, open_itself, whole_file, w
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
+from omninav.pipeline.report.run_page import write_report
 
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
 from .costly_values import costly_values
@@ -124,8 +125,6 @@ def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
-    from omninav.pipeline.report.run_page import write_report
-
     metrics, plots, tables = results_of(engine)
     notes, timing = notes_of(engine), stage_times(engine)
     write_metrics(run.folder, metrics)

@@ -15,6 +15,8 @@ from omninav.pipeline.engine.code_version import LIBRARIES, git_commit, version
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.report.graph_svg import svg
+from omninav.pipeline.report.mermaid import mermaid
 
 from .config_text import config_text
 from .inputs import refuse_missing
@@ -84,9 +86,6 @@ class RunFolder:
 
     def describe(self, prepared: PreparedRun, config: str) -> None:
         """Write the text of the configuration, and the graph that follows from it."""
-        from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
-        from omninav.pipeline.report.mermaid import mermaid
-
         write_whole(self.folder / CONFIG, config)
         write_whole(self.folder / "graph.svg", svg(prepared.graph))
         write_whole(self.folder / "graph.mmd", mermaid(prepared.graph))
