@@ -1,5 +1,6 @@
 """Runs: started, and opened when they have ended."""
 
+import io
 import os
 import shlex
 from collections.abc import Sequence
@@ -149,8 +150,6 @@ class Run:
 
     def __str__(self) -> str:
         """Its headlines."""
-        import io
-
         from rich.console import Console
 
         from omninav.pipeline.report.terminal_tables import key_table

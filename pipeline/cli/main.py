@@ -4,10 +4,12 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from pkgutil import iter_modules
 
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input, nearest, suggest
 from omninav.pipeline.report.terminal_text import cleaned
 
+from . import commands
 from .arguments import refuse_twice, refuse_unreadable, without_flags
 from .config_groups import LEARN, group_files, learnable, refuse_null_groups
 from .help import asks_for_help, help_text
@@ -15,19 +17,7 @@ from .output import lost_output, mend_streams
 from .tools import tools
 from .typing_mistakes import command_first, mistyped_word, with_homes
 
-COMMANDS = (
-    "check",
-    "graph",
-    "stages",
-    "variants",
-    "simulate",
-    "live",
-    "report",
-    "compare",
-    "resume",
-    "experiments",
-    "doctor",
-)
+COMMANDS = tuple(each.name for each in iter_modules(commands.__path__) if each.name not in ("run", "tool"))
 """Each is the function `command` of its module in `commands`; all else is a tool, or runs a variant or experiment."""
 
 WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "experiments", "doctor")

@@ -176,7 +176,8 @@ def _repeat(given: Mapping[str, Any], run: RunFolder, send: Send) -> None:
         shared = recorded or shared
         metrics = results_of(engine)[0]
         result = {"key": given["key"], "seed": seed, "metrics": metrics.values}
-        result["context"] = {each.head: each.text for each in metric_values(metrics).values() if each.is_context}
+        stated = (each for each in metric_values(metrics).values() if each.metric.by_path)
+        result["context"] = {each.head: each.text for each in stated if each.metric.spec.context}
         result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts

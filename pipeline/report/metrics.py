@@ -122,11 +122,6 @@ class MetricValue:
         name = f"{self.name} {self.metric.spec.before}".rstrip()
         return f"{name} ({self.unit})" if self.unit else name
 
-    @property
-    def is_context(self) -> bool:
-        """True if it states the size of the run."""
-        return self.metric.by_path and self.metric.spec.context
-
 
 def in_order(metrics: Metrics) -> list[Metric]:
     """All metrics but those of single logs: described ones in their order, then by name; groups after what is in none.

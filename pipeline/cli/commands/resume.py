@@ -4,26 +4,17 @@ import os
 import shlex
 import sys
 from contextlib import chdir
-from dataclasses import dataclass
 from pathlib import Path
 
 from omninav.pipeline.cli.arguments import read_flags, refuse_unreadable
 from omninav.pipeline.cli.terminal import show_results
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import Damaged, read_json
-from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, one_line
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.resume import no_run, resume
-
-
-@dataclass(frozen=True)
-class ExperimentState:
-    """Record of how an experiment was started."""
-
-    argv: tuple[str, ...]
-    cwd: str
 
 
 def command(arguments: list[str]) -> int:
@@ -64,11 +55,11 @@ def _resume_experiment(folder: Path) -> int:
         manifest = read_json(file)
     except Damaged as damaged:
         raise BadInput(f"{damaged}; type the experiment's command again: what it has done is kept") from None
-    known = {name: manifest.get(name) for name in ("argv", "cwd")}
-    state, problems = convert_fields(known, ExperimentState, "experiment")
-    if problems or not state["argv"]:
+    argv, problems = convert(manifest.get("argv"), tuple[str, ...], "argv")
+    place, more = convert(manifest.get("cwd"), Path, "cwd")
+    if problems or more or not argv:
         raise BadInput(f"{file}: it does not state how the experiment was started; type its command again")
-    words, place = list(state["argv"][1:]), Path(state["cwd"])
+    words = list(argv[1:])
     refuse_unreadable(words)
     if read_flags(words).multirun:  # whose jobs would not know what was typed
         raise BadInput(f"{file}: it is of a sweep, not of an experiment; type the sweep's command again")
