@@ -1,7 +1,7 @@
 """The cache: results as files, by the hash of everything that made them."""
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +69,7 @@ class Cache:
         """Throw a result away, and report why."""
         report_damage(f"{why}; it is thrown away and made again")
         for file in (self._entry(key, suffix), self.path(key, suffix)):
-            with suppress(FileNotFoundError):
-                file.unlink()
+            file.unlink(missing_ok=True)
 
     def lock(self, key: str) -> AbstractContextManager[None]:
         """Lock an entry while its result is being computed; others that need it wait."""

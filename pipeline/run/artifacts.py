@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -126,16 +127,11 @@ def _into(
 def _copy(file: Path, target: Path) -> None:
     """Copy a file, or link it where it is one of those that stay on disk: no program of ours changes it in place."""
     with whole_file(target) as part:
-        if file.stat().st_size <= IN_MEMORY or not _is_linked(file, part):
+        if file.stat().st_size > IN_MEMORY:
+            with suppress(OSError):  # another disk, or a file system without links
+                os.link(file.resolve(), part)
+        if not part.exists():
             shutil.copyfile(file, part)
-
-
-def _is_linked(file: Path, link: Path) -> bool:
-    try:
-        os.link(file.resolve(), link)
-    except OSError:  # another disk, or a file system without links
-        return False
-    return True
 
 
 def _key(artifact: PreparedArtifact) -> str:
