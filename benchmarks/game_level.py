@@ -23,7 +23,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.geometry.plane.se2 import distances_along, wrap
 from omninav.stages.recordings.camera_yaml import write_camera
@@ -246,7 +246,7 @@ def write(level: Level, poses: Array, path: Path, gamma: float, rng: np.random.G
     noise = OdometryNoise()
     rolled = odometry(poses, noise, draw_bias(noise, rng), rng)
     text = write_camera(camera)
-    with LogWriter(path) as log:
+    with written_log(path) as log:
         log.attach("camera.yaml", text.encode(), "application/yaml")
         for number, (pose, seen) in enumerate(zip(poses, rolled, strict=True)):
             stamp = (number + 1) * STEP_NS

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 
 from .table import Row, medians
 
@@ -17,13 +17,13 @@ def rows() -> list[Row]:
     """Odometry and pictures as a robot records them, read message by message."""
     with tempfile.TemporaryDirectory() as place:
         odometry, pictures = Path(place) / "odometry.mcap", Path(place) / "pictures.mcap"
-        with LogWriter(odometry) as log:
+        with written_log(odometry) as log:
             for number in range(MESSAGES):
                 pose = {"pose": {"position": {"x": number * 0.01}, "orientation": {"w": 1.0}}}
                 odometry_of = {"header": {"frame_id": "odom"}, "pose": pose}
                 log.write("/odom", "nav_msgs/msg/Odometry", number * 50_000_000, odometry_of)
         rng = np.random.default_rng(0)
-        with LogWriter(pictures) as log:
+        with written_log(pictures) as log:
             for number in range(300):
                 noise = rng.integers(0, 255, 60_000, dtype=np.uint8)  # as little to compress as in a JPEG
                 image = {"header": {"frame_id": "camera"}, "format": "jpeg", "data": noise}

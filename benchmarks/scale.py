@@ -23,7 +23,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from omninav.pipeline.mcap.writer import LogWriter  # noqa: E402
+from omninav.pipeline.mcap.writer import written_log  # noqa: E402
 
 CAMERA = b"projection: cylindrical\nimage: {width: 48, height: 16}\ncolumn_of_forward: 24\n"
 PLACES = 200
@@ -58,7 +58,7 @@ def write_log(path: Path, frames: int, between: int = 1, crowded: int = -1, far:
     `far`: metres that each lap lies further out than the one before, for references that differ.
     """
     encoded = images()
-    with LogWriter(path) as log:
+    with written_log(path) as log:
         log.attach("camera.yaml", CAMERA)
         for frame in range(frames):
             stamp = 10**18 + round(frame * INTERVAL_S * 1e9)

@@ -19,7 +19,7 @@ from omninav.pipeline.engine.artifact import read_header, write_artifact
 from omninav.pipeline.mcap.message import Message
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.features.grey_strip import GreyStrip
 from omninav.stages.features.hsv_histogram import HsvHistogram
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
@@ -54,7 +54,7 @@ def changed_log(log: Path, path: Path, change: Change) -> Path:
     reader = LogReader(log)
     messages = list(reader.messages())
     first = min(message.stamp for message in messages)
-    with LogWriter(path) as writer:
+    with written_log(path) as writer:
         for name, data in reader.attachments.items():
             writer.attach(name, data)
         for message in messages:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from omninav.pipeline.mcap.message_types import make_message, standard_types
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 
 CAMERA = b"projection: cylindrical\nimage: {width: 48, height: 16}\ncolumn_of_forward: 24\n"
 START = 1_700_000_000_000_000_000
@@ -75,7 +75,7 @@ def _untouched() -> tuple[Made, ...]:
 
 
 def write_mcap(path: Path, made: Iterator[Made] | None = None, camera: bytes | None = CAMERA) -> Path:
-    with LogWriter(path, chunk_bytes=8000) as log:
+    with written_log(path, chunk_bytes=8000) as log:
         if camera is not None:
             log.attach("camera.yaml", camera)
         for message in made if made is not None else messages():

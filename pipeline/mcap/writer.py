@@ -5,7 +5,8 @@ It opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and wi
 """
 
 from collections import Counter
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -81,19 +82,10 @@ class LogStream:
         return channel
 
 
-class LogWriter(LogStream):
-    """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well."""
-
-    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
-        self.path, self.chunk_bytes = Path(path), chunk_bytes
-        self._stack = ExitStack()
-
-    def __enter__(self) -> "LogWriter":
-        part = self._stack.enter_context(whole_file(self.path))
-        super().__init__(self._stack.enter_context(part.open("wb")), self.path, self.chunk_bytes)
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *raised: Any) -> None:
-        if kind is None:
-            self.finish()
-        self._stack.__exit__(kind, *raised)
+@contextmanager
+def written_log(path: Path | str, chunk_bytes: int = 1 << 20) -> Iterator[LogStream]:
+    """A log to write ROS 2 messages to; its file appears when the block ends well."""
+    with whole_file(Path(path)) as part, part.open("wb") as file:
+        log = LogStream(file, path, chunk_bytes)
+        yield log
+        log.finish()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 
 from omninav.pipeline import Context, Stage, write_whole
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import LogStream, written_log
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.plots.pose_messages import path_bytes
 from omninav.stages.values.drive import Drive, known
@@ -33,7 +33,7 @@ class ResultLog(Stage):
     def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> None:
         if ctx.folder is None:
             return
-        with LogWriter(ctx.folder / "result.mcap") as log:
+        with written_log(ctx.folder / "result.mcap") as log:
             ended = {int(part.row[-1]): part for part in drive.by_log}
             every = shown[-1].views_every if shown else 1  # the last knows how long the run was
             before = PathSoFar()
@@ -54,7 +54,7 @@ class ResultLog(Stage):
         write_whole(ctx.folder / LAYOUT, files(__package__).joinpath(LAYOUT).read_text(encoding="utf-8"))
 
 
-def _write_paths(log: LogWriter, drive: Drive) -> None:
+def _write_paths(log: LogStream, drive: Drive) -> None:
     """The paths of one log, at its end."""
     last, has_estimate = int(drive.stamps[-1]), known(drive.estimate)
     if has_estimate.any():

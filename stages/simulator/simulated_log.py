@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import LogStream, written_log
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.messages import scan_fields
@@ -40,7 +40,7 @@ def record(
     drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
     total = sum(len(drive.sent) for drive in drives)
     written = itertools.count(1)
-    with LogWriter(path) as log:
+    with written_log(path) as log:
         log.attach("camera.yaml", write_camera(drives[0].camera).encode(), "application/yaml")
         rooms = rooms_of(drives[0].world)
         if rooms is not None:
@@ -49,7 +49,7 @@ def record(
             _write(log, drive, lambda: progress(next(written), total))
 
 
-def _write(log: LogWriter, recording: SimulatedRecording, wrote_image: Callable[[], None]) -> None:
+def _write(log: LogStream, recording: SimulatedRecording, wrote_image: Callable[[], None]) -> None:
     for arrival, topic, number in sorted(_arrivals(recording)):
         if topic == "odometry":
             _write_odometry(log, recording, number, arrival)
@@ -76,7 +76,7 @@ def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
     return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
 
 
-def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
+def _write_odometry(log: LogStream, recording: SimulatedRecording, number: int, arrival: int) -> None:
     message = {
         "header": {"frame_id": "odom"},
         "child_frame_id": "base_link",
@@ -85,13 +85,13 @@ def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, 
     log.write("/odom", "nav_msgs/msg/Odometry", int(recording.times[number]), message, arrival)
 
 
-def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
+def _write_scan(log: LogStream, recording: SimulatedRecording, number: int, arrival: int) -> None:
     head = {"header": {"frame_id": "base_link"}, "scan_time": 1.0 / recording.world.ranges.rate}
     message = head | scan_fields(recording.scan_at(number))
     log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.scan_times[number]), message, arrival)
 
 
-def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
+def _write_image(log: LogStream, recording: SimulatedRecording, number: int, arrival: int) -> None:
     _, stamp, shot = recording.sent[number]
     camera = recording.camera
     size = {"width": camera.width, "height": camera.height_px}

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from omninav.pipeline import BadInput, Bounds, Context, Tool, counted, user_path
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.live.camera_device import MESSAGE, TOPIC, CameraDevice, device_camera, image_message
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.image import Pixels
@@ -54,7 +54,7 @@ class RecordCamera(Tool):
         camera, assumed = device_camera(device.name, self.camera, first)
         if assumed:
             print(f"assumed: {assumed}")
-        with LogWriter(path) as log:
+        with written_log(path) as log:
             log.attach("camera.yaml", write_camera(camera).encode())
             pixels: Pixels | None = first
             try:

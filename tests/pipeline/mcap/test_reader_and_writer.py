@@ -17,7 +17,7 @@ from omninav.pipeline.mcap.chunks import MAGIC, Allowance, unpack
 from omninav.pipeline.mcap.message import BadMessage, LogError
 from omninav.pipeline.mcap.message_types import encode_message, make_message
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 
 POSE = "geometry_msgs/msg/PoseStamped"
 COUNT = 60
@@ -26,7 +26,7 @@ COUNT = 60
 def written(path: Path, count: int = COUNT, chunk_bytes: int = 2000) -> Path:
     """A small log in several chunks: poses and blobs, and an attachment in the middle."""
     noise = np.random.default_rng(1)
-    with LogWriter(path, chunk_bytes) as log:
+    with written_log(path, chunk_bytes) as log:
         for number in range(count):
             stamp = 1_700_000_000_000_000_000 + number * 1_000_000
             log.write("/pose", POSE, stamp, {"pose": {"position": {"x": float(number)}}}, log_time=stamp + 5)
@@ -95,7 +95,7 @@ def flipped(path: Path, at: int, bit: int = 0) -> Path:
 
 def test_messages_come_back_in_the_order_of_their_stamps_which_without_a_header_are_log_times(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    with LogWriter(path) as log:
+    with written_log(path) as log:
         for log_time, stamp in ((1, 30), (2, 10), (3, 20)):
             log.write("/pose", POSE, stamp, {"header": {"frame_id": "map"}}, log_time=log_time)
         log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"})
@@ -108,14 +108,14 @@ def test_messages_come_back_in_the_order_of_their_stamps_which_without_a_header_
 
 def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
     assert written(tmp_path / "a.mcap").read_bytes() == written(tmp_path / "b.mcap").read_bytes()
-    with LogWriter(tmp_path / "c.mcap") as log:
+    with written_log(tmp_path / "c.mcap") as log:
         for number in range(9):
             log.write("/text", "std_msgs/msg/String", number, {"data": "one chunk holds it"})
     assert len(chunk_places(tmp_path / "c.mcap")) == 1
 
 
 def test_no_file_appears_when_writing_fails(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="no such message type"), LogWriter(tmp_path / "log.mcap") as log:
+    with pytest.raises(LogError, match="no such message type"), written_log(tmp_path / "log.mcap") as log:
         log.write("/pose", "my/msg/Nothing", 1, {})
     assert list(tmp_path.iterdir()) == []
 
@@ -231,7 +231,7 @@ def test_a_wrong_field_or_type_is_refused_with_the_nearest_name(tmp_path: Path) 
         make_message("geometry_msgs/msg/Pose", {"positon": {}})
     with pytest.raises(LogError, match="did you mean 'geometry_msgs/msg/PoseStamped'"):
         make_message("geometry_msgs/msg/PoseStampd", {})
-    with LogWriter(tmp_path / "log.mcap") as log:
+    with written_log(tmp_path / "log.mcap") as log:
         log.write("/pose", POSE, 1, {})
         with pytest.raises(LogError, match="use another topic"):
             log.write("/pose", "std_msgs/msg/String", 1, {})
@@ -326,7 +326,7 @@ def test_a_summary_that_names_places_beyond_the_file_does_no_harm(path: Path, wh
 
 
 def test_a_time_that_no_clock_shows_costs_its_message(tmp_path: Path) -> None:
-    with LogWriter(tmp_path / "log.mcap") as log:
+    with written_log(tmp_path / "log.mcap") as log:
         log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"}, log_time=2**64 - 1)
         log.write("/text", "std_msgs/msg/String", 8, {"data": "eight"})
     reader = LogReader(tmp_path / "log.mcap")
@@ -365,7 +365,7 @@ def test_very_many_chunks_that_unpack_to_far_more_than_a_log_holds_are_not_read(
 
 
 def test_of_two_attachments_of_one_name_the_first_is_used_and_the_other_counted(tmp_path: Path) -> None:
-    with LogWriter(tmp_path / "log.mcap") as log:
+    with written_log(tmp_path / "log.mcap") as log:
         for content in (b"first", b"first", b"other"):
             log.write("/pose", POSE, 1_700_000_000_000_000_000, {})
             log.attach("camera.yaml", content)

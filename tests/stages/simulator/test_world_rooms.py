@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline import BadInput, Context
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.recordings.rooms_yaml import ROOMS, write_rooms
 from omninav.stages.simulator.config import Room, WorldConfig
 from omninav.stages.simulator.world_rooms import WorldRooms, rooms_of
@@ -25,7 +25,7 @@ def test_a_log_that_was_recorded_of_a_world_knows_its_rooms(tmp_path: Path) -> N
     world = rooms_of(WorldConfig(rooms=(Room(name="kitchen", corner=(2.0, 3.0), size=(4.0, 5.0)),)))
     assert world is not None
     for name, text in (("drive", write_rooms(world)), ("odd", "[{name: kitchen, corners: [0, 1]}]"), ("none", None)):
-        with LogWriter(tmp_path / f"{name}.mcap") as log:
+        with written_log(tmp_path / f"{name}.mcap") as log:
             log.attach("camera.yaml", b"{}")
             if text is not None:
                 log.attach(ROOMS, text.encode())

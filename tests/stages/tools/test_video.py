@@ -4,7 +4,7 @@ import pytest
 
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.pipeline.mcap.writer import LogWriter
+from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.plots.pose_messages import pose_messages
 from omninav.stages.tools.video import BAND, BLUE, LIGHT, MAX_HEIGHT, ORANGE, WIDTH, Floor, MakeVideo, scenes_in
 
@@ -22,7 +22,7 @@ def write_scene(log, seconds, x, y):
 @pytest.fixture
 def folder(tmp_path):
     """A run of ten seconds along x; from the sixth on it is lost and believes to be elsewhere."""
-    with LogWriter(tmp_path / "result.mcap") as log:
+    with written_log(tmp_path / "result.mcap") as log:
         for k in range(11):
             now = SECOND * (100 + k)
             header = {"stamp": {"sec": 100 + k, "nanosec": 0}, "frame_id": "map"}
@@ -67,7 +67,7 @@ def test_a_cut_log_is_shown_as_far_as_it_reaches_and_said_to_be_cut(folder, caps
 
 
 def test_a_long_way_along_y_fits_into_the_height_and_lies_in_the_middle(tmp_path):
-    with LogWriter(tmp_path / "result.mcap") as log:
+    with written_log(tmp_path / "result.mcap") as log:
         for k in range(51):
             write_scene(log, 100 + k, 7.0, 0.4 * k)
     floor = Floor(list(scenes_in(LogReader(tmp_path / "result.mcap"))))
@@ -80,7 +80,7 @@ def test_a_long_way_along_y_fits_into_the_height_and_lies_in_the_middle(tmp_path
 
 
 def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
-    with LogWriter(tmp_path / "result.mcap") as log:
+    with written_log(tmp_path / "result.mcap") as log:
         write_scene(log, 100, 1.0, 1.0)
         data = np.zeros((30, 50), np.int8)
         data[2, 40] = 100
@@ -96,7 +96,7 @@ def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
 
 @pytest.mark.parametrize(("seconds", "rate"), [(0.001, 120.0), (100.0, 1.0)])
 def test_a_video_has_a_rate_that_players_can_show(tmp_path, seconds, rate):
-    with LogWriter(tmp_path / "result.mcap") as log:
+    with written_log(tmp_path / "result.mcap") as log:
         for k in range(3):
             write_scene(log, 100 + seconds * k, 0.1 * k, 0.0)
     MakeVideo(run_folder=str(tmp_path), out=str(tmp_path / "video.mp4"), speed=1.0).run(Context("video"))
