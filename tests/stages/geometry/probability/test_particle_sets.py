@@ -14,6 +14,7 @@ from omninav.stages.geometry.probability.particles import (
     uniform_around,
     weighted_mean,
 )
+from omninav.stages.sensor import nearest_cells
 from omninav.stages.sensor.nearest_cells import NearestCells
 
 POSES = st.tuples(*[st.floats(-50, 50)] * 3)
@@ -111,3 +112,21 @@ def test_the_mean_of_all_stands_beside_the_heaviest_mode():
     poses, weights = rng.normal(0.0, [3.0, 3.0, 2.0], (500, 3)), rng.random(500)
     *_, mean = mode_and_mean(poses, weights, 1.0, 0.5)
     assert mean.tolist() == weighted_mean(poses, weights).tolist()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_few_points_are_searched_without_the_tree_and_give_what_it_gives(seed: int, monkeypatch) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([rng.uniform(0, 10, (150, 2)), rng.integers(0, 10, (60, 2)).astype(float)])
+    points = np.concatenate([points, points[:40]])  # of those that lie at one place, and on a lattice, the tree chooses
+    places = rng.uniform(-2, 12, (3000, 2))
+    found = NearestCells(points, 4, 0.25, 1.5).of(places)
+    monkeypatch.setattr(nearest_cells, "FEW_POINTS", 0)
+    assert found.tolist() == NearestCells(points, 4, 0.25, 1.5).of(places).tolist()
+    expected = NearestCells(points[:150], 4, 0.25, 1.5).of(places)
+    monkeypatch.undo()
+    alone = NearestCells(points[:150], 4, 0.25, 1.5)
+    monkeypatch.setattr(alone, "_in_tree", None)
+    for some in np.array_split(places, 7):
+        alone.of(some)
+    assert alone.of(places).tolist() == expected.tolist()
