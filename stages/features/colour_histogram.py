@@ -1,18 +1,18 @@
 """Colour histogram per segment of the panorama, in a colour space of choice."""
 
-import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.arrays import Floats
+from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
-from .segment_edges import counts_by_segment
+from .segment_edges import segment_edges
 
 ColourSpace = Literal["rgb", "lab", "ycrcb", "hsv"]
 BinCount = Annotated[int, Bounds(ge=0, le=256)]
@@ -21,6 +21,31 @@ Ranges = tuple[tuple[Level, Level], tuple[Level, Level], tuple[Level, Level]]
 
 CONVERSIONS = {"lab": cv2.COLOR_BGR2Lab, "ycrcb": cv2.COLOR_BGR2YCrCb, "hsv": cv2.COLOR_BGR2HSV}
 LEVELS = {"rgb": (256, 256, 256), "lab": (256, 256, 256), "ycrcb": (256, 256, 256), "hsv": (180, 256, 256)}
+
+
+@compiled(nogil=True)
+def _count(pixels: Pixels, edges: Ints, bins: Ints, sizes: Ints, offsets: Ints, joint: bool, length: int) -> Floats:
+    segments = len(edges) - 1
+    counts = np.zeros((segments, length), np.float32)
+    for j in range(segments):
+        here = np.zeros(length, np.int64)
+        for row in range(pixels.shape[0]):
+            for column in range(edges[j], edges[j + 1]):
+                cell = 0
+                for channel in range(3):
+                    if sizes[channel] == 0:
+                        continue
+                    b = bins[channel, pixels[row, column, channel]]
+                    if joint:
+                        cell = cell * sizes[channel] + b
+                    else:
+                        here[offsets[channel] + b] += 1
+                if joint:
+                    here[cell] += 1
+        total = here.sum()
+        for b in range(length):
+            counts[j, b] = here[b] / total
+    return counts
 
 
 def colour_histograms(
@@ -38,21 +63,20 @@ def colour_histograms(
     `joint` False: one histogram per channel behind each other, with equal shares of the mass; True: one over all
     channels, the first slowest. `pixels` are blue-green-red.
     """
-    converted = pixels[..., ::-1] if space == "rgb" else np.asarray(cv2.cvtColor(pixels, CONVERSIONS[space]), np.uint8)
+    converted = pixels[..., ::-1] if space == "rgb" else cv2.cvtColor(pixels, CONVERSIONS[space])
+    sizes = np.array(bins, dtype=np.int64)
     spans = ranges or tuple((0, levels - 1) for levels in LEVELS[space])
-    used = [channel for channel in range(3) if bins[channel]]
-    each = []
-    for channel in used:
-        low, high = spans[channel]
-        table = np.clip((np.arange(256) - low) * bins[channel] // (high - low + 1), 0, bins[channel] - 1)
-        each.append(np.take(table, converted[..., channel]))
-    if joint:
-        sizes = [bins[channel] for channel in used]
-        counts = counts_by_segment(np.ravel_multi_index(each, sizes), math.prod(sizes), segments)
-    else:
-        parts = [counts_by_segment(own, bins[channel], segments) for channel, own in zip(used, each, strict=True)]
-        counts = np.concatenate(parts, axis=1)
-    return np.asarray(counts / counts.sum(axis=1, keepdims=True), np.float32)
+    table = np.stack(
+        [
+            np.clip((np.arange(256) - low) * n // (high - low + 1), 0, max(n - 1, 0))
+            for n, (low, high) in zip(bins, spans, strict=True)
+        ]
+    )
+    offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+    length = int(np.prod(sizes[sizes > 0])) if joint else int(sizes.sum())
+    edges = segment_edges(pixels.shape[1], segments)
+    counted: Floats = _count(np.ascontiguousarray(cast(Pixels, converted)), edges, table, sizes, offsets, joint, length)
+    return counted
 
 
 class ColourHistogram(UnderGreyWorld, Stage):

@@ -6,7 +6,8 @@ from typing import Literal, cast
 import cv2
 import numpy as np
 
-from omninav.stages.geometry.arrays import Array
+from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.image import Pixels
 
 GreyWorld = Literal["none", "whole", "local"]
@@ -19,6 +20,17 @@ LOCAL_WINDOW = 0.25
 
 MIN_MEAN = 1.0
 """Means below this (0..255) are of a black part, which stays black."""
+
+
+@compiled(nogil=True)
+def _scaled(pixels: Pixels, gains: Floats) -> Pixels:
+    out = np.empty_like(pixels)
+    for row in range(pixels.shape[0]):
+        for column in range(pixels.shape[1]):
+            for channel in range(3):
+                value = pixels[row, column, channel] * gains[column, channel] + np.float32(0.5)
+                out[row, column, channel] = np.uint8(min(value, np.float32(255)))
+    return out
 
 
 def grey_world_pixels(pixels: Pixels, window: float) -> Pixels:
@@ -38,7 +50,8 @@ def grey_world_pixels(pixels: Pixels, window: float) -> Pixels:
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(circle, axis=0)])
         around = (sums[2 * half + 1 : 2 * half + 1 + columns] - sums[:columns]) / (2 * half + 1)
     gains = (LEVEL / np.maximum(around, MIN_MEAN)).astype(np.float32)
-    return np.asarray(np.minimum(pixels * gains + np.float32(0.5), np.float32(255)), np.uint8)
+    scaled: Pixels = _scaled(np.ascontiguousarray(pixels), gains)
+    return scaled
 
 
 @dataclass(kw_only=True, eq=False)

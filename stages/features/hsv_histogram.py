@@ -1,20 +1,68 @@
 """HSV colour histogram per segment of the panorama."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.arrays import Floats
+from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.arrays import Floats, Ints
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
 from .grey_world import UnderGreyWorld
-from .segment_edges import counts_by_segment
+from .segment_edges import segment_edges
 
 HUE_BINS = 16
 """Bins of the hue, as in the paper (Gross & Koenig 2004, section 2)."""
+
+
+@compiled(nogil=True)
+def _count(
+    hsv: Pixels,
+    edges: Ints,
+    hue_bin: Ints,
+    value_bin: Ints,
+    hues: int,
+    values: int,
+    joint: bool,
+    min_saturation: int,
+    min_value: int,
+) -> Floats:
+    segments = len(edges) - 1
+    bins = hues * values + values if joint else hues + values
+    counts = np.zeros((segments, bins), np.float32)
+    hue_counts = np.zeros(hues, np.int64)
+    value_counts = np.zeros(values, np.int64)
+    joint_counts = np.zeros(hues * values + values, np.int64)
+    for j in range(segments):
+        hue_counts[:] = 0
+        value_counts[:] = 0
+        joint_counts[:] = 0
+        coloured = 0
+        for row in range(hsv.shape[0]):
+            for column in range(edges[j], edges[j + 1]):
+                h, s, v = hsv[row, column, 0], hsv[row, column, 1], hsv[row, column, 2]
+                defined = s >= min_saturation and v >= min_value
+                if joint:
+                    joint_counts[(hue_bin[h] if defined else hues) * values + value_bin[v]] += 1
+                else:
+                    value_counts[value_bin[v]] += 1
+                    if defined:
+                        hue_counts[hue_bin[h]] += 1
+                        coloured += 1
+        total = hsv.shape[0] * (edges[j + 1] - edges[j])
+        if joint:
+            for b in range(bins):
+                counts[j, b] = joint_counts[b] / total
+        else:
+            # Pixels without a hue take no part of its histogram: their share of the segment's mass stays with V.
+            for b in range(hues):
+                counts[j, b] = 0.5 * hue_counts[b] / total
+            for b in range(values):
+                counts[j, hues + b] = (1.0 - 0.5 * coloured / total) * value_counts[b] / total
+    return counts
 
 
 def hsv_histograms(
@@ -29,20 +77,20 @@ def hsv_histograms(
     value intersect by 1, white and black by 0. OpenCV's hue is 0..179 and circular: bins are equal arcs, of which the
     first starts at red (erratum 22 in docs/papers.md).
     """
-    hsv = cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV)
-    hue, saturation, value = (np.asarray(channel, np.uint8) for channel in cv2.split(hsv))
-    defined = (saturation >= max(1, min_saturation)) & (value >= max(1, min_value))
-    hue_bin = np.where(defined, np.take(np.arange(256) * HUE_BINS // 180, hue), HUE_BINS)  # the last one: without a hue
-    value_bin = np.take(np.arange(256) * value_bins // 256, value)
-    if joint:
-        counts = counts_by_segment(hue_bin * value_bins + value_bin, (HUE_BINS + 1) * value_bins, segments)
-        return np.asarray(counts / counts.sum(axis=1, keepdims=True), np.float32)
-    hues = counts_by_segment(hue_bin, HUE_BINS + 1, segments)[:, :HUE_BINS]
-    values = counts_by_segment(value_bin, value_bins, segments)
-    total = values.sum(axis=1, keepdims=True)
-    # Pixels without a hue take no part of its histogram: their share of the segment's mass stays with V.
-    left = 1.0 - 0.5 * hues.sum(axis=1, keepdims=True) / total
-    return np.concatenate([0.5 * hues / total, left * values / total], axis=1).astype(np.float32)
+    hsv = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV))
+    hue_bin = np.arange(256) * HUE_BINS // 180
+    value_bin = np.arange(256) * value_bins // 256
+    return _count(
+        hsv,
+        segment_edges(pixels.shape[1], segments),
+        hue_bin,
+        value_bin,
+        HUE_BINS,
+        value_bins,
+        joint,
+        max(1, min_saturation),
+        max(1, min_value),
+    )
 
 
 class HsvHistogram(UnderGreyWorld, Stage):

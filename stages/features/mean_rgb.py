@@ -18,7 +18,8 @@ def mean_colours(pixels: Pixels, segments: int) -> Floats:
     edges = segment_edges(pixels.shape[1], segments)
     columns = pixels.sum(axis=0, dtype=np.uint32)
     sums = np.add.reduceat(columns, edges[:-1], axis=0)
-    return np.asarray(sums / (np.diff(edges)[:, None] * pixels.shape[0]), np.float32)
+    means: Floats = (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
+    return means
 
 
 class MeanRgb(UnderGreyWorld, Stage):

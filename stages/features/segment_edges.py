@@ -1,4 +1,4 @@
-"""Cuts a panorama into segments, and counts in each."""
+"""Cuts a panorama into segments."""
 
 import functools
 
@@ -15,10 +15,3 @@ def segment_edges(columns: int, segments: int) -> Ints:
     edges: Ints = np.round(np.arange(segments + 1) * columns / segments).astype(np.int64)
     edges.setflags(write=False)
     return edges
-
-
-def counts_by_segment(bins: Ints, number: int, segments: int) -> Ints:
-    """How many pixels of each segment are in each of a `number` of bins: (rows, columns) -> (segments, number)."""
-    segment = np.repeat(np.arange(segments), np.diff(segment_edges(bins.shape[1], segments)))
-    counts = np.bincount((segment * number + bins).ravel(), minlength=segments * number)
-    return counts.reshape(segments, number)

@@ -15,7 +15,6 @@ from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import VerticalSegments
 
 from .colour_moments import add_pixel, correlations
-from .dct import cosine_basis
 from .prepared_image import PreparedImage, prepared_image
 
 SAMPLES = 8
@@ -34,6 +33,15 @@ LINES = 360
 """Radii of a mirror image along which segments are searched."""
 MARGIN = 0.2
 """Share of its length by which a segment is widened at both ends for its colours."""
+
+
+def profile_basis() -> Floats:
+    """Rows 0 to 6 of the orthonormal 8-point cosine transform: (7, 8)."""
+    n = np.arange(SAMPLES)
+    rows = np.arange(COEFFICIENTS)[:, None]
+    basis = math.sqrt(2.0 / SAMPLES) * np.cos(np.pi * (n + 0.5) * rows / SAMPLES)
+    basis[0] /= math.sqrt(2.0)
+    return basis.astype(np.float32)
 
 
 class ImageSegments(NamedTuple):
@@ -104,8 +112,7 @@ def segments_of(
     kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= min_length))
     ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
     descriptors = np.empty((len(kept), 3 + COEFFICIENTS), np.float32)
-    basis = cosine_basis(SAMPLES)[:COEFFICIENTS].astype(np.float32)
-    _describe(smooth, grey, lines[kept], ends, margin, basis, descriptors)
+    _describe(smooth, grey, lines[kept], ends, margin, profile_basis(), descriptors)
     return ImageSegments(lines[kept], ends, descriptors)
 
 
@@ -115,7 +122,7 @@ def _count_neighbours(
 ) -> None:
     columns = len(starts) - 1
     for column in range(columns):
-        for step in range(reach + 1):
+        for step in range(0, reach + 1):
             other = column + step
             if other >= columns:
                 if not circle or step >= columns:
@@ -255,4 +262,5 @@ class FindVerticalSegments(Stage):
         radius = read.ring.outer - points[..., 1]
         around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         middle = np.array([read.ring.centre_x, read.ring.centre_y])
-        return np.asarray(middle + radius[..., None] * around)
+        back: Array = middle + radius[..., None] * around
+        return back
