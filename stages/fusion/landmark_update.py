@@ -118,7 +118,7 @@ class LandmarkUpdate(Stage):
         old = belief.weights * unsaid**novelty
         poses, weights, recovery, free = [belief.poses], [old], [], np.ones(len(belief.poses), np.bool_)
         for mean, covariance, probability in zip(fix.poses, fix.covariances, sure.tolist(), strict=True):
-            local = are_within(belief.poses, mean, *LOCAL) & free
+            local = are_within(np.ascontiguousarray(belief.poses), mean, *LOCAL) & free
             free &= ~local  # where two poses are close together, a particle counts for the better one
             share = float(np.add.reduce(belief.weights[local]))
             if share > 0.0:

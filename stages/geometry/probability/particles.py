@@ -8,7 +8,6 @@ import numpy as np
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Ints, Shorts
 from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
-from omninav.stages.geometry.plane.se2 import wrap
 
 NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 """Steps to a cell itself and its 26 neighbours: (3, 27)."""
@@ -107,15 +106,23 @@ def _mode_and_mean(
     return mass
 
 
+@compiled(nogil=True)
 def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Bools:
     """Tests whether each of poses (N, 3) is within a tolerance of a pose (3,): (N,)."""
-    x, y, turn = (poses - pose).T
-    return np.asarray((x * x + y * y <= metres * metres) & (np.abs(wrap(turn)) <= radians))
+    out = np.zeros(len(poses), np.bool_)
+    for n in range(len(poses)):
+        x, y = poses[n, 0] - pose[0], poses[n, 1] - pose[1]
+        if x * x + y * y <= metres * metres:
+            turn = poses[n, 2] - pose[2] + np.pi
+            if turn < 0.0 or turn >= 2 * np.pi:  # a remainder takes ten times as long as all the rest
+                turn = turn % (2 * np.pi)
+            out[n] = abs(turn - np.pi) <= radians
+    return out
 
 
 def share_within(poses: Array, weights: Array, pose: Array, metres: float, radians: float) -> float:
     """The weight of the particles (N, 3) within a distance and a turn of a pose (3,), of weights (N,)."""
-    return float(np.add.reduce(weights[are_within(poses, pose, metres, radians)]))
+    return float(np.add.reduce(weights[are_within(np.ascontiguousarray(poses), pose, metres, radians)]))
 
 
 @compiled(nogil=True)
