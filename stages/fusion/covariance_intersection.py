@@ -5,7 +5,13 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.probability.gaussians import intersected, inverse_into, merged, squared_distances
+from omninav.stages.geometry.probability.gaussians import (
+    farther_apart,
+    intersect_into,
+    inverse_into,
+    merged,
+    squared_distance,
+)
 from omninav.stages.values.belief import GaussianMixture
 
 MAX_DISTANCE = 7.81
@@ -40,36 +46,11 @@ def fuse(
     components are copied. So the sum of all weights is that of both mixtures (erratum 5); normalise only after the last
     source. Raises ValueError where a covariance is not positive definite.
     """
-    (mean_a, cov_a, weight_a), (mean_b, cov_b, weight_b) = a, b
-    near = squared_distances(mean_a, cov_a, mean_b, cov_b) < gamma
-    one, other = np.nonzero(near)
-    alone_a, alone_b = np.flatnonzero(~near.any(axis=1)), np.flatnonzero(~near.any(axis=0))
-    log_det_a, log_det_b = _log_determinants(cov_a), _log_determinants(cov_b)
-    pairs = []
-    for i, j in zip(one.tolist(), other.tolist(), strict=True):
-        shares = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
-        alpha = alpha_by_ratio(log_det_a[i], log_det_b[j], *shares)
-        pairs.append(intersected(mean_a[i], cov_a[i], mean_b[j], cov_b[j], alpha))
-    means = np.array([mean for mean, _ in pairs]).reshape(-1, 3)
-    covariances = np.array([covariance for _, covariance in pairs]).reshape(-1, 3, 3)
-    matched_a = np.bincount(one, weight_b[other], len(weight_a))[one]
-    matched_b = np.bincount(other, weight_a[one], len(weight_b))[other]
-    weights = weight_a[one] * weight_b[other] * (1.0 / matched_a + 1.0 / matched_b)
-    # In the order of a's components, then those of b that match none.
-    order = np.argsort(np.concatenate([alone_a, one, len(weight_a) + alone_b]), kind="stable")
-    return (
-        np.concatenate([mean_a[alone_a], means, mean_b[alone_b]])[order],
-        np.concatenate([cov_a[alone_a], covariances, cov_b[alone_b]])[order],
-        np.concatenate([weight_a[alone_a], weights, weight_b[alone_b]])[order],
-    )
-
-
-def _log_determinants(covariances: Array) -> Array:
-    inverse = np.empty((3, 3))
-    found = np.array([inverse_into(np.ascontiguousarray(each, np.float64), inverse) for each in covariances])
-    if np.isnan(found).any():
+    mean_a, cov_a, weight_a, mean_b, cov_b, weight_b = (np.ascontiguousarray(each, np.float64) for each in (*a, *b))
+    means, covariances, weights, definite = _fuse(mean_a, cov_a, weight_a, mean_b, cov_b, weight_b, gamma, weighted)
+    if not definite:
         raise ValueError("a covariance is not positive definite")
-    return found
+    return means, covariances, weights
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -80,7 +61,8 @@ def alpha_by_ratio(log_det_a: float, log_det_b: float, weight_a: float, weight_b
     minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3 in
     docs/papers.md).
     """
-    return float(1.0 / (1.0 + weight_a / weight_b * np.exp(log_det_b - log_det_a)))
+    alpha: float = 1.0 / (1.0 + weight_a / weight_b * np.exp(log_det_b - log_det_a))
+    return alpha
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -111,6 +93,61 @@ def _min_determinant(cov_a: Array, inverse_b: Array) -> float:
         else:
             high = alpha
     return 0.5 * (low + high)
+
+
+@compiled(nogil=True, error_model="numpy")
+def _fuse(
+    mean_a: Array,
+    cov_a: Array,
+    weight_a: Array,
+    mean_b: Array,
+    cov_b: Array,
+    weight_b: Array,
+    gamma: float,
+    weighted: bool,
+) -> tuple[Array, Array, Array, bool]:
+    size_a, size_b = len(weight_a), len(weight_b)
+    match = np.zeros((size_a, size_b), np.bool_)
+    matched_a, matched_b = np.zeros(size_a), np.zeros(size_b)
+    unmatched_a, unmatched_b = np.ones(size_a, np.bool_), np.ones(size_b, np.bool_)
+    number = 0
+    for i in range(size_a):
+        for j in range(size_b):
+            if farther_apart(mean_a[i], cov_a[i], mean_b[j], cov_b[j], gamma):
+                continue
+            if squared_distance(mean_a[i], cov_a[i], mean_b[j], cov_b[j]) < gamma:
+                match[i, j] = True
+                matched_a[i] += weight_b[j]
+                matched_b[j] += weight_a[i]
+                unmatched_a[i] = unmatched_b[j] = False
+                number += 1
+    size = number + unmatched_a.sum() + unmatched_b.sum()
+    means, covariances, weights = np.empty((size, 3)), np.empty((size, 3, 3)), np.empty(size)
+    inverse = np.empty((3, 3))
+    log_det_a, log_det_b = np.empty(size_a), np.empty(size_b)
+    for i in range(size_a):
+        log_det_a[i] = inverse_into(cov_a[i], inverse)
+    for j in range(size_b):
+        log_det_b[j] = inverse_into(cov_b[j], inverse)
+    definite = not (np.isnan(log_det_a).any() or np.isnan(log_det_b).any())
+    at = 0
+    for i in range(size_a):
+        if unmatched_a[i]:
+            means[at], covariances[at], weights[at] = mean_a[i], cov_a[i], weight_a[i]
+            at += 1
+        for j in range(size_b):
+            if not match[i, j]:
+                continue
+            share_a, share_b = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
+            alpha = alpha_by_ratio(log_det_a[i], log_det_b[j], share_a, share_b)
+            definite &= intersect_into(mean_a[i], cov_a[i], mean_b[j], cov_b[j], alpha, means[at], covariances[at])
+            weights[at] = weight_a[i] * weight_b[j] * (1.0 / matched_a[i] + 1.0 / matched_b[j])
+            at += 1
+    for j in range(size_b):
+        if unmatched_b[j]:
+            means[at], covariances[at], weights[at] = mean_b[j], cov_b[j], weight_b[j]
+            at += 1
+    return means, covariances, weights, definite
 
 
 class CovarianceIntersection(Stage):
