@@ -1,22 +1,19 @@
 """Pages of experiments say what their result files say, and no more."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
 
-from omninav.pipeline.cli.composed_experiments import judged_experiments
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.page import markdown_page
-from omninav.pipeline.experiment.pages import Judged, by_chance, claims_of, claims_page, counts, index_page, sources
+from omninav.pipeline.experiment.pages import Judged, claims_page, counts, index_page
 from omninav.pipeline.experiment.result import Cell, ExperimentResult, result_text
 from omninav.pipeline.experiment.specification import read_experiment
-from omninav.pipeline.experiment.verdicts import Case, Verdict
+from omninav.pipeline.experiment.verdicts import Case
 from omninav.pipeline.graph.problems import BadInput
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "experiments"
-MADE = re.compile(r"Made with omninav [\w.]+, commit [0-9a-f]{12}( with changes that are not committed)?")
 CLAIM = {"statement": "it holds", "measure": "error", "at_most": 9.0}
 FILE = {
     "name": "one",
@@ -103,52 +100,6 @@ def test_a_struck_claim_counts_no_more_and_is_named_with_its_reason() -> None:
     assert counts(found, "A paper 2004") == "Of 1 claims of this paper 1 hold, 0 do not, and 0 are undecided."
     assert "* as printed: so ([One](one.md)): the limit is ours" in claims_page(found)
     assert "(section 2): “so it is” Struck: the limit is ours." in str(markdown_page(*found[0], ())["one.md"])
-
-
-def test_the_claims_say_how_many_verdicts_chance_would_give(committed: Judged) -> None:
-    number = sum(len(list(claims_of(committed, source))) for source in sources(committed))
-    share = round(0.025 * number)
-    assert f"{number} verdicts" in by_chance(committed)
-    assert f"some {share} that hold and {share} that do not" in by_chance(committed)
-
-
-@pytest.fixture(scope="module")
-def committed() -> Judged:
-    return judged_experiments(RESULTS)
-
-
-def test_every_committed_result_judges_the_claims_of_its_file_and_shows_its_conditions(committed: Judged) -> None:
-    for experiment, result in committed:
-        assert set(result.verdicts) == set(experiment.claims), experiment.name
-        assert set(result.cells) == set(experiment.measures), experiment.name
-        shown = {
-            (*(condition.labels[row] for row in experiment.page.rows), condition.labels[experiment.page.columns])
-            for condition in experiment.conditions()
-        }
-        for measure, cells in result.cells.items():
-            assert {cell.at for cell in cells if cell.figure is not None} <= shown, (experiment.name, measure)
-            assert shown <= {cell.at for cell in cells}, (experiment.name, measure)
-        assert MADE.fullmatch(result.made_with), experiment.name
-
-
-def test_a_page_says_what_its_result_file_does(committed: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
-    for experiment, result in committed:
-        page = str(markdown_page(experiment, result, ())[f"{experiment.name}.md"])
-        said = re.findall(r"\| (holds(?: in \d+ of \d+ runs)?|does not hold|undecided) \|\n", page)
-        assert said == [Verdict((each,)).words for key in experiment.claims for each in result.verdicts[key]]
-        for key, verdict in result.judged(experiment).items():
-            assert f"\n| {experiment.claims[key].statement} (" in page
-            assert f"): **{verdict.words}** |" in page
-
-
-def test_the_five_papers_have_claims_and_a_page_each(committed: Judged) -> None:
-    pages = {page: page.read_text() for page in RESULTS.glob("*.md")}
-    assert len(sources(committed)) == 5
-    for source in sources(committed):
-        assert len(list(claims_of(committed, source))) > 30
-        (page,) = (text for text in pages.values() if f"{{{{ claims {source} }}}}" in text)
-        assert len(re.findall(r"^\{\{ (?:table|plot) ", page, re.MULTILINE)) == 2
 
 
 def test_the_command_writes_pages_plots_index_and_claims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ def mapped(poses, points=None):
 
 
 def test_maps_are_put_where_their_common_landmarks_are_in_whatever_order_they_come() -> None:
-    there, back = np.split(tour_poses(0.3), 2)
+    there, back = np.split(tour_poses(0.45), 2)
     back[:, 1] += 0.3
     maps = [mapped_room(), mapped(there), mapped(back)]
     found = aligned_by_landmarks(maps, np.random.default_rng(0))
@@ -41,7 +41,7 @@ def test_all_landmarks_of_a_map_agree_with_itself() -> None:
 
 
 def test_a_map_of_another_room_or_without_landmarks_is_aligned_with_nothing() -> None:
-    other = mapped(tour_poses(0.3), room(seed=5))
+    other = mapped(tour_poses(0.45), room(seed=5))
     assert aligned_by_landmarks([mapped_room(), other], np.random.default_rng(0)) is None
     assert aligned_by_landmarks([mapped_room(), replace(other, landmarks=None)], np.random.default_rng(0)) is None
 
@@ -56,7 +56,7 @@ def test_in_a_joined_map_whose_landmarks_are_there_twice_an_image_is_found_as_in
 
 
 def test_true_poses_of_two_frames_are_not_joined_unless_it_is_asked(tmp_path: Path) -> None:
-    here, there = mapped_room(), replace(mapped(tour_poses(0.3)), pose_source="truth")
+    here, there = mapped_room(), replace(mapped(tour_poses(0.45)), pose_source="truth")
     files = [str(tmp_path / f"{name}.omap") for name in ("here", "there", "again")]
     for file, map in zip(files, (here, there, here), strict=True):
         write_artifact(Path(file), replace(map, pose_source="truth"), {"stages": {}})

@@ -164,12 +164,11 @@ CAMERA = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_
     [
         ("truth", (0.1, 0.0, 0.0)),
         ("truth", (0.5, -0.2, 0.0)),
-        ("odometry", (0.5, -0.2, 0.0)),
-        ("odometry", (0.2, 0.0, math.radians(8.0))),  # given poses tell a turn with the camera's axis
+        ("odometry", (0.5, -0.2, math.radians(8.0))),  # given poses tell a turn with the camera's axis
     ],
 )
 def test_where_a_camera_sits_on_the_robot_is_found_and_its_map_is_as_exact(source, mount) -> None:
-    poses = tour_poses(0.3)
+    poses = tour_poses()
     robot = robot_poses(poses, np.array(mount))
     ctx, out = learned(robot, source, seen_along(poses), camera=CAMERA)
     landmarks = out.map.landmarks
@@ -189,7 +188,7 @@ def swinging(seconds: np.ndarray) -> np.ndarray:
     return np.column_stack([1.0 + 0.5 * there, 2.5 + (seconds > 20.0), wrap(0.7 * seconds + np.sin(seconds))])
 
 
-STAMPS = np.arange(12.0, 28.0, 0.2)
+STAMPS = np.arange(14.0, 26.0, 0.2)
 TICKS = [Tick(n, round(at * 1e9)) for n, at in enumerate(STAMPS.tolist())]
 
 
@@ -250,6 +249,6 @@ def test_a_camera_that_is_as_it_is_described_is_mounted_so_to_the_last_bit() -> 
 
 
 def test_motion_that_was_seen_in_the_images_tells_no_mount() -> None:
-    poses = tour_poses(0.3)
+    poses = tour_poses()
     _, out = learned(robot_poses(poses, np.array([0.5, 0.0, 0.0])), "guess", seen_along(poses), camera=CAMERA)
     assert not out.map.landmarks.mount.any()
