@@ -35,6 +35,12 @@ def built(name: str, day: int = 0) -> World:
     return World(world_of(name), day)
 
 
+@lru_cache
+def planned(name: str, route: Route, day: int = 0) -> np.ndarray:
+    """The line of a world's route."""
+    return route_planning.plan(built(name, day), route)
+
+
 def length(line: np.ndarray) -> float:
     return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
 
@@ -66,7 +72,7 @@ def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: s
     for day in (0, len(config.days) - 1):
         world = built(name, day)
         for route in _of_each_kind(config.routes.values()):
-            line = route_planning.plan(world, route)
+            line = planned(name, route, day)
             driven = route_planning.jittered(world, line, config.robot.path_jitter_m, np.random.default_rng(day))
             dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 5)[:, None] for a, b in pairwise(driven)])
             assert world.clearance(dense).min() > config.robot.radius
@@ -111,7 +117,7 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
     ],
 )
 def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
-    assert least <= length(route_planning.plan(built(name), world_of(name).routes[route])) <= most
+    assert least <= length(planned(name, world_of(name).routes[route])) <= most
 
 
 def test_laps_begin_where_what_comes_first_has_led() -> None:
@@ -162,7 +168,7 @@ def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each()
     world = built("home_store")
     aisles = world.layout.aisles
     assert len(aisles) > 40
-    line = route_planning.plan(world, world.config.routes["training"])
+    line = planned("home_store", world.config.routes["training"])
     for aisle in aisles:
         a, b = np.array(aisle.ends)
         for share in np.linspace(0.15, 0.75, 5):

@@ -26,7 +26,7 @@ from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
-SMALL = mirror(columns=160)
+SMALL = mirror(columns=80)
 WORLD = replace(DEMO, camera=SMALL)
 EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
