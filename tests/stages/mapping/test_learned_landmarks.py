@@ -188,7 +188,7 @@ def swinging(seconds: np.ndarray) -> np.ndarray:
     return np.column_stack([1.0 + 0.5 * there, 2.5 + (seconds > 20.0), wrap(0.7 * seconds + np.sin(seconds))])
 
 
-STAMPS = np.arange(12.0, 28.0, 0.25)
+STAMPS = np.arange(12.0, 28.0, 0.2)
 TICKS = [Tick(n, round(at * 1e9)) for n, at in enumerate(STAMPS.tolist())]
 
 
