@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.geometry.landmarks.closures import straightened_drive
+from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 ROOM = np.array([6.0, 5.0])
@@ -98,6 +100,12 @@ def driven(poses):
     motions[:, :2] *= 1.02
     motions[:, 2] += math.radians(0.5) * np.hypot(*motions[:, :2].T)
     return motions, compose(poses[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+
+
+def straightened(odometry, verified):
+    """Poses of a drive by odometry, straightened by its verified pairs."""
+    steps = between(odometry[:-1], odometry[1:])
+    return straightened_drive(odometry[0], steps, odometry_sigmas(steps), verified)
 
 
 def seen_in(views):

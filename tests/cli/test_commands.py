@@ -88,8 +88,10 @@ def test_check_says_who_reads_the_truth(omninav):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("variant=omniview_mcl", "log=drive.mcap"), "this variant needs a map"),
-        (("variant=omniview_mcl", "log=drive.mcap"), "type tour=… to make one, or map=FILE.omap to load one"),
+        (
+            ("variant=omniview_mcl", "log=drive.mcap"),
+            "this variant needs a map, and none is given\n      type tour=… to make one, or map=FILE.omap to load one",
+        ),
         (("tour=tour.mcap",), "tour is given, but no log\n      type log=…"),
         (("tour=tour.mcap", "map=m.omap", "log=d.mcap"), "leave one of them out"),
         (("match=null",), "'~nodes.match' '~wires.match'"),

@@ -168,7 +168,7 @@ def test_a_drive_is_localised_in_a_joined_and_in_a_thinned_map(demo: Path, share
     assert main(["map", "thin", "both.omap", "spacing=0.6", "out=few.omap"]) == 0
     references = {}
     for name in ("both", "few"):
-        words = (f"map={name}.omap", f"cache={shared_cache}", "nodes.source.stop=20", "plots=none")
+        words = (f"map={name}.omap", f"cache={shared_cache}", "nodes.source.stop=10", "plots=none")
         assert main([*words, f"hydra.run.dir=runs/{name}"]) == 0
         metrics = json.loads((tmp_path / "runs" / name / "metrics.json").read_text())
         assert metrics["position_error_m"]["median"] < 0.5

@@ -108,14 +108,18 @@ def folder(tmp_path: Path) -> str:
     return str(tmp_path / "my")
 
 
-def test_config_dir_stands_before_or_behind_every_command(folder: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_config_dir_stands_before_or_behind_every_command(
+    folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     run = ["variant=mine", f"tour={TOUR}", f"log={DRIVE}"]
-    for words in (["check", *run], ["stages", "match.l2"], ["variants", "mine"], ["doctor"]):
+    drawn = ["graph", *run, f"out={tmp_path}"]
+    for words in (["check", *run], drawn, ["stages", "match.l2"], ["variants", "mine"], ["doctor"]):
         for line in (["--config-dir", folder, *words], [*words, f"--config-dir={folder}"]):
             assert main(line) == 0, capsys.readouterr().err
     out = capsys.readouterr().out
     assert out.count("mine: nothing wrong with it") == 2
     assert out.count("somebody's own.") == 2
+    assert (tmp_path / "mine.svg").is_file()
     assert main(["variants", "--config-dir", folder]) == 0
     listed = capsys.readouterr().out
     assert "\nmine " in listed
@@ -155,13 +159,6 @@ def test_own_options_that_include_each_other_and_a_folder_of_runs_are_named(fold
     assert f"continue a sweep by its own command: omninav -m … hydra.sweep.dir={folder}" in said(
         capsys, "resume", folder
     )
-
-
-def test_an_own_variant_is_drawn(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["graph", "variant=mine", f"tour={TOUR}", f"log={DRIVE}", f"out={tmp_path}"]
-    assert main(["--config-dir", folder, *words]) == 0
-    assert (tmp_path / "mine.svg").is_file()
-    assert "mine.svg" in capsys.readouterr().out
 
 
 def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:

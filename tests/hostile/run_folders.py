@@ -25,9 +25,6 @@ def prepared(cache: Path | None = None) -> PreparedRun:
     """A small graph with state, random numbers and a sequence."""
     return prepare_run(noisy_sum(Path("runs"), **({"cache": str(cache)} if cache else {})))
 
-    def say(self, words: str) -> None:
-        pass
-
 
 @contextmanager
 def inside(folder: Path) -> Iterator[None]:

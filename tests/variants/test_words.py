@@ -7,7 +7,6 @@ import pytest
 from background_runs import assert_same_bytes, finished, whole_and_resumed
 from conftest import DRIVE, TOUR
 
-import omninav
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.run.prepared_run import prepare_run
@@ -17,14 +16,13 @@ from omninav.stages.values.visual_words import VisualWords
 FOUND = ("candidates=words", f"log={DRIVE}", "nodes.candidates.compare_all_up_to=0", "plots=none")
 MADE = ("variant=omniview_mcl", *FOUND, f"tour={TOUR}", "nodes.source.stop=12")
 MAPPING = "+artifacts.map.nodes.mapping"
-DISTANCES = {
-    "omninav": "distance_m",
-    "omniview_mcl": "distance_m",
-    "omniview_mcl_as_printed": "distance_m",
-    "plain_matching": "distance_m",
-    "retrieval_mcl": "min_distance_m",
+TYPED = {
+    **dict.fromkeys(("omninav", "omniview_mcl_as_printed", "plain_matching"), f"{MAPPING}.distance_m=0.7"),
+    "retrieval_mcl": f"{MAPPING}.min_distance_m=0.7",
+    "omniview_mcl": f"{MAPPING}.min_distance_m=0.7 artifacts.map.choices.mapping=image_database "
+    "tour_settings.cuts=[[10,20]]",
 }
-"""Variants that localise in a map of references, with the setting of the distance between these."""
+"""Variants that localise in a map of references, with words that change the map."""
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +37,10 @@ def made(runs: tuple[Path, Path]) -> Path:
 
 def test_killed_while_learning_it_goes_on_to_the_same_bytes(runs: tuple[Path, Path]) -> None:
     assert_same_bytes(*runs, "map.omap", "words.omap")
+    map, learned = (read_artifact(runs[0] / f"{artifact}.omap") for artifact in ("map", "words"))
+    assert isinstance(map, ReferenceGraph)
+    assert isinstance(learned, VisualWords)
+    assert len(learned) == len(map)
 
 
 def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
@@ -48,33 +50,18 @@ def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
     assert json.loads((run / "metrics.json").read_text())["frames"] == 6
 
 
-@pytest.mark.parametrize("variant", DISTANCES)
+@pytest.mark.parametrize("variant", TYPED)
 def test_what_is_typed_for_a_map_is_of_its_words_too(variant: str) -> None:
-    typed = f"{MAPPING}.{DISTANCES[variant]}=0.7"
-    with composed([f"variant={variant}", "candidates=words", typed]) as config:
+    with composed([f"variant={variant}", "candidates=words", *TYPED[variant].split()]) as config:
         made = {artifact.name: artifact.graph for artifact in prepare_run(complete(config)).artifacts}
-    for name in ("map", "words"):
-        graph = made[name]
-        assert graph is not None
-        assert getattr(graph.nodes["mapping"].stage, DISTANCES[variant]) == 0.7
-
-
-def test_words_are_of_the_map_that_is_used(tmp_path: Path, shared_cache: Path) -> None:
-    overrides = {
-        "its own parameter": (f"{MAPPING}.distance_m=0.6",),
-        "another stage's": ("artifacts.map.choices.mapping=image_database", f"{MAPPING}.min_distance_m=0.3"),
-        "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
-    }
-    sizes = set()
-    for name, words in overrides.items():
-        few = ("cuts=[[3,50]]", f"cache={shared_cache}")
-        run = omninav.run("omniview_mcl", *FOUND, *few, *words, tour=TOUR, folder=tmp_path / name, progress=False)
-        map, learned = (read_artifact(run.folder / f"{artifact}.omap") for artifact in ("map", "words"))
-        assert isinstance(map, ReferenceGraph)
-        assert isinstance(learned, VisualWords)
-        assert len(learned) == len(map)
-        sizes.add(len(map))
-    assert len(sizes) == len(overrides)
+    map, words = made["map"], made["words"]
+    assert map is not None
+    assert words is not None
+    assert 0.7 in map.nodes["mapping"].parameters.values()
+    for node in ("source", "mapping"):
+        assert type(words.nodes[node].stage) is type(map.nodes[node].stage)
+        assert words.nodes[node].parameters == map.nodes[node].parameters
+    assert bool(map.nodes["source"].parameters["cuts"]) == (variant == "omniview_mcl")
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from omninav.stages.source.log import LogSource
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.source.simulated import SimulatedSource
 
-SMALL = mirror(columns=160)
+SMALL = mirror(columns=80)
 WORLD = replace(
     DEMO,
     camera=SMALL,

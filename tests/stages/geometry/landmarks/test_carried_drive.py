@@ -2,13 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from landmark_world import driven, misplaced
+from landmark_world import driven, misplaced, straightened
 
 from omninav.stages.geometry.landmarks.carried_drive import CarriedDrive, _carried, _mode, carried_drive
 from omninav.stages.geometry.landmarks.closures import (
     VerifiedPairs,
     candidate_pairs,
-    straightened_drive,
     verified_pairs,
 )
 from omninav.stages.geometry.landmarks.map_making import local_views
@@ -27,11 +26,6 @@ def laps(world, views, similarity):
     poses = world.poses[LAPS]
     pairs = candidate_pairs(iter(similarity[np.ix_(LAPS, LAPS)]), distances_along(poses))
     return poses, verified_pairs(two, pairs, np.random.default_rng(2))
-
-
-def straightened(odometry, verified):
-    steps = between(odometry[:-1], odometry[1:])
-    return straightened_drive(odometry[0], steps, odometry_sigmas(steps), verified)
 
 
 def carried_in(laps, rows):

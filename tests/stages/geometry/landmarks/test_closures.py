@@ -2,11 +2,10 @@ import math
 
 import numpy as np
 import pytest
-from landmark_world import driven, misplaced
+from landmark_world import driven, misplaced, straightened
 
-from omninav.stages.geometry.landmarks.closures import candidate_pairs, straightened_drive, verified_pairs
+from omninav.stages.geometry.landmarks.closures import candidate_pairs, verified_pairs
 from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views
-from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between, distances_along, wrap
 
 
@@ -16,11 +15,6 @@ def verified(world, views, similarity):
     pairs = candidate_pairs(iter(similarity), way)
     apart = np.array([[5, 95], [20, 80]])  # in rooms that do not see each other
     return verified_pairs(views, np.concatenate([pairs, apart]), np.random.default_rng(2))
-
-
-def straightened(odometry, verified):
-    steps = between(odometry[:-1], odometry[1:])
-    return straightened_drive(odometry[0], steps, odometry_sigmas(steps), verified)
 
 
 def test_turn_and_direction_of_a_pair_are_those_of_the_motion(world, verified):
