@@ -11,7 +11,7 @@ from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.simulator.config import Day, Route
+from omninav.stages.simulator.config import Day, Route, mirror
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
@@ -84,7 +84,7 @@ def test_a_route_that_is_not_there_is_refused_with_those_that_are() -> None:
 def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(
     tmp_path: Path, delay: float | None
 ) -> None:
-    route, camera = Route(((2.0, 1.5), (3.5, 1.5))), {**DEMO.camera, "delay": delay}
+    route, camera = Route(((2.0, 1.5), (3.5, 1.5))), {**mirror(columns=160), "delay": delay}
     config = dataclasses.replace(DEMO, routes={"short": route}, camera=camera)
     recording = SimulatedRecording(config, "short", 2)
     record(recording, tmp_path / "one.mcap")

@@ -1,5 +1,6 @@
 """Relative poses where half of the pairs are wrong."""
 
+import functools
 import math
 
 import numpy as np
@@ -21,6 +22,7 @@ from omninav.stages.geometry.two_views.relative_pose_ransac import (
 SEEDS = st.integers(0, 10**6)
 
 
+@functools.cache
 def errors(solver: Solver, seed: int, **how) -> tuple[float, float]:
     rotation, translation, first, second = two_views(seed, 100, wrong=0.5, noise_deg=0.1)
     found = relative_pose(first, second, np.random.default_rng(seed), solver, **how)
