@@ -50,7 +50,7 @@ def planned(name: str, draw: int | None = None) -> dict[str, np.ndarray]:
     """The lines of a world's routes, but for those along the same aisles as another with fewer laps."""
     world = World(world_of(name)) if draw is None else built(name, draw)
     routes = world.config.routes.items()
-    return {key: route_planning.plan(world, route) for key, route in routes if route.kind != "aisles" or route.laps < 3}
+    return {key: route_planning.plan(world, route) for key, route in routes if route.kind != "aisles" or route.laps == 1}
 
 
 @each_world
