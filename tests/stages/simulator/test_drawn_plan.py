@@ -49,8 +49,8 @@ def test_each_draw_has_a_plan_of_its_own_and_always_the_same(name: str) -> None:
 def planned(name: str, draw: int | None = None) -> dict[str, np.ndarray]:
     """The lines of a world's routes, but for those along the same aisles as another with fewer laps."""
     world = World(world_of(name)) if draw is None else built(name, draw)
-    routes = world.config.routes.items()
-    return {key: route_planning.plan(world, route) for key, route in routes if route.kind != "aisles" or route.laps == 1}
+    routes = {key: route for key, route in world.config.routes.items() if route.kind != "aisles" or route.laps == 1}
+    return {key: route_planning.plan(world, route) for key, route in routes.items()}
 
 
 @each_world
