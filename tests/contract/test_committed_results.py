@@ -40,10 +40,9 @@ def test_every_committed_result_judges_the_claims_of_its_file_and_shows_its_cond
         assert MADE.fullmatch(result.made_with), experiment.name
 
 
-def test_a_page_says_what_its_result_file_does(committed: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
+def test_a_page_says_what_its_result_file_does(committed: Judged) -> None:
     for experiment, result in committed:
-        page = str(markdown_page(experiment, result)[f"{experiment.name}.md"])
+        page = str(markdown_page(experiment, result, ())[f"{experiment.name}.md"])
         said = re.findall(r"\| (holds(?: in \d+ of \d+ runs)?|does not hold|undecided) \|\n", page)
         assert said == [Verdict((each,)).words for key in experiment.claims for each in result.verdicts[key]]
         for key, verdict in result.judged(experiment).items():
