@@ -10,10 +10,9 @@ from omninav.stages.geometry.appearance.visual_distance import (
     MAX_GLOBAL_DISTANCE,
     MIN_MATCHES,
     ComparisonOptions,
+    ManyViews,
     PatchDistance,
-    ViewFeatures,
     colour_distances,
-    compare,
 )
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.topological_map import TopologicalMap
@@ -45,12 +44,12 @@ class VisualDistance(Stage):
     def setup(self, ctx: Context) -> None:
         """No map yet."""
         self._map: TopologicalMap | None = None
-        self._places: list[ViewFeatures] = []
+        self._places = ManyViews([])
 
     def step(self, ctx: Context, features: LocalFeatures, descriptor: GlobalDescriptor, map: TopologicalMap) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
-            self._places = [view_features(map.views.features(int(view))) for view in map.places]
+            self._places = ManyViews([view_features(map.views.features(int(view))) for view in map.places])
             self._map = map
         if len(features) and features.descriptors.shape[1] != map.views.descriptors.shape[1]:
             raise BadInput(
@@ -62,8 +61,8 @@ class VisualDistance(Stage):
         close = colour_distances(map.views.moments[map.places], descriptor.values) <= self.max_global_distance
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
-        for place in np.flatnonzero(close):
-            found = compare(self._places[place], here, options)
+        compared = np.flatnonzero(close)
+        for place, found in zip(compared, self._places.compare(compared, here, options), strict=True):
             distances[place], turns[place], matches[place] = found.distance, found.turn, found.matches
         if not np.isfinite(distances).any():
             ctx.count("nothing_in_common", detail="match: an image that has too little in common with every place")

@@ -99,6 +99,34 @@ def mutual_nearest_units(one: Floats, other: Floats, ratio: float, points: Array
     return mutual_nearest(squares, ratio, points)
 
 
+@compiled(nogil=True)
+def _mutual_of_each(
+    squares: Floats, starts: Ints, ratio: float, first: Ints, second: Ints, unclear: Array, found: Ints
+) -> None:
+    distance = np.empty(len(squares))
+    for n in range(len(starts) - 1):
+        a, b = starts[n], starts[n + 1]
+        found[n] = _mutual(squares[a:b], ratio, NOWHERE, first[a:b], second[a:b], distance[a:b], unclear[a:b])
+
+
+def mutual_nearest_of_each(squares: Floats, starts: Ints, ratio: float) -> tuple[Ints, Ints, Ints]:
+    """`mutual_nearest` of several first views with one second view.
+
+    `squares` (N, M) float32; of view v the rows `starts[v]` to `starts[v + 1]`. Returns the view, the row and the
+    column of each pair: (K,), view by view, the clearest first.
+    """
+    rows, views = len(squares), len(starts) - 1
+    first, second = np.empty((2, rows), np.int64)
+    unclear, found = np.empty(rows), np.zeros(views, np.int64)
+    if squares.size:
+        _mutual_of_each(squares, starts, ratio, first, second, unclear, found)
+    view = np.repeat(np.arange(views), found)
+    at = np.arange(len(view)) + np.repeat(starts[:-1] - np.cumsum(found) + found, found)
+    order = np.lexsort((unclear[at], view))
+    at = at[order]
+    return view, first[at] + starts[view], second[at]
+
+
 def squared_distances(one: npt.ArrayLike, other: npt.ArrayLike) -> Floats:
     """Squared Euclidean distances (N, M) float32 of rows (N, D) and (M, D); exact for whole numbers as SIFT's."""
     a, b = np.asarray(one, np.float32), np.asarray(other, np.float32)

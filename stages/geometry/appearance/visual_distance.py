@@ -1,15 +1,25 @@
-"""Visual distance of two views, by what they have in common and how it is arranged."""
+"""Visual distance of two views, or of one and many, by what they have in common and how it is arranged."""
 
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.arrays import Array, Floats
+from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.runs import chosen_runs
 
-from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, squared_distances, tree_matches
+from .feature_matching import (
+    NO_PAIRS,
+    Pairs,
+    mahalanobis_matches,
+    mutual_nearest,
+    mutual_nearest_of_each,
+    squared_distances,
+    tree_matches,
+)
 
 MAX_GLOBAL_DISTANCE = 0.5
 """Largest distance between the global colours (Euclidean, three correlations) of views that are compared further."""
@@ -18,6 +28,8 @@ MIN_MATCHES = 8
 PatchDistance = Literal["euclidean", "mahalanobis"]
 """Distance of two patches' descriptors: as they are, or each element by its spread over both views (equation 2 of
 Goedemé et al. 2007)."""
+ROWS = 2048
+"""Patches that are compared at once, and those of the view that goes beyond: their distances stay in the cache."""
 
 
 class ComparisonOptions(NamedTuple):
@@ -115,10 +127,20 @@ def compare(one: ViewFeatures, other: ViewFeatures, by: ComparisonOptions, part:
     `part`: only some features of the first view are known, those that a map keeps. The second is then counted as if it
     had as many.
     """
-    angles, first, second = [np.empty(0)], 0, 0
+    angles: Array | None = None
     if one.patches is not None and other.patches is not None:
         pairs = match_patches(one.patches, other.patches, by)
-        angles.append(other.patches.azimuths[pairs.second] - one.patches.azimuths[pairs.first])
+        angles = other.patches.azimuths[pairs.second] - one.patches.azimuths[pairs.first]
+    return compared(one, other, angles, by, part)
+
+
+def compared(
+    one: ViewFeatures, other: ViewFeatures, matched: Array | None, by: ComparisonOptions, part: bool = False
+) -> Comparison:
+    """`compare` of views whose patches match at the angles `matched` (M,); None: one of them has no patches."""
+    angles, first, second = [np.empty(0)], 0, 0
+    if matched is not None and one.patches is not None and other.patches is not None:
+        angles.append(matched)
         first, second = len(one.patches.azimuths), len(other.patches.azimuths)
     if one.segments is not None and other.segments is not None:
         pairs = mahalanobis_matches(one.segments.descriptors, other.segments.descriptors, by.segment_ratio)
@@ -133,4 +155,41 @@ def compare(one: ViewFeatures, other: ViewFeatures, by: ComparisonOptions, part:
 
 def colour_distances(one: npt.ArrayLike, other: npt.ArrayLike) -> Array:
     """Euclidean distances of global colours over the last axis (section 4.2.1)."""
-    return np.asarray(np.linalg.norm(np.asarray(one, np.float64) - np.asarray(other, np.float64), axis=-1))
+    gap: Array = np.linalg.norm(np.asarray(one, np.float64) - np.asarray(other, np.float64), axis=-1)
+    return gap
+
+
+class ManyViews:
+    """Views prepared to be compared with one view after the other."""
+
+    def __init__(self, features: Sequence[ViewFeatures]) -> None:
+        self.features = features
+        patches = [view.patches for view in features if view.patches is not None]
+        self._patches: Patches | None = None
+        if patches and len(patches) == len(features):
+            self._patches = Patches(*(np.concatenate(parts) for parts in zip(*patches, strict=True)))
+        self._starts = np.cumsum([0, *(len(each.azimuths) for each in patches)])
+
+    def compare(self, chosen: Ints, other: ViewFeatures, by: ComparisonOptions) -> list[Comparison]:
+        """`visual_distance.compare` of the chosen views (K,) with another: the same numbers."""
+        if self._patches is None or other.patches is None:
+            return [compared(self.features[n], other, None, by) for n in chosen]
+        if by.patch_distance == "mahalanobis":  # each two views have spreads of their own
+            return [compare(self.features[n], other, by) for n in chosen]
+        rows_before = np.cumsum(self._starts[chosen + 1] - self._starts[chosen])
+        found: list[Comparison] = []
+        for number in np.unique(rows_before // ROWS):
+            block = chosen[rows_before // ROWS == number]
+            angles = self._angles(block, self._patches, other.patches, by)
+            found += [compared(self.features[n], other, each, by) for n, each in zip(block, angles, strict=True)]
+        return found
+
+    def _angles(self, chosen: Ints, own: Patches, other: Patches, by: ComparisonOptions) -> list[Array]:
+        """Turns of the patches of each chosen view against those that they match, the clearest first."""
+        rows, starts = chosen_runs(self._starts, chosen)
+        squares = squared_distances(own.descriptors[rows], other.descriptors)
+        view, first, second = mutual_nearest_of_each(squares, starts, by.ratio)
+        first = rows[first]
+        kept = np.linalg.norm(own.colours[first] - other.colours[second], axis=1) <= by.max_colour_distance
+        angles = other.azimuths[second[kept]] - own.azimuths[first[kept]]
+        return np.split(angles, np.searchsorted(view[kept], np.arange(1, len(chosen))))
