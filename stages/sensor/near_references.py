@@ -10,7 +10,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints, Shorts
-from omninav.stages.geometry.probability.evidence import contrast_power
+from omninav.stages.geometry.probability.evidence import contrast_power, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale, metres_of
@@ -159,7 +159,7 @@ def background_similarity(
     if not len(there):
         return weighted_median(best, sampling_weight)
     if sampling_weight is None:
-        return float(np.quantile(there, quantile, method="hazen"))  # the same, without sorting
+        return hazen_quantile(there, quantile)  # the same, without sorting
     return weighted_quantile(there, sampling_weight[background], quantile)
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 
 MIN_NOVELTY = 0.05
@@ -15,15 +16,44 @@ MIN_SPREAD = 1e-6
 def best_headings(values: Floats) -> tuple[Floats, Ints]:
     """Each reference's similarity at its best heading, and which that is (of equal ones the first): (references,) each,
     of (references, headings >= 1)."""
-    at = values.argmax(axis=1)
-    return values[np.arange(len(values)), at], at
+    best, at = np.empty(len(values), np.float32), np.empty(len(values), np.int64)
+    _best_headings(np.ascontiguousarray(values), best, at)
+    return best, at
+
+
+@compiled(nogil=True)
+def _best_headings(values: Floats, out: Floats, at: Ints) -> None:
+    for n in range(len(values)):  # numpy's maximum along so short an axis takes ten times as long
+        best, heading = values[n, 0], 0
+        for h in range(1, values.shape[1]):
+            if values[n, h] > best:
+                best, heading = values[n, h], h
+        out[n], at[n] = best, heading
+
+
+def hazen_quantile(values: Floats, quantile: float) -> float:
+    """Computes `np.quantile(values, quantile, method="hazen")`, to the bit, in a tenth of its time."""
+    at = len(values) * quantile + 0.5 - 1.0
+    if at < 0.0 or at >= len(values) - 1:
+        return float(values.min() if at < 0.0 else values.max())
+    low = math.floor(at)
+    ordered = values.copy()
+    ordered.partition((low, low + 1))
+    before, after, part = ordered[low], ordered[low + 1], at - low
+    return float(after - (after - before) * (1.0 - part) if part >= 0.5 else before + (after - before) * part)
 
 
 def centre_and_spread(values: Floats, weights: Array | None) -> tuple[float, float]:
     """Mean and standard deviation of values by their weights; None: all weigh the same."""
     each = values.astype(np.float64)
-    centre = float(np.average(each, weights=weights))
-    return centre, math.sqrt(np.average(np.square(each - centre), weights=weights))
+    centre = _average(each, weights)
+    return centre, math.sqrt(_average(np.square(each - centre), weights))
+
+
+def _average(values: Array, weights: Array | None) -> float:
+    if weights is None:
+        return float(np.add.reduce(values)) / len(values)
+    return float(np.add.reduce(values * weights) / np.add.reduce(weights))
 
 
 def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None = None) -> float:
