@@ -42,6 +42,7 @@ HEADLINES = tuple(
     for name in (
         "goals_reached_rate",
         "reached_rate",
+        "state",
         "end_error_m",
         "collisions",
         "time_s",
