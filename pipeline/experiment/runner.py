@@ -58,7 +58,7 @@ class ExperimentRun:
     recordings: list[Recording] = field(default_factory=list)
     started: datetime = field(default_factory=datetime.now)
     state: dict[str, Any] = field(default_factory=dict)
-    """What its file `STATE` holds."""
+    """Content of its file `STATE`."""
 
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
