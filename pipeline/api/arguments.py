@@ -11,7 +11,7 @@ def arguments_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[st
     """Words as they would be typed: `"omniview_mcl", seed=3` is `variant=omniview_mcl seed=3`.
 
     A first word without `=` is a variant's name; a dictionary's keys are names below its own, as in
-    `nodes={"match": {"headings": 72}}`. Raises `BadInput` for a value that no word can hold.
+    `nodes={"match": {"size": 72}}`. Raises `BadInput` for a value that no word can hold.
     """
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
