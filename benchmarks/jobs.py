@@ -43,9 +43,9 @@ def _throughput(place: Path) -> list[Row]:
     words: dict[str, Any] = {"tour": str(DATA / "tour.mcap"), "log": str(DATA / "drive.mcap"), "plots": "none"}
     made = omninav.compose("omniview_mcl", cache=str(place / "cache"), **words, **{"nodes.prior.number": 5000})
     given = {
-        "config": json.loads(json.dumps(made.plan.config, default=str)),
-        "key": condition_key(made.plan),
-        "code": made.plan.digest,
+        "config": json.loads(json.dumps(made.prepared.config, default=str)),
+        "key": condition_key(made.prepared),
+        "code": made.prepared.digest,
         "shared": True,
         "groups": [],
     }

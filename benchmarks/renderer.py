@@ -83,5 +83,5 @@ def _moments(world: World) -> list[tuple[np.ndarray, tuple]]:  # type: ignore[ty
     moments = []
     for point, heading in zip(points, rng.uniform(-np.pi, np.pi, POSES), strict=False):
         pose = np.array([*point, heading])
-        moments.append((pose, world.people_at(39.0, RobotTrack(times, np.tile(pose, (len(times), 1))))))
+        moments.append((pose, world.crowd.at(39.0, RobotTrack(times, np.tile(pose, (len(times), 1))))))
     return moments

@@ -30,7 +30,7 @@ def rows() -> list[Row]:
         folder = Path(place)
         (folder / "camera.yaml").write_text(write_camera(recording.camera))
         made = omninav.compose("omniview_mcl", tour=tour, log=drive, **words)
-        with running(start(made.plan, ["omninav"], folder / "batch"), made.plan) as engine:
+        with running(start(made.prepared, ["omninav"], folder / "batch"), made.prepared) as engine:
             batch = _ticks(engine)
         settings: dict[str, Any] = {"map": folder / "batch" / "map.omap", "camera": folder / "camera.yaml", **words}
         with omninav.open("omniview_mcl", folder=folder / "session", **settings) as session:
