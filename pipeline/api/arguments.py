@@ -1,10 +1,11 @@
 """Python values as arguments of a command."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from omninav.pipeline.cli.arguments import value_text
 from omninav.pipeline.graph.problems import BadInput, shown
+from omninav.pipeline.graph.results import by_path
 
 
 def arguments_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
@@ -16,7 +17,7 @@ def arguments_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[st
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
         typed[0] = f"variant={typed[0]}"
-    return [*typed, *(setting_argument(name, value) for name, value in _flattened(settings))]
+    return [*typed, *(setting_argument(name, value) for name, value in by_path(settings))]
 
 
 def setting_argument(name: str, value: Any) -> str:
@@ -25,14 +26,6 @@ def setting_argument(name: str, value: Any) -> str:
         return f"{name}={value_text(value)}"
     except BadInput as refused:
         raise BadInput(f"{name}: {refused}") from None
-
-
-def _flattened(settings: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in settings.items():
-        if isinstance(value, Mapping) and value:
-            yield from _flattened(value, f"{above}{name}.")
-        else:
-            yield f"{above}{name}", value
 
 
 def _checked(word: Any) -> str:

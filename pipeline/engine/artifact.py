@@ -182,7 +182,7 @@ class Dropped:
 _FACTS: dict[str, tuple[Any, str]] = {
     "dropped": (dict[str, int | Dropped], "counts by kind"),
     "facts": (dict, "facts by name"),
-    "stages": (dict[str, dict], "parameters by stage"),  # type: ignore[type-arg]
+    "stages": (dict[str, dict[str, Any]], "parameters by stage"),
     "variant": (str | None, "a name"),
     "made_by": (str, "a name"),
     "warnings": (list[str], "texts"),

@@ -179,8 +179,8 @@ class Experiment:
     """Measures by which the best condition over the scenarios of development is named: that with the least value of
     the first, among equals of the next."""
     shared: bool = True
-    """Whether the repetitions of a condition share what does not depend on the seed, and other experiments its results:
-    not where time is measured."""
+    """The repetitions of a condition share what does not depend on the seed, and other experiments its results; false
+    where time is measured."""
     cores: int | None = None
     """Jobs at a time; None: one for each core."""
     profiles: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -43,7 +43,7 @@ class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given. `commands`: so many came.
+    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given. `commanded`: it had one.
     """
 
     robot: Array = field(default_factory=lambda: np.zeros(0))
@@ -53,7 +53,7 @@ class ClosedLoopState(State):
     ticks: int = 0
     ended: int = 0
     asked: int = 0
-    commands: int = 0
+    commanded: bool = False
 
 
 class ClosedLoop(Source):
@@ -150,7 +150,7 @@ class ClosedLoop(Source):
                 simulation.asked += 1
             else:
                 simulation.ended += 1
-        simulation.commands += command is not None
+        simulation.commanded |= command is not None
         if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
             self._warn_at_end(ctx, simulation, route is not None or progress is not None)
             return None
@@ -170,7 +170,7 @@ class ClosedLoop(Source):
                 f"The time is over after {seconds:g} s, and the robot was still under way; "
                 "nodes.source.seconds=… gives it more."
             )
-        if simulation.commands == 0:
+        if not simulation.commanded:
             ctx.warn(f"No command came in {seconds:g} s, and the robot stood: does its controller give a `command`?")
         late = [f"{each.at:g}" for each in self._kidnappings if each.at > (simulation.ticks - 1) / self.rate_hz]
         if late:

@@ -25,7 +25,7 @@ SOON = {
     "nodes.novelty_threshold.min_separation": 3,
     "nodes.map_update.length": 5,
 }
-"""By which a map that is learned on the way grows within the twenty images."""
+"""Settings with which a map that is learned on the way grows within the twenty images."""
 
 
 @pytest.fixture(scope="module")

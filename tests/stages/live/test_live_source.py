@@ -41,7 +41,7 @@ def _said() -> tuple[RawMessage, ...]:
 
 
 def said() -> list[RawMessage]:
-    """What the recorded robot said in its first 20 s, in the order in which it was received."""
+    """Messages of the recorded robot's first 20 s, in the order in which they were received."""
     return list(_said())
 
 

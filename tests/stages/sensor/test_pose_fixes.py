@@ -50,7 +50,7 @@ def test_without_truth_nothing_is_stated_and_it_is_counted() -> None:
 
 
 def estimates(wrong: float) -> list[tuple[float, PoseFixes.Out]]:
-    """What an external estimator gives along a line, half a metre an image: each image's true x, and the output."""
+    """Runs an external estimator along a line, half a metre an image: each image's true x, and the output."""
     stage = PoseFixes(every_m=0.4, sigma_m=0.3, sigma_rad=0.17, wrong=wrong)
     ctx, memory = Context("estimator", np.random.default_rng(1)), PoseFixesState()
     found = []
