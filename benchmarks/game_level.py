@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter, gaussian_filter1d
+from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter, gaussian_filter1d  # type: ignore[attr-defined]
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 

@@ -73,10 +73,10 @@ def in_large_map(folder: Path, references: int) -> dict[int, list[float]]:
     shares: dict[int, list[list[float]]] = {number: [] for number in ASKED}
     for view, own, gap in zip(asked, alike, near, strict=True):
         best, closest = np.argsort(-own, kind="stable")[:BEST], np.argsort(gap, kind="stable")[:BEST]
-        for number, rows in shares.items():
+        for number, each in shares.items():
             found = search.nearest(vectors_of(view), number, LISTS)
             reached = np.sort(own[found])[::-1][:BEST].mean() / own[best].mean()
-            rows.append([best[0] in found, np.isin(best, found).mean(), np.isin(closest, found).mean(), reached])
+            each.append([best[0] in found, np.isin(best, found).mean(), np.isin(closest, found).mean(), reached])
     return {number: np.mean(rows, axis=0).tolist() for number, rows in shares.items()}
 
 

@@ -64,9 +64,9 @@ def _pair() -> list[Row]:
 
     def both() -> int:
         first, second = patches()
-        segments = [finder.step(context, image=Image(pixels), camera=camera).vertical_segments for pixels in pictures]
+        here, there = (finder.step(context, image=Image(each), camera=camera).vertical_segments for each in pictures)
         pairs = match_patches(first.patches(), second.patches(), ComparisonOptions())
-        return len(pairs.first) + len(mahalanobis_matches(*(each.descriptors for each in segments), 0.8).first)
+        return len(pairs.first) + len(mahalanobis_matches(here.descriptors, there.descriptors, 0.8).first)
 
     def plain() -> int:
         found = [own.detectAndCompute(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), None)[1] for pixels in pictures]
