@@ -16,6 +16,7 @@ from pathlib import Path
 
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.registry import SOURCE
 
 LIBRARIES = (
     "numpy",
@@ -84,7 +85,6 @@ def graph_digest(graph: Graph, only: Iterable[str] | None = None) -> str:
     return digest_text(*parts)
 
 
-@functools.cache
 def module_version(module: str, without: str = "") -> str:
     """A hash over the source of a loaded module and of all that it imports of its own package, directly or not.
 
@@ -93,6 +93,11 @@ def module_version(module: str, without: str = "") -> str:
     installed, as from files beside its own: they count too. What other packages hold counts by its version, where it is
     one of `LIBRARIES`. Modules of the package `without` are left out.
     """
+    return _module_version(module, without, vars(sys.modules[module]).get(SOURCE))
+
+
+@functools.cache
+def _module_version(module: str, without: str, loaded: str | None) -> str:
     file = Path(inspect.getfile(sys.modules[module])).resolve()
     root = file.parent
     while (root / "__init__.py").exists():
@@ -103,8 +108,8 @@ def module_version(module: str, without: str = "") -> str:
     found: dict[str, str] = {}
     to_read = [module]
     if ".".join(names[-len(inside) :]) != ".".join(inside):  # a file that was given by its path: it has no package
-        found[inside[-1]], imported = _read(file, inside[-1])
-        to_read = list(imported)
+        text = file.read_text(encoding="utf-8") if loaded is None else loaded
+        found[inside[-1]], to_read = digest_text(text), [*_imported(text, "")]
     while to_read:
         name = to_read.pop()
         if name in found or (without and f"{name}.".startswith(f"{without}.")):

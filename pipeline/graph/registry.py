@@ -22,6 +22,7 @@ import pkgutil
 import re
 import shlex
 import sys
+import tokenize
 import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -42,6 +43,8 @@ from .value import Value
 BUILT_IN = "omninav.stages"
 ENVIRONMENT = "OMNINAV_STAGES"
 ENTRY_POINTS = "omninav.stages"
+SOURCE = "__omninav_source__"
+"""The name under which a module that is loaded from a file keeps its text: the file may change afterwards."""
 SETTING = re.compile(r"[+~]*[\w./]+=")
 """The beginning of a word that sets something."""
 
@@ -177,15 +180,19 @@ def _load_file(path: Path) -> ModuleType:
     path = user_path(path).resolve()
     if not path.is_file():
         raise UnknownStage(f"there is no file {path}")
+    with tokenize.open(path) as file:
+        source = file.read()
     name = f"omninav_plugin_{path.stem}_{digest_text(str(path))[:8]}"
-    if name not in sys.modules:
+    before = sys.modules.get(name)
+    if before is None or getattr(before, SOURCE) != source:
         spec = importlib.util.spec_from_file_location(name, path)
-        if spec is None or spec.loader is None:
+        if spec is None:
             raise UnknownStage(f"{path} cannot be read as a Python module")
         module = importlib.util.module_from_spec(spec)
+        setattr(module, SOURCE, source)
         sys.modules[name] = module
         try:
-            spec.loader.exec_module(module)
+            exec(compile(source, path, "exec"), vars(module))
         except BaseException:
             del sys.modules[name]
             raise

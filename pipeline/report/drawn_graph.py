@@ -7,8 +7,8 @@ LIFETIMES = {"before": "before the loop", "tick": "every tick", "after": "after 
 
 
 def class_name(target: str) -> str:
-    """`package.module.Stage` -> `Stage`."""
-    return target.rpartition(".")[2]
+    """`package.module.Stage` and `folder/file.py:Stage` -> `Stage`."""
+    return target.replace(":", ".").rpartition(".")[2]
 
 
 def delay_in_words(wire: Wire) -> str:

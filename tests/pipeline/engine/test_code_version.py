@@ -58,11 +58,12 @@ def written(place: Path) -> Path:
 def version(place: Path) -> str:
     """The version of the stage in a folder, read anew."""
     code_version._read.cache_clear()
+    code_version._module_version.cache_clear()
     code_version._not_installed.cache_clear()
     with patch.dict(sys.modules), patch.object(sys, "path", [str(place), *sys.path]):
         module = importlib.import_module("pack.stage")
         assert Path(str(module.__file__)).is_relative_to(place)
-        return code_version.module_version.__wrapped__(module.__name__)
+        return code_version.module_version(module.__name__)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -86,8 +87,9 @@ def test_a_stage_in_a_file_follows_what_lies_beside_it_and_nothing_that_is_insta
     for text in ("b = 1\n", "b = 2\n"):
         (tmp_path / "beside.py").write_text(text)
         code_version._read.cache_clear()
+        code_version._module_version.cache_clear()
         code_version._not_installed.cache_clear()
-        found.append(code_version.module_version.__wrapped__(module.__name__))
+        found.append(code_version.module_version(module.__name__))
     assert found[0] != found[1]
     assert code_version._not_installed("beside") == tmp_path / "beside.py"
     assert not any(map(code_version._not_installed, ("numpy", "json", "omninav", "omninav.stages", "nowhere_at_all")))

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 import toys
+from omninav.pipeline import Context
+from omninav.pipeline.engine.code_version import module_version
 from omninav.pipeline.graph.registry import UnknownStage, entries, plugins, resolve
 
 STAGE = """
@@ -34,6 +36,14 @@ def test_a_stage_is_found_by_its_full_name_and_by_file(stage_file: Path):
     assert resolve("toys.Scale") is toys.Scale
     assert resolve("toys:Scale") is toys.Scale
     assert resolve(f"{stage_file}:Twice").__doc__ == "Twice a number."
+
+
+def test_a_file_that_has_changed_is_loaded_anew_and_its_stages_have_the_version_that_was_loaded(stage_file: Path):
+    first = resolve(f"{stage_file}:Twice")
+    stage_file.write_text(STAGE.replace("2 * number", "3 * number"))  # of the same size, in the same second
+    assert module_version(first.__module__) != module_version(resolve(f"{stage_file}:Twice").__module__)
+    second = resolve(f"{stage_file}:Twice")()
+    assert [stage.step(Context("twice"), toys.Number(1.0)).number.value for stage in (first(), second)] == [2.0, 3.0]
 
 
 def test_the_environment_offers_a_stage_by_name(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
