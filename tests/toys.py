@@ -150,6 +150,20 @@ class Scribble(Stage):
         big.array[0] += ctx.tick.index >= self.since
 
 
+class Reuse(Stage):
+    """Gives a number in one array, again and again."""
+
+    class Out(Outputs):
+        big: Big
+
+    def setup(self, ctx: Context) -> None:
+        self.array = np.zeros(3)
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        self.array[0] = number.value
+        return self.Out(big=Big(self.array))
+
+
 class Noise(GivesNumber):
     """A number with noise from the stage's own generator."""
 

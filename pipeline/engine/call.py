@@ -15,11 +15,12 @@ from omninav.pipeline.graph.registry import BUILT_IN
 from omninav.pipeline.graph.stage import Context, Outputs, State
 
 from .channel import channel_key, held_key
-from .codec import encode
+from .codec import BadEncoding, encode, encode_state
 
 VALIDATED_TICKS = 10
 """First calls of a stage of ours whose outputs are checked against what their types state, and of another's whose
-inputs must stay as they are; outputs of another's are always checked, since a NaN may come late."""
+inputs must stay as they are, as must what it gave before; outputs of another's are always checked, since a NaN may
+come late."""
 
 
 class StageFailed(Exception):
@@ -57,10 +58,18 @@ class Call:
         each = [wire.to_port for wire in given if wire.origin not in static]
         self.guarded = each if node.lifetime == "tick" else []
         self.guarded_once = [wire.to_port for wire in given if wire.origin in static]  # these may be large
+        growing = {name for name, port in node.signature.outputs.items() if getattr(port.type, "in_place", False)}
+        self.guarded_outputs = [name for name in node.signature.outputs if name not in growing]
+        self.gave: tuple[list[Any], bytes] = ([], encode([]))
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def set_up(self) -> None:
         """Set up the stage. Raises `StageFailed` with its name for whatever it raises, but `BadInput`."""
+        if self.to_guard and self.state is not None:
+            try:
+                encode(encode_state(self.state))
+            except BadEncoding as error:
+                raise StageFailed(f"stage '{self.node.name}' ({self.node.target}): its State: {error}") from None
         try:
             self.node.stage.setup(self.ctx)
         except BadInput:
@@ -84,7 +93,7 @@ class Call:
                 return True
             given[port] = value
         guarded = self.guarded + self.guarded_once if self.to_guard else []
-        before = encode([given[name] for name in guarded]) if guarded else b""
+        before = self._bytes([given[name] for name in guarded]) if guarded else b""
         start = time.perf_counter()
         try:
             out = self.step(self.ctx, **given)
@@ -93,17 +102,35 @@ class Call:
         except (Exception, SystemExit) as error:
             raise self._failed(error, self._place()) from error
         self.times.append(time.perf_counter() - start)
-        if guarded and encode([given[name] for name in guarded]) != before:
+        if guarded and self._bytes([given[name] for name in guarded]) != before:
             raise StageFailed(f"{self._place()}: it changes its inputs, which others read too; write to a copy")
-        self.to_guard, self.guarded_once = max(0, self.to_guard - 1), []
         if self.outputs and out is not None and not isinstance(out, Outputs):
             raise StageFailed(f"{self._place()}: step gave a value of type {type(out).__name__}, expected its Out")
         for name, origin in self.outputs:
-            values[origin] = getattr(out, name) if out is not None else None
+            try:
+                values[origin] = getattr(out, name) if out is not None else None
+            except AttributeError:
+                raise StageFailed(f"{self._place()}: step gave another Out than its own, without '{name}'") from None
+        if self.to_guard:
+            self._guard_outputs([values[f"{self.node.name}.{name}"] for name in self.guarded_outputs])
+        self.to_guard, self.guarded_once = max(0, self.to_guard - 1), []
         if self.to_check > 0 and out is not None:
             self.to_check -= 1
             self._check(out)
         return out is not None
+
+    def _guard_outputs(self, given: list[Any]) -> None:
+        """Raise `StageFailed` where this step changed what the one before gave, which may be read and written later."""
+        before, as_given = self.gave
+        if self._bytes(before) != as_given:
+            raise StageFailed(f"{self._place()}: it changes what it gave before, which is still read; give new arrays")
+        self.gave = given, self._bytes(given)
+
+    def _bytes(self, given: list[Any]) -> bytes:
+        try:
+            return encode(given)
+        except BadEncoding as error:
+            raise StageFailed(f"{self._place()}: {error}") from None
 
     def _check(self, out: Any) -> None:
         """Raise `StageFailed` for the first output that is not what its type states."""

@@ -99,7 +99,7 @@ def _describe_all(things: Sequence[Any], arrays: _Arrays) -> Any:
         columns = [[thing[key] for thing in things] for key in keys]
         return ["dicts", _describe(keys, arrays), *(_describe_all(column, arrays) for column in columns)]
     forms = {(thing.dtype, thing.shape) for thing in things} if not kinds and kind is np.ndarray else ()
-    if len(forms) == 1 and not things[0].dtype.hasobject:
+    if len(forms) == 1 and not things[0].dtype.hasobject and not things[0].dtype.names:
         offset = arrays.add(b"".join([thing.tobytes() for thing in things]))
         return ["arrays", things[0].dtype.str, list(things[0].shape), offset]
     return ["each", *(_describe(thing, arrays) for thing in things)]
@@ -139,8 +139,9 @@ def _describe(thing: Any, arrays: _Arrays) -> Any:
     if isinstance(thing, _PLAIN):
         return thing
     if isinstance(thing, np.ndarray | StoredRows):
-        if thing.dtype.hasobject:
-            raise BadEncoding("an array of objects cannot be written: use a numeric array")
+        if thing.dtype.hasobject or thing.dtype.names or isinstance(thing, np.ma.MaskedArray):
+            kind = "with a mask" if isinstance(thing, np.ma.MaskedArray) else f"of {thing.dtype}"
+            raise BadEncoding(f"an array {kind} cannot be written: use a plain array of numbers")
         return ["array", thing.dtype.str, list(thing.shape), arrays.add(np.ascontiguousarray(thing).tobytes())]
     if isinstance(thing, np.generic):
         return ["scalar", thing.dtype.str, thing.tobytes().hex()]

@@ -19,7 +19,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.stage import Context, Source
 
 from . import checkpoint as checkpoints
-from .call import Call
+from .call import Call, StageFailed
 from .channel import Channel, channel_key, held_key
 from .checkpoint import Checkpoint, OtherVersion
 from .codec import BadEncoding, encode_state, restore_state
@@ -241,7 +241,10 @@ class Engine:
             channel.waiting.append(value)
         for name, sequence in self.sequences.items():
             together = self.recorded.get(name)
-            sequence.append(values[name] if together is None else {key: values[key] for key in together})
+            try:
+                sequence.append(values[name] if together is None else {key: values[key] for key in together})
+            except BadEncoding as error:
+                raise StageFailed(f"'{name}' cannot be kept: {error}") from None
         self.ticks += 1
 
     def _fill_channels(self) -> None:

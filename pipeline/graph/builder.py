@@ -121,7 +121,7 @@ class _Builder:
         except (ValueError, TypeError) as error:  # what __post_init__ reports of parameters that do not go together
             self.problems.append(Problem(path, str(error)))
             return None
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self.problems.append(Problem(path, f"{target} cannot be made: {type(error).__name__}: {error}"))
             return None
         plain = {key: value for key, value in spec.items() if key != "_target_"}

@@ -43,11 +43,15 @@ def split_optional(annotation: Any) -> tuple[Any, bool]:
 
 
 def type_hints(thing: Any, cls: type) -> dict[str, Any]:
-    """The annotations of a function or class that belongs to `cls`, by name. Raises `BadStage` for an unknown name."""
+    """The annotations of a function or class that belongs to `cls`, by name. Raises `BadStage` where one has no type."""
+    names = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
     try:
-        return typing.get_type_hints(thing, localns=dict(vars(cls)), include_extras=True)
+        return typing.get_type_hints(thing, localns=names, include_extras=True)
     except NameError as error:
         raise BadStage(f"{cls.__module__}.{cls.__qualname__}: {error}; import the name at module level") from None
+    except Exception as error:  # an annotation is evaluated, and may be any expression
+        what = f"an annotation is no type: {type(error).__name__}: {error}"
+        raise BadStage(f"{cls.__module__}.{cls.__qualname__}: {what}") from None
 
 
 def read_parameters(cls: type[Any]) -> dict[str, Parameter]:

@@ -221,7 +221,8 @@ def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
 def plugins() -> list[Entry]:
     """Stages that others offer, from installed entry points and from the environment; none is imported for this."""
     found = list(_installed(tuple(sys.path)))
-    for item in filter(None, (text.strip() for text in os.environ.get(ENVIRONMENT, "").split(","))):
+    given = [text.strip() for text in os.environ.get(ENVIRONMENT, "").split(",")]
+    for item in filter(None, given):
         name, equals, target = item.partition("=")
         if not equals or "." not in name or ":" not in target:
             wanted = "write role.name=package.module:Class or role.name=path/to/file.py:Class"
@@ -229,7 +230,12 @@ def plugins() -> list[Entry]:
                 Entry(item, "", "environment", problem=f"'{item}' in {ENVIRONMENT} is not understood; {wanted}")
             )
             continue
-        found.append(_plugin(name, target, "environment"))
+        entry = _plugin(name, target, "environment")
+        others = sorted({other.partition("=")[2] for other in given if other.partition("=")[0] == name} - {target})
+        if others:
+            both = " and ".join([target, *others])
+            entry = replace(entry, problem=f"'{name}' is {both} in {ENVIRONMENT}; leave all but one out")
+        found.append(entry)
     return found
 
 

@@ -108,7 +108,7 @@ def _as_json(value: Any) -> Any:
         value = value.tolist()
     if isinstance(value, list | tuple):
         return [_as_json(each) for each in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class Slide(Value):

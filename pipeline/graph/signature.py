@@ -73,6 +73,9 @@ def _read_signature(cls: type[Stage]) -> Signature:
             annotation = get_args(annotation)[0]
         if inspect.isclass(annotation) and issubclass(annotation, State):
             state = (name, annotation)
+            for field in dataclasses.fields(annotation):  # type: ignore[arg-type]  # State makes it a dataclass
+                if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+                    raise BadStage(f"{where}: '{field.name}' of its {annotation.__name__} has no default; write one")
             continue
         optional = optional or argument.default is not inspect.Parameter.empty
         collects, gaps = get_origin(annotation) is Sequence, False

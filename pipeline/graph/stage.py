@@ -1,6 +1,7 @@
 """A stage: a typed function with parameters."""
 
 import dataclasses
+import json
 import operator
 from collections import Counter
 from collections.abc import Callable
@@ -103,19 +104,27 @@ class Context:
 
     def count(self, kind: str, number: int = 1, detail: str = "") -> None:
         """Count something dropped or odd; the first `detail` of a kind is kept."""
-        self.counts[kind] += number
+        if not isinstance(kind, str):
+            raise TypeError(f"ctx.count begins with a name for what is counted, not with {kind!r:.40}")
+        self.counts[kind] += int(number)
         if detail:
             self.details.setdefault(kind, detail)
 
     def fact(self, name: str, value: Any, of_run: bool = False) -> None:
         """Put a fact about the run into the manifest (`noise: synthetic`), and into the files that the run makes.
 
-        `of_run`: not into those, as it does not describe them (its pace).
+        `of_run`: not into those, as it does not describe them (its pace). Raises `TypeError` for what JSON cannot hold.
         """
+        try:
+            json.dumps(value)
+        except TypeError as error:
+            raise TypeError(f"ctx.fact('{name}', …): {error}; give numbers, texts, lists or mappings of them") from None
         (self.run_facts if of_run else self.facts)[name] = value
 
     def warn(self, sentence: str) -> None:
         """Record a warning, once, that matters for judging the run's results."""
+        if not isinstance(sentence, str):
+            raise TypeError(f"ctx.warn takes a sentence, not {type(sentence).__name__}: {sentence!r:.40}")
         if sentence not in self.warnings:
             self.warnings.append(sentence)
 

@@ -96,8 +96,12 @@ def test_values_counters_paths_and_scalars_come_back():
 def test_what_is_no_value_cannot_be_written_or_named():
     with pytest.raises(BadEncoding, match="make it a Value"):
         encode(object())
-    with pytest.raises(BadEncoding, match="array of objects"):
+    with pytest.raises(BadEncoding, match="array of object"):
         encode(np.array([object()]))
+    for array in (np.zeros(2, [("a", float)]), np.ma.masked_less(np.arange(3.0), 1)):
+        for write in (encode, lambda array: encode_all([array, array])):
+            with pytest.raises(BadEncoding, match="use a plain array of numbers"):
+                write(array)
     forged = encode(toys.Number(1.0)).replace(b"toys.Number", b"os.PathLike")
     with pytest.raises(BadEncoding, match=r"unknown value type 'os\.PathLike'"):
         decode(forged)

@@ -15,7 +15,7 @@ from omninav.pipeline.engine.prefix import cached_prefix, following, keep_prefix
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
-from toys import Big, Number, graph_of_toys
+from toys import Big, Collected, Number, graph_of_toys
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -158,6 +158,31 @@ def test_a_stage_that_gives_something_else_or_changes_what_others_read_too_is_na
     graph = build(graph_of_toys(nodes, {"scribble": {"big": "artifacts.map"}}), {"map": Big})
     with pytest.raises(StageFailed, match=r"failed: it changes its inputs"):
         Engine(graph, artifacts={"map": Big(np.zeros(3))}).run()
+
+
+def test_a_stage_that_writes_into_what_it_gave_before_is_named():
+    graph = graph_of({"source": "Count", "reuse": "Reuse"}, {"reuse": {"number": "source.number"}})
+    said = r"stage 'reuse' \(toys.Reuse\) failed at tick 1 .*: it changes what it gave before"
+    with pytest.raises(StageFailed, match=said):
+        Engine(graph).run()
+
+
+def test_another_out_a_fact_that_is_no_json_and_what_cannot_be_kept_are_named_with_the_stage():
+    def engine() -> Engine:
+        return Engine(graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}}))
+
+    def fails(step: object, said: str) -> None:
+        made = engine()
+        made.calls["scale"].step = step
+        with pytest.raises(StageFailed, match=rf"stage 'scale' \(toys.Scale\) failed at tick 0 .*: {said}"):
+            made.run()
+
+    out = graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}}).nodes["scale"].stage
+    fails(lambda ctx, number: Collected.Out(metrics=None), "step gave another Out than its own, without 'number'")
+    fails(lambda ctx, number: ctx.fact("a", np.float32(3)), r"TypeError: ctx.fact\('a', …\): .*float32")
+    fails(lambda ctx, number: ctx.warn(ValueError("a")), "TypeError: ctx.warn takes a sentence, not ValueError")
+    fails(lambda ctx, number: ctx.count(3), "TypeError: ctx.count begins with a name")
+    fails(lambda ctx, number: out.Out(number=Number({1, 2})), "builtins.set cannot be written")
 
 
 FULL = {

@@ -105,6 +105,13 @@ def test_a_plugin_of_the_name_of_a_built_in_stage_is_a_problem(stage_file: Path,
     assert "'match.l2' is of omninav itself" in next(entry for entry in plugins() if entry.name == "match.l2").problem
 
 
+def test_two_files_of_one_name_are_a_problem(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", f"match.twice={stage_file}:Twice,match.twice=toys:Scale")
+    first, second = plugins()
+    assert f"'match.twice' is {stage_file}:Twice and toys:Scale in OMNINAV_STAGES; leave all but" in first.problem
+    assert f"'match.twice' is toys:Scale and {stage_file}:Twice" in second.problem
+
+
 def test_an_entry_that_is_not_understood_says_what_to_write_and_a_missing_file_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ):

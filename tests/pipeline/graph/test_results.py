@@ -19,9 +19,9 @@ def test_metrics_of_several_stages_are_merged_group_by_group():
 
 
 def test_numbers_of_numpy_are_merged_as_json_holds_them():
-    values = {"one": np.float32(0.5), "several": (np.int64(2), math.nan), "group": {"yes": np.bool_(True)}}
+    values = {"one": np.float32(0.5), "several": (np.int64(2), math.nan, -math.inf), "group": {"yes": np.bool_(True)}}
     assert json.loads(json.dumps(merged([Metrics(values)]).values, allow_nan=False)) == {
-        "one": 0.5, "several": [2, None], "group": {"yes": True},
+        "one": 0.5, "several": [2, None, None], "group": {"yes": True},
     }  # fmt: skip
 
 

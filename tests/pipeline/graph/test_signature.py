@@ -5,7 +5,7 @@ from typing import Annotated
 import pytest
 
 import toys
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.parameters import BadStage
 from omninav.pipeline.graph.signature import signature
 
@@ -90,9 +90,24 @@ class Silent(toys.Constant):
     def step(self, ctx: Context): ...
 
 
+class NoType(Stage):
+    def step(self, ctx: Context, number: "toys.Nowhere") -> None: ...
+
+
+class Needy(Stage):
+    class Memory(State):
+        """Its memory."""
+
+        seen: int
+
+    def step(self, ctx: Context, memory: Memory) -> None: ...
+
+
 @pytest.mark.parametrize(
     ("cls", "message"),
     [
+        (NoType, "an annotation is no type: AttributeError: module 'toys' has no attribute 'Nowhere'"),
+        (Needy, "'seen' of its Memory has no default; write one"),
         (WithoutContext, "step: its first argument is 'number'; write `def step\\(self, ctx: Context, …\\)`"),
         (UntypedParameter, "'gain' has no type, and so sets no parameter; write `gain: int = 3`"),
         (OtherDefault, "'offset' has no type, and so sets no parameter; write `offset: float = 2.0`"),
