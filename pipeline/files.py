@@ -7,6 +7,7 @@ import json
 import os
 import re
 import stat
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -39,7 +40,7 @@ def write_whole(path: Path, content: bytes | str) -> None:
 def whole_file(path: Path) -> Iterator[Path]:
     """A path to write to; renamed to `path` when the block ends well, removed when it does not."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}{PART}")
+    part = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}{PART}")
     part.unlink(missing_ok=True)  # a link of that name would be written through
     _remove_left_over(path)
     try:
@@ -64,8 +65,9 @@ def _remove_left_over(path: Path) -> None:
     """Remove what processes of this machine left that were killed while they wrote this file."""
     begins, ends = f"{path.name}.", PART
     for name in os.listdir(path.parent):
-        number = name.removeprefix(begins).removesuffix(ends)
-        if name == f"{begins}{number}{ends}" and number.isdecimal() and not _lives(int(number)):
+        by = name.removeprefix(begins).removesuffix(ends)
+        process, _, thread = by.partition("-")
+        if name == f"{begins}{by}{ends}" and f"{process}{thread}".isdecimal() and not _lives(int(process)):
             with suppress(OSError):
                 path.with_name(name).unlink()
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from omninav.pipeline.cli.arguments import number_of, value_text
 from omninav.pipeline.cli.commands.run import command
+from omninav.pipeline.cli.hydra_session import ALONE
 from omninav.pipeline.cli.overrides import MAX_JOBS
 from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.tables import read_table
@@ -76,7 +77,7 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     made: list[Path] = []
     before = sys.argv
     try:
-        with ExitStack() as quiet:
+        with ALONE, ExitStack() as quiet:
             if not progress:
                 quiet.enter_context(redirect_stdout(io.StringIO()))
                 quiet.enter_context(redirect_stderr(io.StringIO()))

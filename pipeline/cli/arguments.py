@@ -138,7 +138,7 @@ def value_text(value: Any, depth: int = 0) -> str:
             raise BadInput(f"a whole number of more than {MAX_DIGITS} digits cannot be a setting")
         return repr(value)
     if isinstance(value, str | Path):
-        text = str(value)
+        text = str(value) if isinstance(value, str) else str(value).replace("${", "\\${")
         return text if text and all(c.isalnum() or c in "_./-" for c in text) else _quoted(text)
     if isinstance(value, Mapping | list | tuple | range):
         if number_of(value) > MAX_WORD or depth >= MAX_NESTING:
@@ -159,5 +159,5 @@ def number_of(values: Sized) -> int:
 
 
 def _quoted(text: str) -> str:
-    backslash = "\\"
-    return "'" + text.replace(backslash, 2 * backslash).replace("'", f"{backslash}'") + "'"
+    # Hydra takes a backslash for itself but before a quote.
+    return "'" + re.sub(r"(\\*)('|$)", lambda end: 2 * end[1] + ("\\'" if end[2] else ""), text) + "'"

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
@@ -43,22 +44,28 @@ OWN_WORDS = ("hydra/job_logging=disabled", "hydra/hydra_logging=disabled", "hydr
 """Values that config.yaml gives to those parts that a configuration cannot set."""
 CALLED_BY_NAME = ("custom_search_space",)
 """Parameters of a sweeper that name a function to call."""
+ALONE = threading.RLock()
+"""Held while Hydra composes, and during a sweep."""
 MAX_KEPT = 256
 """Configurations of options that a process keeps, each of some 100 kB."""
 
 
 @contextmanager
 def hydra_started(folders: Sequence[str] = ()) -> Iterator[Any]:
-    """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`)."""
+    """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`).
+
+    Hydra is one for the whole process: threads wait for each other.
+    """
     session = GlobalHydra.instance()
-    before, session.hydra = session.hydra, None
-    version.setbase(VERSION_BASE)
-    session.hydra = _finding_in(tuple(folders)) if folders else _finding_own(tuple(plugins()))
-    try:
-        with interpolations_limited():
-            yield session.hydra
-    finally:
-        session.hydra = before
+    with ALONE:
+        before, session.hydra = session.hydra, None
+        version.setbase(VERSION_BASE)
+        session.hydra = _finding_in(tuple(folders)) if folders else _finding_own(tuple(plugins()))
+        try:
+            with interpolations_limited():
+                yield session.hydra
+        finally:
+            session.hydra = before
 
 
 @lru_cache(maxsize=4)

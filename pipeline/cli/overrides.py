@@ -163,6 +163,15 @@ def _refuse_no_values(word: Override, folders: Sequence[str]) -> None:
         raise BadInput(f"{name}: {shown(word.input_line)} means no value; {hint}")
 
 
+def _refuse_same_jobs(texts: Sequence[str], word: Override, first: Override) -> None:
+    """Raise `BadInput` where a swept word has a value twice, or where `first` sets the same and would be passed over."""
+    double = next((text for number, text in enumerate(texts) if text in texts[:number]), None)
+    if double is not None:
+        raise BadInput(f"{word.key_or_group}: {double} stands twice in the sweep; its jobs would be the same")
+    if word is not first and (word.is_sweep_override() or first.is_sweep_override()):
+        raise BadInput(f"{first.input_line} and {word.input_line} are typed; leave one of them out")
+
+
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
     """The configuration with these options alone, the first of each that is swept; {} where there is none."""
     try:
@@ -180,6 +189,7 @@ def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[s
     groups = set(_groups(folders))
     choices = []
     jobs = 1
+    given: dict[str, Override] = {}
     for word in words:
         try:
             parsed = _parse(word)[0]
@@ -189,6 +199,7 @@ def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[s
         jobs *= _number_of_values(parsed)
         texts = _texts(parsed)
         _refuse_no_values(parsed, folders)
+        _refuse_same_jobs(texts, parsed, given.setdefault(parsed.key_or_group, parsed))
         choices.append(texts if parsed.key_or_group in groups else texts[:1])
     if jobs > MAX_JOBS and not any(word.startswith("hydra/sweeper=") for word in words):
         raise BadInput(f"-m: a sweep of {jobs:,} jobs, expected at most {MAX_JOBS:,}; leave some values out")

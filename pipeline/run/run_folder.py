@@ -4,6 +4,7 @@ import os
 import platform
 import shutil
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -109,7 +110,7 @@ def start(
     inputs = input_digests(prepared)
     root = Path(str(config.get("runs", "runs"))).absolute()
     named = f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{prepared.variant}"
-    beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder.absolute()
+    beginning = root / f".{named}.{threading.get_native_id()}.part" if folder is None else folder.absolute()
     beginning.mkdir(parents=True, exist_ok=True)
     run = RunFolder(beginning)
     config_file = config_text(prepared.config)
@@ -187,7 +188,7 @@ def _numbered(folder: Path) -> Iterator[Path]:
 
 def _point_latest(folder: Path) -> None:
     link = folder.parent / "latest"
-    part = folder.parent / f".latest.{os.getpid()}"
+    part = folder.parent / f".latest.{threading.get_native_id()}"
     try:
         part.unlink(missing_ok=True)
         part.symlink_to(folder.name)

@@ -109,6 +109,15 @@ def test_a_sweep_that_is_typed_again_does_only_what_is_missing(toy, tmp_path: Pa
     assert "2 jobs: 2 complete" in (tmp_path / "out" / "sweep.html").read_text()
 
 
+def test_a_job_does_not_overwrite_what_another_has_left_in_its_folder(toy, tmp_path: Path):
+    swept = toy("--config-dir=mine", "-m", "hydra.sweep.dir=swept", "hydra.sweep.subdir=same", "seed=3,4")
+    assert swept.returncode == 2
+    assert "job 1: " in swept.stderr
+    assert "job 0 has left its run there; give each job its own folder: hydra.sweep.subdir=" in swept.stderr
+    manifest = json.loads((tmp_path / "swept" / "same" / "manifest.json").read_text())
+    assert (manifest["seed"], manifest["job"], manifest["status"]) == (3, "0", "complete")
+
+
 def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path: Path):
     where = ("--config-dir=mine", "-m", "hydra.sweep.dir=out")
     toy(*where, "seed=0", check=True)

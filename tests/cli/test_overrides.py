@@ -58,6 +58,18 @@ def test_a_sweep_of_no_value_is_refused(word: str, hint: str):
     assert hint in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["seed=1,2,1"], "seed: seed=1 stands twice in the sweep; its jobs would be the same"),
+        (["seed=1,2", "seed=3"], "seed=1,2 and seed=3 are typed; leave one of them out"),
+    ],
+)
+def test_a_sweep_of_the_same_jobs_and_one_that_would_be_passed_over_are_refused(words: list[str], said: str):
+    with pytest.raises(BadInput, match=said):
+        list(jobs_to_try(words, ()))
+
+
 def test_a_parameter_that_the_configuration_does_not_list_is_added_and_a_misspelled_one_is_not():
     words = ["nodes.match.headings=18", "nodes.match.headngs=18", "seed=3"]
     assert with_unlisted_parameters(words, ()) == ["++nodes.match.headings=18", "nodes.match.headngs=18", "seed=3"]

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -55,8 +56,14 @@ def test_a_configuration_knows_its_variant_and_draws_its_graph():
 
 
 def test_a_text_with_odd_characters_arrives_as_it_is(tmp_path):
-    odd = tmp_path / "it's {a} $b, c=d.mcap"
+    odd = tmp_path / "it's {a} $b, ${e} c=d\\.mcap"
     assert omninav.compose("omniview_cml", log=odd).settings["log"] == str(odd)
+
+
+def test_threads_wait_for_each_other_where_there_is_one_hydra():
+    with ThreadPoolExecutor(4) as threads:
+        composed = threads.map(lambda seed: omninav.compose("plain_matching", seed=seed), range(8))
+        assert [made.settings["seed"] for made in composed] == list(range(8))
 
 
 def test_what_is_wrong_is_an_exception_and_no_exit():
