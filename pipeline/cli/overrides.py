@@ -164,7 +164,7 @@ def _refuse_no_values(word: Override, folders: Sequence[str]) -> None:
 
 
 def _refuse_same_jobs(texts: Sequence[str], word: Override, first: Override) -> None:
-    """Raise `BadInput` where a swept word has a value twice, or where `first` sets the same and would be passed over."""
+    """Raise `BadInput` where a swept word has a value twice, or where `first` sets the same and is passed over."""
     double = next((text for number, text in enumerate(texts) if text in texts[:number]), None)
     if double is not None:
         raise BadInput(f"{word.key_or_group}: {double} stands twice in the sweep; its jobs would be the same")

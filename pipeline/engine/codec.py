@@ -140,8 +140,8 @@ def _describe(thing: Any, arrays: _Arrays) -> Any:
         return thing
     if isinstance(thing, np.ndarray | StoredRows):
         if thing.dtype.hasobject or thing.dtype.names or isinstance(thing, np.ma.MaskedArray):
-            kind = "with a mask" if isinstance(thing, np.ma.MaskedArray) else f"of {thing.dtype}"
-            raise BadEncoding(f"an array {kind} cannot be written: use a plain array of numbers")
+            such = "with a mask" if isinstance(thing, np.ma.MaskedArray) else f"of {thing.dtype}"
+            raise BadEncoding(f"an array {such} cannot be written: use a plain array of numbers")
         return ["array", thing.dtype.str, list(thing.shape), arrays.add(np.ascontiguousarray(thing).tobytes())]
     if isinstance(thing, np.generic):
         return ["scalar", thing.dtype.str, thing.tobytes().hex()]

@@ -43,7 +43,7 @@ def split_optional(annotation: Any) -> tuple[Any, bool]:
 
 
 def type_hints(thing: Any, cls: type) -> dict[str, Any]:
-    """The annotations of a function or class that belongs to `cls`, by name. Raises `BadStage` where one has no type."""
+    """The annotations of a function or class that belongs to `cls`, by name. Raises `BadStage` for what is no type."""
     names = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
     try:
         return typing.get_type_hints(thing, localns=names, include_extras=True)
