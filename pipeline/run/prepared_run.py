@@ -12,7 +12,7 @@ from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, check
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
-from omninav.pipeline.graph.ports import convert
+from omninav.pipeline.graph.ports import convert, type_name
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
 
@@ -96,6 +96,8 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
         graph = build(config, types)
     except ProblemsFound as found:
         problems += found.problems
+        for made in artifacts:
+            problems = _of_one_file(problems, made, specs[made.name])
     saves = config.get("saves") or {}
     plots = config.get("plots", PLOTS[0])
     if plots not in PLOTS:
@@ -115,6 +117,16 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
     return PreparedRun(config, graph, tuple(artifacts), saves, record)
+
+
+def _of_one_file(problems: list[Problem], made: PreparedArtifact, spec: ArtifactSpecification) -> list[Problem]:
+    """Problems, those of all inputs that cannot take an artifact's file as one: another variant has made it."""
+    of_it = [each for each in problems if each.what.startswith(f"{ARTIFACTS}.{made.name} is of type ")]
+    if made.file is None or len(of_it) < 2:
+        return problems
+    what = f"{made.file} holds {type_name(made.type)}, which {len(of_it)} inputs of this variant cannot take"
+    hint = f"variant={made.variant.removesuffix('_map')} has made it; type that variant, or {_how_to_get(made.name, spec)}"
+    return [*(each for each in problems if each not in of_it), Problem(made.name, what, hint)]
 
 
 def _unreadable_inputs(graph: Graph | None) -> Iterator[Problem]:
@@ -171,7 +183,7 @@ def _prepare_artifact(name: str, spec: ArtifactSpecification, graph: Graph | Non
             if file.is_file() and file.suffix != ".omap" and spec.made_from:
                 hint = f"if it is what a {name} is made from, type {spec.made_from[0]}={spec.file}; else {hint}"
             raise ProblemsFound([Problem(name, str(error), hint)]) from None
-        return PreparedArtifact(name, file, type=kind, made_by=facts.get("stages", {}))
+        return PreparedArtifact(name, file, variant=facts.get("variant", ""), type=kind, made_by=facts.get("stages", {}))
     if spec.graph is None:
         what = f"this variant needs a {name}, and none is given"
         raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])

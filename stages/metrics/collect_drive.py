@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence
-from omninav.stages.values.drive import EVIDENCE, Drive, pose_row
+from omninav.stages.values.drive import EVIDENCE, Drive, known, pose_row
 from omninav.stages.values.episode_statistics import EpisodeStatistics
 from omninav.stages.values.evidence import ImageEvidence
 from omninav.stages.values.maps import ReferenceGraph
@@ -31,6 +32,11 @@ ROW = np.dtype(
 )
 """A row of a `Drive`, its columns in their order."""
 NOT_KNOWN = (None,) * 3
+MAX_WITHOUT_TRUTH = 0.1
+"""Share of images without a true pose of which nothing is said."""
+AT_ORIGIN = (0.05, 0.05, 0.05)
+"""Largest x, y (m) and heading (rad) of a first estimate at which a map is begun (0.01 m and 0.5 degrees)."""
+ALIGNED = "the true poses were aligned with the estimates by one rigid motion, and errors are those after alignment"
 
 
 class CollectDrive(Stage):
@@ -88,8 +94,19 @@ class CollectDrive(Stage):
         columns: dict[str, Any] = {name: np.ascontiguousarray(table[name]) for name in ROW.names or ()}
         if map is not None and map.pose_source in OWN_FRAMES and np.isfinite(columns["truth"]).any():
             columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
-            ctx.warn(
-                f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own: the true poses "
-                "were aligned with the estimates by one rigid motion, and errors are those after alignment"
-            )
+            ctx.warn(f"The map's poses are from {SOURCE_WORDS[map.pose_source]}, in a frame of their own: {ALIGNED}")
+        self._late_truth(ctx, columns, map is None)
         return self.Out(drive=Drive(**columns, conflicts=tuple(conflicts)))
+
+    def _late_truth(self, ctx: Context, columns: dict[str, Any], begins_its_map: bool) -> None:
+        """Warn where many images have no true pose; align with a map that was begun at the origin before the first."""
+        has = known(columns["truth"])
+        without = int((~has).sum())
+        if not has.any() or without <= MAX_WITHOUT_TRUTH * len(has):
+            return
+        said = f"{without} of {counted(len(has), 'image')} have no true pose: errors are those of the others"
+        begun = columns["estimate"][:1]
+        if begins_its_map and not has[0] and (np.abs(begun) < AT_ORIGIN).all():
+            columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
+            said += f". The map is begun at the origin, before the first of them: {ALIGNED}"
+        ctx.warn(said)

@@ -101,9 +101,9 @@ def frozen_steps(odometry: Array, truth: Array) -> tuple[int, float]:
     steps, metres, at = 0, 0.0, 0
     for is_frozen, group in groupby(frozen.tolist()):
         length = len(list(group))
-        way = float(np.hypot(*(truth[at + length, :2] - truth[at, :2])))
-        if is_frozen and length >= MIN_STEPS and way >= MIN_DISTANCE_M:
-            steps, metres = steps + length, metres + way
+        away = np.hypot(*(truth[at : at + length + 1, :2] - truth[at, :2]).T)
+        if is_frozen and length >= MIN_STEPS and away.max() >= MIN_DISTANCE_M:  # a circle comes back
+            steps, metres = steps + length, metres + float(moved[at : at + length].sum())
         at += length
     return steps, metres
 

@@ -14,7 +14,7 @@ from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.self_calibration import adjustable
 from omninav.stages.geometry.landmarks.adjustment import adjusted
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
-from omninav.stages.mapping.camera_check import CameraCheck
+from omninav.stages.mapping.camera_check import MIN_VIEWS, CameraCheck
 from omninav.stages.recordings.camera_yaml import parse_camera
 
 TRUE = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
@@ -22,10 +22,10 @@ SPHERE = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_
 BESIDE = replace(TRUE, centre_x=321.8, centre_y=237.6)  # by 3 pixels
 
 
-def check_of(camera, pixels):
+def check_of(camera, pixels, views=MIN_VIEWS):
     rays = adjustable(camera, pixels).bearings(np.zeros(2)) if camera.ring else camera.unproject(pixels)[0]
     features = replace(features_of(np.zeros((len(pixels), 128), np.uint8)), bearings=rays, points=pixels)
-    return CameraCheck.of(camera, [None, features], rays, poses_given=True)
+    return CameraCheck.of(camera, [*[None] * (views - 1), features], rays, poses_given=True)
 
 
 @pytest.fixture(scope="module")
@@ -90,12 +90,13 @@ def test_a_camera_that_leans_is_said(camera):
     np.testing.assert_allclose(level[shown], world.bearings[shown], atol=0.003)
 
 
-def test_bearings_of_other_pixels_and_cameras_of_a_part_of_the_circle_are_not_checked(seen):
+def test_bearings_of_other_pixels_cameras_of_a_part_of_the_circle_and_few_views_are_not_checked(seen):
     pixels, _ = seen
     check = check_of(TRUE, pixels)
-    other = CameraCheck.of(BESIDE, [None], check.bearings, poses_given=True)
+    other = CameraCheck.of(BESIDE, [None] * MIN_VIEWS, check.bearings, poses_given=True)
     ahead = check_of(Perspective(640, 480, 400.0, 400.0, 319.5, 239.5), np.full((5, 2), 100.0))
-    for each in (other, ahead, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
+    short = check_of(BESIDE, pixels, MIN_VIEWS - 1)
+    for each in (other, ahead, short, CameraCheck.of(None, [None], np.empty((0, 3)), poses_given=False)):
         assert each.camera is None
         assert each.metrics(np.empty(0), np.zeros(3), 0.0) == {}
         assert each.seen(np.arange(0)).sigmas.shape == (0,)

@@ -69,6 +69,19 @@ def test_true_poses_are_in_the_frame_of_the_map(source, moved):
     assert bool(ctx.warnings) is (source == "odometry")
 
 
+@pytest.mark.parametrize(("begun", "aligned"), [(0.0, True), (3.0, False)])
+def test_truth_that_comes_late_is_told_and_aligned_with_a_map_begun_at_the_origin(begun: float, aligned: bool):
+    run, ctx = small_run(frames=6), Context("drive")
+    at = [PoseEstimate(Pose(begun + 0.5 * i, 0.0, 0.0), np.eye(3), 1.0, None) for i in range(6)]
+    there = [None, None, *(Pose(7.0, 0.5 * i, np.pi / 2) for i in range(2, 6))]
+    drive = CollectDrive().step(ctx, run.ticks, there, run.motion, at).drive
+    seen = drive.estimate[2:, :2] if aligned else np.array([[7.0, 0.5 * i] for i in range(2, 6)])
+    assert drive.truth[2:, :2] == pytest.approx(seen)
+    (said,) = ctx.warnings
+    assert said.startswith("2 of 6 images have no true pose: errors are those of the others")
+    assert ("begun at the origin" in said) is aligned
+
+
 def test_what_a_tick_did_not_bring_is_not_a_number_or_less_than_none():
     drive = collected([Tick(0, 0)], [None])
     assert (drive.collisions[0], drive.place[0], drive.reference[0], drive.mode_weight[0]) == (0, -1, -1, 0.0)

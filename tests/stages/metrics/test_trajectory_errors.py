@@ -68,9 +68,9 @@ def test_the_settling_window_is_the_same_whoever_is_lost_for_how_long():
 
 def test_the_settling_window_counts_frames_of_each_log_also_those_that_are_not_scored():
     truth = [None, None, *[AT_ORIGIN] * 4] * 2
-    found = measured(off_by(*map(float, range(12)), truth=truth, logs=[0] * 6 + [1] * 6), settle_steps=4)
-    assert means(*(log["after_settling"] for log in found["logs"])) == [4.5, 10.5]
-    assert means(found["mean_pose"]["after_settling"]) == [11.5]
+    found = measured(off_by(*map(float, range(1, 13)), truth=truth, logs=[0] * 6 + [1] * 6), settle_steps=4)
+    assert means(*(log["after_settling"] for log in found["logs"])) == [5.5, 11.5]
+    assert means(found["mean_pose"]["after_settling"]) == [12.5]
     assert measured(off_by(0.0, 0.0, 0.0), settle_steps=3)["after_settling"] is None
 
 

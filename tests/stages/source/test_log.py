@@ -252,7 +252,7 @@ def test_odometry_that_stands_still_while_ground_truth_moves_is_said(tmp_path: P
     ctx = Context("source")
     LogSource(log=str(write_mcap(tmp_path / "log.mcap", map(stopped, messages())))).setup(ctx)
     assert [line.partition(": ")[2] for line in ctx.warnings] == [
-        "odometry stands still at 19 images, ground truth moves 1.6 m"
+        "odometry stands still at 19 images, ground truth moves 1.9 m"
     ]
 
 

@@ -23,6 +23,9 @@ def test_odometry_that_stops_while_the_robot_goes_on_is_counted() -> None:
     steps, metres = frozen_steps(changed(AHEAD, slice(5, None), 1.0), AHEAD)
     assert (steps, metres) == (14, pytest.approx(2.8))
     assert frozen_steps(np.zeros((20, 3)), AHEAD)[0] == 19
+    angles = np.linspace(0.0, 2.0 * np.pi, 20)
+    circle = np.column_stack([np.sin(angles), np.cos(angles), -angles])
+    assert frozen_steps(np.zeros((20, 3)), circle) == (19, pytest.approx(6.254, abs=1e-3))
 
 
 @pytest.mark.parametrize(
