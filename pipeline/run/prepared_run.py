@@ -125,7 +125,8 @@ def _of_one_file(problems: list[Problem], made: PreparedArtifact, spec: Artifact
     if made.file is None or len(of_it) < 2:
         return problems
     what = f"{made.file} holds {type_name(made.type)}, which {len(of_it)} inputs of this variant cannot take"
-    hint = f"variant={made.variant.removesuffix('_map')} has made it; type that variant, or {_how_to_get(made.name, spec)}"
+    maker = made.variant.removesuffix("_map")
+    hint = f"variant={maker} has made it; type that variant, or {_how_to_get(made.name, spec)}"
     return [*(each for each in problems if each not in of_it), Problem(made.name, what, hint)]
 
 
@@ -183,7 +184,8 @@ def _prepare_artifact(name: str, spec: ArtifactSpecification, graph: Graph | Non
             if file.is_file() and file.suffix != ".omap" and spec.made_from:
                 hint = f"if it is what a {name} is made from, type {spec.made_from[0]}={spec.file}; else {hint}"
             raise ProblemsFound([Problem(name, str(error), hint)]) from None
-        return PreparedArtifact(name, file, variant=facts.get("variant", ""), type=kind, made_by=facts.get("stages", {}))
+        maker, stages = str(facts.get("variant", "")), facts.get("stages", {})
+        return PreparedArtifact(name, file, variant=maker, type=kind, made_by=stages)
     if spec.graph is None:
         what = f"this variant needs a {name}, and none is given"
         raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])

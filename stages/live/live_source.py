@@ -262,8 +262,8 @@ class LiveSource(Source):
     def _why_not(self, synchronizer: TimeSynchronizer) -> str:
         """Inputs that were missing, as the terminal reported, and what was left out."""
         troubles = sorted(self._transport.status.troubles.values())
-        first = synchronizer.details
-        troubles += [f"{kind} {number} times ({first.get(kind, kind):.200})" for kind, number in self._counted.items()]
+        for kind, number in self._counted.items():
+            troubles.append(f"{kind} {number} times ({synchronizer.first_dropped(kind) or kind:.200})")
         return "; ".join(troubles) or "it was ended before the first image; let it run until the robot sends"
 
     def _write(self, synchronizer: TimeSynchronizer, messages: list[Any]) -> None:
@@ -293,7 +293,7 @@ class LiveSource(Source):
         """Count in the manifest what was left out since the last time."""
         counts = synchronizer.dropped()
         for kind, number in (counts - self._counted).items():
-            ctx.count(kind, number, synchronizer.details.get(kind, ""))
+            ctx.count(kind, number, synchronizer.first_dropped(kind))
         self._counted = counts
 
     def _out(self, position: LiveSourceState, stamp: int, camera: Camera, pixels: Pixels, frame: Frame) -> Out:

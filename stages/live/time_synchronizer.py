@@ -208,6 +208,14 @@ class TimeSynchronizer:
         kind, number = unused.most_common(1)[0]
         return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200})"
 
+    def first_dropped(self, kind: str) -> str:
+        """Describes the first item of a kind that was left out."""
+        tracks = {"odometry": self.drive.odometry, "truth": self.drive.truth}
+        of_tracks = (
+            f"{role}: {track.details[kind]}" for role, track in tracks.items() if track and kind in track.details
+        )
+        return self.details.get(kind) or next(of_tracks, "")
+
     def dropped(self) -> Counter[str]:
         """Numbers of items left out so far, by kind."""
         tracks = (self.drive.odometry, self.drive.truth)

@@ -99,14 +99,11 @@ class CollectDrive(Stage):
         return self.Out(drive=Drive(**columns, conflicts=tuple(conflicts)))
 
     def _late_truth(self, ctx: Context, columns: dict[str, Any], begins_its_map: bool) -> None:
-        """Warn where many images have no true pose; align with a map that was begun at the origin before the first."""
+        """Align with a map that was begun at the origin before the first true pose; warn where many have none."""
         has = known(columns["truth"])
-        without = int((~has).sum())
-        if not has.any() or without <= MAX_WITHOUT_TRUTH * len(has):
-            return
-        said = f"{without} of {counted(len(has), 'image')} have no true pose: errors are those of the others"
-        begun = columns["estimate"][:1]
-        if begins_its_map and not has[0] and (np.abs(begun) < AT_ORIGIN).all():
+        if has.any() and begins_its_map and not has[0] and (np.abs(columns["estimate"][0]) < AT_ORIGIN).all():
             columns["truth"] = in_map_frame(columns["truth"], columns["estimate"])
-            said += f". The map is begun at the origin, before the first of them: {ALIGNED}"
-        ctx.warn(said)
+            ctx.warn(f"The map is begun at the origin, before the first true pose: {ALIGNED}")
+        without = int((~has).sum())
+        if has.any() and without > MAX_WITHOUT_TRUTH * len(has):
+            ctx.warn(f"{without} of {counted(len(has), 'image')} have no true pose: errors are those of the others")

@@ -29,12 +29,13 @@ class LiveTrack:
     What no robot can have driven, and what is before the last stamp or long after it, is doubted: dropped where the
     track continues as before, and believed once it has continued for `EXCURSION_S` by itself. Then odometry is joined
     to where it was (`jumps` false), or the truth starts again there; where stamps went back, all before is forgotten.
-    `dropped` counts by kind what was left out. What comes of it depends on what was kept alone: fed with that, another
-    track gives the same.
+    `dropped` counts by kind what was left out, `details` tells of the first of each. What comes of it depends on what
+    was kept alone: fed with that, another track gives the same.
     """
 
     def __init__(self, limits: MotionLimits, jumps: bool) -> None:
         self.dropped: Counter[str] = Counter()
+        self.details: dict[str, str] = {}
         self._limits, self._jumps = limits, jumps
         self._known: deque[_Pose] = deque()
         self._doubted: list[_Pose] = []
@@ -50,10 +51,10 @@ class LiveTrack:
         """Take a pose. Returns the items of all poses that are now believed and were not before, in their order."""
         new = _Pose(stamp, np.array(pose, dtype=np.float64), item)
         if not np.isfinite(new.pose).all():
-            self.dropped["impossible_pose"] += 1
+            self._drop("impossible_pose", f"of {stamp / 1e9:.3f} s is not finite")
             return []
         if self._known and stamp == self._known[-1].stamp:
-            self.dropped["duplicate_stamp"] += 1
+            self._drop("duplicate_stamp", f"of {stamp / 1e9:.3f} s has come before")
             return []
         if not self._known or self._follows(self._known[-1], new, joined=True):
             self._drop_doubted()
@@ -144,5 +145,14 @@ class LiveTrack:
             kind = "impossible_motion" if late else "backward_stamp"
             if late and one.stamp - self._known[-1].stamp > MAX_PAUSE_S * 1e9:
                 kind = "lone_stamp"
-            self.dropped[kind] += 1
+            beside = ""
+            if self._known:
+                last = self._known[-1]
+                metres = float(np.hypot(*(self._join(one.pose) - last.pose)[:2]))
+                beside = f", {metres:.2f} m and {(one.stamp - last.stamp) / 1e9:.3f} s from the one before"
+            self._drop(kind, f"of {one.stamp / 1e9:.3f} s{beside}; do two nodes publish?")
         self._doubted.clear()
+
+    def _drop(self, kind: str, detail: str) -> None:
+        self.dropped[kind] += 1
+        self.details.setdefault(kind, f"a pose {detail}")

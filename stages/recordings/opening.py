@@ -56,6 +56,9 @@ def open_recording(
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {advice}")
     if not path.exists() and any(path.suffix in one.suffixes for one in formats):
         raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
+    if path.name.endswith(".mcap.unfinished") and path.exists():
+        again = f"`omninav resume {path.parent}` goes on and closes it, or name it .mcap"
+        raise UnreadableRecording(f"{log}: the record of a live run that was stopped; {again}")
     if path.suffix == ".active" and path.exists():
         raise UnreadableRecording(f"{log}: a bag that was never closed; `rosbag reindex` closes it, then name it .bag")
     what = "not a recording" if path.exists() else f"no such file{_candidates(path)}"
@@ -117,5 +120,5 @@ def _readable(folder: Path, formats: Sequence[Format]) -> str:
 
 
 def _candidates(path: Path) -> str:
-    near = sorted(other.name for other in path.parent.glob(f"*{path.suffix}")) if path.parent.is_dir() else []
+    near = sorted(other.name for other in path.parent.glob(f"*{path.suffix}*")) if path.parent.is_dir() else []
     return f" (in that folder: {', '.join(near[:5])})" if near and path.suffix else ""

@@ -32,6 +32,7 @@ def test_a_single_stamp_that_leaps_ahead_or_back_costs_itself():
     assert track.add(round(2.9 * S), (3.0, 0, 0)) == []  # once more the last one
     assert len(straight(track, np.arange(3.0, 4.0, 0.1))) == 10
     assert track.dropped == {"lone_stamp": 1, "backward_stamp": 1, "duplicate_stamp": 1}
+    assert track.details["backward_stamp"].startswith("a pose of 1.000 s, 0.10 m and -1.900 s from the one before")
 
 
 def test_a_track_goes_on_after_ten_seconds_and_is_known_for_thirty():

@@ -37,6 +37,14 @@ def test_a_format_that_a_user_wrote_opens_its_names(tmp_path: Path) -> None:
         FORMATS.remove(Renamed)
 
 
+def test_the_record_of_a_stopped_live_run_says_how_it_is_closed(tmp_path: Path) -> None:
+    write_mcap(tmp_path / "live.mcap").rename(tmp_path / "live.mcap.unfinished")
+    with refused(r"the record of a live run that was stopped; `omninav resume .*` goes on and closes it"):
+        open_recording(str(tmp_path / "live.mcap.unfinished"))
+    with refused(r"no such file \(in that folder: live\.mcap\.unfinished\)$"):
+        open_recording(str(tmp_path / "live.mcap"))
+
+
 def images(folder: Path, *suffixes: str) -> Path:
     """A folder with an image of each suffix."""
     folder.mkdir(parents=True)
