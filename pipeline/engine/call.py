@@ -18,9 +18,11 @@ from .channel import channel_key, held_key
 from .codec import BadEncoding, encode, encode_state
 
 VALIDATED_TICKS = 10
-"""First calls of a stage of ours whose outputs are checked against what their types state, and of another's whose
-inputs must stay as they are, as must what it gave before; outputs of another's are always checked, since a NaN may
-come late."""
+"""First calls of a stage of ours whose outputs are checked against what their types state; another's always are, since
+a NaN may come late."""
+GUARDED_EVERY = 8
+"""Every so many calls of another's stage, and in its first `VALIDATED_TICKS`, its inputs and what it gave before must be
+as they were; encoding them takes longer than a small stage."""
 
 
 class StageFailed(Exception):
@@ -34,7 +36,7 @@ class Call:
         self.node, self.ctx = node, ctx
         foreign = not node.target.startswith(f"{BUILT_IN}.")  # tests check ours
         self.to_check = math.inf if validate or foreign else VALIDATED_TICKS
-        self.to_guard = VALIDATED_TICKS if foreign else 0
+        self.foreign = foreign
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
         self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
@@ -60,12 +62,12 @@ class Call:
         self.guarded_once = [wire.to_port for wire in given if wire.origin in static]  # these may be large
         growing = {name for name, port in node.signature.outputs.items() if getattr(port.type, "in_place", False)}
         self.guarded_outputs = [name for name in node.signature.outputs if name not in growing]
-        self.gave: tuple[list[Any], bytes] = ([], encode([]))
+        self.gave: tuple[list[Any], bytes] | None = None
         self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def set_up(self) -> None:
         """Set up the stage. Raises `StageFailed` with its name for whatever it raises, but `BadInput`."""
-        if self.to_guard and self.state is not None:
+        if self.foreign and self.state is not None:
             try:
                 encode(encode_state(self.state))
             except BadEncoding as error:
@@ -92,7 +94,9 @@ class Call:
                     values[origin] = None
                 return True
             given[port] = value
-        guarded = self.guarded + self.guarded_once if self.to_guard else []
+        called = len(self.times)
+        guards = self.foreign and (called < VALIDATED_TICKS or called % GUARDED_EVERY == 0)
+        guarded = self.guarded + self.guarded_once if guards else []
         before = self._bytes([given[name] for name in guarded]) if guarded else b""
         start = time.perf_counter()
         try:
@@ -111,20 +115,16 @@ class Call:
                 values[origin] = getattr(out, name) if out is not None else None
             except AttributeError:
                 raise StageFailed(f"{self._place()}: step gave another Out than its own, without '{name}'") from None
-        if self.to_guard:
-            self._guard_outputs([values[f"{self.node.name}.{name}"] for name in self.guarded_outputs])
-        self.to_guard, self.guarded_once = max(0, self.to_guard - 1), []
+        if self.gave is not None and self._bytes(self.gave[0]) != self.gave[1]:
+            raise StageFailed(f"{self._place()}: it changes what it gave before, which is still read; give new arrays")
+        self.gave = None
+        if guards:
+            given_out = [values[f"{self.node.name}.{name}"] for name in self.guarded_outputs]
+            self.gave, self.guarded_once = (given_out, self._bytes(given_out)), []
         if self.to_check > 0 and out is not None:
             self.to_check -= 1
             self._check(out)
         return out is not None
-
-    def _guard_outputs(self, given: list[Any]) -> None:
-        """Raise `StageFailed` where this step changed what the one before gave, which may be read and written later."""
-        before, as_given = self.gave
-        if self._bytes(before) != as_given:
-            raise StageFailed(f"{self._place()}: it changes what it gave before, which is still read; give new arrays")
-        self.gave = given, self._bytes(given)
 
     def _bytes(self, given: list[Any]) -> bytes:
         try:

@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 import json
+import re
 import struct
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -16,11 +17,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.graph.registry import OF_A_FILE
 from omninav.pipeline.graph.stage import State
 from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
 _LENGTH = struct.Struct("<Q")
+FOLDER = re.compile(rf"(?<=^{OF_A_FILE})(.*)_[0-9a-f]{{8}}(?=\.)")
+"""Finds, in the name of a class of a file, the file's name and a digest of its folder."""
 _PLAIN = (str, bool, int, float, type(None))
 _PLAIN_TYPES = frozenset(_PLAIN)
 _to_json = json.JSONEncoder(separators=(",", ":")).encode
@@ -195,13 +199,26 @@ def _array(dtype_name: str, shape: list[int], offset: int, data: memoryview) -> 
 
 
 def _value_class(name: str, fields: int) -> tuple[type[Value], tuple[str, ...]]:
-    cls = VALUE_TYPES.get(name)
+    name, _, listed = name.partition("(")
+    cls = VALUE_TYPES.get(name) or _of_moved_file(name)
     if cls is None:
         raise BadEncoding(f"unknown value type '{name}': is the module that defines it loaded?")
     names = field_names(cls)
+    if listed:
+        there = tuple(listed.rstrip(")").split(","))
+        if not {*names[: len(names) - _defaults(cls)]} <= {*there} <= {*names}:
+            raise BadEncoding(f"'{name}' has the fields {', '.join(names)} now, {', '.join(there)} in the file")
+        return cls, there
     if not len(names) - _defaults(cls) <= fields <= len(names):
         raise BadEncoding(f"'{name}' has {len(names)} fields now, {fields} in the file")
     return cls, names[:fields]  # a field that an older file does not have takes its default
+
+
+def _of_moved_file(name: str) -> type[Value] | None:
+    """The class of a file that lay elsewhere, by the file's name; None where there is none, or several."""
+    own = FOLDER.sub(r"\1", name)
+    found = [cls for known, cls in VALUE_TYPES.items() if FOLDER.sub(r"\1", known) == own != name]
+    return found[0] if len(found) == 1 else None
 
 
 def _field_names(cls: Any) -> tuple[str, ...]:
@@ -216,7 +233,16 @@ def _defaults(cls: Any) -> int:
 
 field_names: Callable[[Any], tuple[str, ...]] = cache(_field_names)
 """The fields of a class of values or states, which their base classes make dataclasses of."""
-_name_of: Callable[[Any], str] = cache(value_name)
+
+
+def _named(cls: Any) -> str:
+    """The name of a value's class; of another's than ours with its fields, whose order may change."""
+    name = value_name(cls)
+    fields = field_names(cls)
+    return name if name.startswith("omninav.") or not fields else f"{name}({','.join(fields)})"
+
+
+_name_of: Callable[[Any], str] = cache(_named)
 
 
 def encode_state(state: State) -> dict[str, Any]:

@@ -388,6 +388,15 @@ class _Builder:
             if given is None or not getattr(given.type, "in_place", False):
                 continue
             kind = type_name(given.type)
+            again = [
+                port.name for port in self.nodes[wire.to_node].signature.outputs.values() if port.type is given.type
+            ]
+            if again and not wire.delay and (lifetimes[wire.from_node], lifetimes[wire.to_node]) == ("before", "tick"):
+                self._problem(
+                    wire.where,
+                    f"'{wire.to_node}' updates the {kind} of '{wire.from_node}', and a resumed run would not know how",
+                    f"write {wire.where}={{from: {wire.to_node}.{again[0]}, delay: 1, initial: {wire.origin}}}",
+                )
             if wire.collect or wire.hold or wire.delay > 1:
                 self._problem(
                     wire.where,

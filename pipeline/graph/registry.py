@@ -45,6 +45,8 @@ ENVIRONMENT = "OMNINAV_STAGES"
 ENTRY_POINTS = "omninav.stages"
 SOURCE = "__omninav_source__"
 """The name under which a module that is loaded from a file keeps its text: the file may change afterwards."""
+OF_A_FILE = "omninav_plugin_"
+"""Beginning of the name of a module that is loaded from a file; the file's name and a digest of its path follow."""
 SETTING = re.compile(r"[+~]*[\w./]+=")
 """The beginning of a word that sets something."""
 
@@ -182,7 +184,7 @@ def _load_file(path: Path) -> ModuleType:
         raise UnknownStage(f"there is no file {path}")
     with tokenize.open(path) as file:
         source = file.read()
-    name = f"omninav_plugin_{path.stem}_{digest_text(str(path))[:8]}"
+    name = f"{OF_A_FILE}{path.stem}_{digest_text(str(path))[:8]}"
     before = sys.modules.get(name)
     if before is None or getattr(before, SOURCE) != source:
         spec = importlib.util.spec_from_file_location(name, path)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
 import numpy as np
 
+from omninav.pipeline.files import digest_file, digest_text, user_path
+
 from .value import Tick
 
 
@@ -171,7 +173,8 @@ class Stage:
     * scratch: an argument of `step` whose type is a `State`;
     * output ports: the fields of the nested class `Out(Outputs)`;
     * `setup(ctx)`: heavy work, once per run, before the first step;
-    * `inputs_digest()`: for stages that read files, the content hash that caches and manifests use.
+    * `inputs_digest()`: for stages that read other files than those of their `Path` parameters, the content hash that
+      caches and manifests use.
 
     A stage is pure when its outputs follow from its inputs alone: no State, no use of `ctx.rng`. Purity is what lets
     the engine keep the prefix of a graph (what follows from its logs alone) for the next run.
@@ -191,8 +194,13 @@ class Stage:
         """Heavy once-per-run work. The default does nothing."""
 
     def inputs_digest(self) -> str | None:
-        """A content hash of the files this stage reads, or None where it reads none."""
-        return None
+        """A content hash of the files this stage reads, or None where it reads none.
+
+        The default takes the files that parameters of type `Path` name.
+        """
+        given = (getattr(self, field.name) for field in dataclasses.fields(self))  # type: ignore[arg-type]
+        files = [path for value in given if isinstance(value, Path) and (path := user_path(value)).is_file()]
+        return digest_text(*map(digest_file, files)) if files else None
 
 
 class Source(Stage):

@@ -125,7 +125,7 @@ def _of_one_file(problems: list[Problem], made: PreparedArtifact, spec: Artifact
     if made.file is None or len(of_it) < 2:
         return problems
     what = f"{made.file} holds {type_name(made.type)}, which {len(of_it)} inputs of this variant cannot take"
-    maker = made.variant.removesuffix("_map")
+    maker = made.variant.removesuffix(f"_{made.name}")
     hint = f"variant={maker} has made it; type that variant, or {_how_to_get(made.name, spec)}"
     return [*(each for each in problems if each not in of_it), Problem(made.name, what, hint)]
 

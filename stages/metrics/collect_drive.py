@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
-from omninav.pipeline.graph.problems import counted
+from omninav.pipeline import Context, Outputs, Stage, Tick, counted
 from omninav.stages.geometry.arrays import Ints
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import TRACKING_STATES, PoseConfidence

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as arrays
 import toys
 from omninav.pipeline.engine.codec import BadEncoding, decode, decode_all, encode, encode_all, seal, unseal
 from omninav.pipeline.engine.disk_sequence import DiskSequence, Present
-from omninav.pipeline.graph.value import Value, value_name
+from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),
@@ -105,6 +105,44 @@ def test_what_is_no_value_cannot_be_written_or_named():
     forged = encode(toys.Number(1.0)).replace(b"toys.Number", b"os.PathLike")
     with pytest.raises(BadEncoding, match=r"unknown value type 'os\.PathLike'"):
         decode(forged)
+
+
+def test_fields_of_others_values_are_known_by_their_names(monkeypatch: pytest.MonkeyPatch):
+    class Pair(Value):
+        x: float
+        y: float
+
+    one, several = encode(Pair(1.0, 2.0)), encode_all([Pair(1.0, 2.0)] * 2)
+    name = value_name(Pair)
+
+    class Turned(Value):
+        y: float
+        x: float
+        z: float = 0.0
+
+    monkeypatch.setitem(VALUE_TYPES, name, Turned)
+    for back in (decode(one), *decode_all(several, 2)):
+        assert (back.x, back.y, back.z) == (1.0, 2.0, 0.0)
+
+    class Renamed(Value):
+        x: float
+        width: float
+
+    monkeypatch.setitem(VALUE_TYPES, name, Renamed)
+    with pytest.raises(BadEncoding, match="has the fields x, width now, x, y in the file"):
+        decode(one)
+
+
+def test_a_value_of_a_file_is_read_where_the_file_lies_elsewhere_now(monkeypatch: pytest.MonkeyPatch):
+    class Level(Value):
+        height: float
+
+    monkeypatch.setattr(Level, "__module__", "omninav_plugin_levels_0123abcd")
+    written = encode(Level(1.5)).replace(b"0123abcd", b"89efcdab")
+    with pytest.raises(BadEncoding, match="unknown value type"):
+        decode(written)
+    monkeypatch.setitem(VALUE_TYPES, value_name(Level), Level)
+    assert decode(written).height == 1.5
 
 
 @given(st.data())

@@ -168,6 +168,14 @@ WRONG: dict[str, tuple[dict, dict, list[str]]] = {
         {"enter": ENTER, "look": {"ledger": {**DELAYED, "initial": "other.ledger"}}},
         [".ledger.initial: enter.ledger is one Ledger: all its delayed wires need the same initial value"],
     ),
+    "what is updated in place, read from before the loop": (
+        LEDGER,
+        {"enter": {**ENTER, "ledger": "new.ledger"}, "look": {"ledger": "enter.ledger"}},
+        [
+            "wires.enter.ledger: 'enter' updates the Ledger of 'new', and a resumed run would not know how",
+            "write wires.enter.ledger={from: enter.ledger, delay: 1, initial: new.ledger}",
+        ],
+    ),
     "what is updated in place, held": (
         LEDGER,
         {"enter": ENTER, "look": {"ledger": {"from": "enter.ledger", "hold": True}}},

@@ -46,6 +46,18 @@ def test_a_file_that_has_changed_is_loaded_anew_and_its_stages_have_the_version_
     assert [stage.step(Context("twice"), toys.Number(1.0)).number.value for stage in (first(), second)] == [2.0, 3.0]
 
 
+def test_the_files_that_a_path_parameter_names_are_inputs_of_a_stage(tmp_path: Path):
+    class Weighted(toys.Scale):
+        weights: Path = tmp_path / "weights"
+
+    assert Weighted().inputs_digest() is None  # there is no such file
+    digests = set()
+    for text in ("1", "2"):
+        (tmp_path / "weights").write_text(text)
+        digests.add(Weighted().inputs_digest())
+    assert len(digests - {None}) == 2
+
+
 def test_the_environment_offers_a_stage_by_name(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OMNINAV_STAGES", f"match.twice={stage_file}:Twice, match.scale=toys:Scale")
     assert resolve("match.twice").__name__ == "Twice"
