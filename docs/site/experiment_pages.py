@@ -63,7 +63,7 @@ def _included(match: re.Match[str]) -> str:
     if kind == "claims":
         if words not in sources(judged()):
             raise ValueError(f"{match[0]}: there is no such paper, expected one of {', '.join(sources(judged()))}")
-        return f"{counts(judged(), words)} [All of them](claims.md)."
+        return f"{counts(judged(), words)} Each judges the system as it was when measured: [all of them](claims.md)."
     if kind == "plot":
         drawn = _plot(words)
         return f"![{drawn.title}]({drawn.file})\n\n{drawn.caption}"

@@ -1,19 +1,21 @@
 """Pages of many experiments from their result files: one each, an index, and the list of the papers' claims."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from .intervals import CONFIDENCE
 from .page import markdown_page, number
 from .plots import plots_of
 from .result import ExperimentResult
-from .specification import Claim, Experiment
+from .specification import Claim, Experiment, comparison_of
 from .verdicts import Verdict, headline
 
 INDEX, CLAIMS = "results.md", "claims.md"
 """Files with the index and with the papers' claims."""
 TAIL = (1.0 - CONFIDENCE) / 2.0
 """Share of 95 % intervals that are wholly above the true value, and as many below."""
+VARIANT = re.compile(r"(?<!\S)variant=(\S+)")
+"""The variant in the words of a condition; the last one counts."""
 Judged = Sequence[tuple[Experiment, ExperimentResult]]
 """Experiments, each with its result."""
 
@@ -101,17 +103,33 @@ def counts(judged: Judged, source: str) -> str:
     """A sentence: how many of a paper's claims are judged, and how; and the same of those about the printed system."""
     of_paper = list(claims_of(judged, source))
     held = [verdict.holds for *_, verdict in of_paper]
-    printed = [verdict.holds for _, claim, verdict in of_paper if "as printed" in claim.paper.lower()]
+    printed = [verdict.holds for experiment, claim, verdict in of_paper if as_printed(experiment, claim)]
     of_printed = f"; of {len(printed)} as printed {_shares(printed)}" if printed else ""
+    if len(printed) == len(held):
+        of_printed = "; all are of the system as printed"
     return f"Of {len(held)} claims of this paper {_shares(held)}{of_printed}."
 
 
+def as_printed(experiment: Experiment, claim: Claim) -> bool:
+    """Tells whether a claim is about a printed system: by a label of either side, or by all its conditions' variant."""
+    sides = (claim.of, getattr(claim, comparison_of(claim)))
+    if any("as printed" in str(label) for side in sides if isinstance(side, Mapping) for label in side.values()):
+        return True
+    about = [each.overrides for each in experiment.conditions() if each.fits(claim.of)]
+    typed = [f"variant={experiment.variant} {experiment.common} {overrides}" for overrides in about]
+    return bool(typed) and all("as_printed" in VARIANT.findall(words)[-1] for words in typed)
+
+
 def by_chance(judged: Judged) -> str:
-    """A sentence: how many verdicts on the papers' claims chance would give."""
-    number = sum(1 for source in sources(judged) for _ in claims_of(judged, source))
+    """A sentence: how many verdicts on the papers' claims chance would give, by the cases that each claim has."""
+    claims = [(claim, len(verdict.cases)) for each in sources(judged) for _, claim, verdict in claims_of(judged, each)]
+    strict = [cases for claim, cases in claims if not claim.lowest and claim.not_above is None]
+    fail, hold = sum(1.0 - (1.0 - TAIL) ** cases for _, cases in claims), sum(TAIL**cases for cases in strict)
     return (
-        f"Each of the {number} verdicts is on a 95 % interval. Were no figure different from what it is compared with, "
-        f"chance would give some {number * TAIL:.0f} that hold and {number * TAIL:.0f} that do not."
+        f"The {len(claims)} verdicts have {sum(cases for _, cases in claims)} cases, each on a 95 % interval; a claim "
+        "fails with one of its cases. Were no figure different from what it is compared with, chance would give at "
+        f"most some {fail:.0f} that do not hold, and some {hold:.0f} that do; the {len(claims) - len(strict)} with a "
+        "margin would mostly hold."
     )
 
 

@@ -2,12 +2,13 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.page import markdown_page
-from omninav.pipeline.experiment.pages import Judged, claims_page, counts, index_page
+from omninav.pipeline.experiment.pages import Judged, by_chance, claims_page, counts, index_page
 from omninav.pipeline.experiment.result import Cell, ExperimentResult, result_text
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import Case
@@ -15,6 +16,7 @@ from omninav.pipeline.graph.problems import BadInput
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "experiments"
 CLAIM = {"statement": "it holds", "measure": "error", "at_most": 9.0}
+WHOLE = CLAIM | {"paper": "they say so", "where": "Table 1"}
 FILE = {
     "name": "one",
     "title": "One",
@@ -25,7 +27,7 @@ FILE = {
     "measures": {"error": {"title": "Error (cm)", "path": ["error"]}},
     "page": {"rows": [], "columns": "day"},
     "claims": {
-        "whole": CLAIM | {"paper": "they say so", "where": "Table 1"},
+        "whole": WHOLE,
         "part": CLAIM | {"statement": "… too", "paper": "as printed: so", "where": "section 2", "quote": "so it is"},
         "ours": CLAIM | {"statement": "so we think", "quote": "not said"},
         "unrun": CLAIM | {"paper": "it will", "where": "section 3"},
@@ -56,15 +58,34 @@ def test_each_claim_of_a_paper_stands_with_its_place_verdict_and_figure() -> Non
     assert f"| they say so | Table 1 | {link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases" in text
     shown = "Error (cm): 5.25, beside 9 (the limit), difference -1 to 1.50"
     assert f"| as printed: so | section 2 | {link}: … too | undecided | {shown} |" in text
-    assert counts(found, "A paper 2004") == (
-        "Of 2 claims of this paper 0 hold, 1 do not, and 1 are undecided; "
-        "of 1 as printed 0 hold, 0 do not, and 1 are undecided."
-    )
+    assert counts(found, "A paper 2004") == "Of 2 claims of this paper 0 hold, 1 do not, and 1 are undecided."
     assert "so we think" not in text  # no paper says it
     assert "it will" not in text  # no result judges it
     page = str(markdown_page(*found[0], ())["one.md"])
     assert "| … too (Error (cm)): **undecided** | as printed: so (section 2): “so it is” | second | 5.2 |" in page
     assert "| so we think (Error (cm)): **holds** | not said | first | 1.0 |" in page
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"variant": "one_as_printed"},
+        {"common": "variant=one_as_printed", "variant": "other"},
+        {"sweep": {"day": {"first": "variant=one_as_printed", "second": "variant=one_as_printed"}}},
+        {"sweep": {"day": {"as printed": ""}}, "claims": {"whole": WHOLE | {"of": {"day": "as printed"}}}},
+    ],
+)
+def test_a_claim_counts_as_printed_by_the_system_that_was_measured(changed: dict[str, Any]) -> None:
+    ((_, result),) = judged(whole=(case("", True, 3.0),))
+    found = [(read_experiment(FILE | changed, "full"), result), *judged(whole=(case("", None, 3.0),))]
+    assert "; of 1 as printed 1 hold, 0 do not, and 0 are undecided." in counts(found, "A paper 2004")
+    assert counts(found[:1], "A paper 2004").endswith(" undecided; all are of the system as printed.")
+
+
+def test_chance_follows_from_the_cases_of_each_claim() -> None:
+    many = tuple(case(str(number), True, 3.0) for number in range(60))
+    assert "2 verdicts have 61 cases" in by_chance(judged(whole=many, part=(case("", True, 3.0),)))
+    assert "at most some 1 that do not hold, and some 0 that do" in by_chance(judged(whole=many))
 
 
 @pytest.mark.parametrize(
