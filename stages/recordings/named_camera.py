@@ -36,7 +36,7 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
         )
     if name == "equirectangular" and width < LEAST_SIDES * height:
         raise UnreadableRecording(
-            f"camera={name}: images of {width} x {height} are no equirectangular ones, which are twice as wide as high, "
+            f"camera={name}: images of {width} x {height} are no equirectangular ones, twice as wide as high, "
             "or wider where they are a strip; a mirror's are camera=donut, or better a camera.yaml with its numbers"
         )
     camera = models[name].of_size(width, height) if name in models else None

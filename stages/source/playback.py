@@ -20,7 +20,7 @@ from omninav.stages.values.pose import Motion, Pose
 
 from .cuts import Cut
 from .dead_reckoning import DeadReckoning
-from .log_parts import LogPart, frozen_steps, parts_of, pauses
+from .log_parts import LogPart, frozen_steps, odometry_scale, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
 
 
@@ -157,6 +157,11 @@ class Playback(Source, ABC):
         if steps:
             still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
             ctx.warn(f"{recording.name}: {still}")
+        elif (times := odometry_scale(recording.odometry[part.frames], truth[part.frames])) is not None:
+            ctx.warn(
+                f"{recording.name}: odometry drives {times:.2g} times as far as ground truth: check that both are in "
+                "metres, and of the same robot"
+            )
 
     def _motion(
         self, ctx: Context, position: PlaybackState, part: LogPart, image: Image

@@ -167,7 +167,7 @@ def test_a_projection_comes_before_a_file_of_its_name(tmp_path: Path, monkeypatc
 
 
 def test_a_full_panorama_of_mirror_images_is_refused_and_a_strip_is_not() -> None:
-    with refused("images of 640 x 480 are no equirectangular ones, which are twice as wide as high"):
+    with refused("images of 640 x 480 are no equirectangular ones, twice as wide as high"):
         named_camera("equirectangular", lambda: (640, 480))
     assert named_camera("equirectangular", lambda: (720, 144))[0].elevations == pytest.approx(
         (0.2 * np.pi, -0.2 * np.pi)
