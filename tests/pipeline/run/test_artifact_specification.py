@@ -30,6 +30,21 @@ def of_file(file: Path | None) -> dict[str, Any]:
     return configuration(file=None if file is None else str(file), required=False)
 
 
+@pytest.mark.parametrize(("inputs", "stop", "told"), [("same", 0, 1), ("same", 3, 0), ("other", 0, 0)])
+def test_an_artifact_of_the_input_that_is_run_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, inputs: str, stop: int, told: int
+) -> None:
+    monkeypatch.setattr(toys.Count, "inputs_digest", lambda self: inputs if self.logs > 1 else "same")
+    config = two_of_one_graph(tmp_path)
+    config["nodes"]["source"] |= {"gap": stop}
+    config["artifacts"]["map"] |= {"made_from": ["tour"]}
+    if inputs == "other":
+        config["nodes"]["source"] |= {"logs": 2}
+    warnings = ended(config).manifest["warnings"]
+    sentence = "map: it is made from the input of this run, so figures are too good; give another tour=…"
+    assert warnings == [sentence] * told
+
+
 @pytest.fixture
 def known(tmp_path: Path) -> Path:
     write_artifact(tmp_path / "known.omap", toys.Number(3.0))
