@@ -258,6 +258,13 @@ def test_odometry_that_stands_still_while_ground_truth_moves_is_said(tmp_path: P
     ]
 
 
+@pytest.mark.parametrize(("rate", "told"), [(0.01, ["rate=0.01 uses 1 of 20 images: type"]), (1.0, []), (None, [])])
+def test_a_rate_that_uses_hardly_an_image_is_told(log: str, rate: float | None, told: list[str]) -> None:
+    ctx = Context("source")
+    LogSource(log=log, rate_hz=rate).setup(ctx)
+    assert [line[: len(begins)] for line, begins in zip(ctx.warnings, told, strict=True)] == told
+
+
 def test_odometry_that_drives_farther_than_ground_truth_is_said() -> None:
     truth = np.column_stack([np.arange(40) * 0.2, np.zeros((40, 2))])
     part = LogPart(SimpleNamespace(name="log", odometry=3.0 * truth), np.arange(40), truth, truth, "measured")  # type: ignore[arg-type]
