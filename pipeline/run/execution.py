@@ -113,7 +113,7 @@ def _running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | N
         with whole_file(run.folder / recorded_name(origin)) as part:
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)
-    _finish(run, engine, prefix.reason, same_inputs(prepared, run.manifest["inputs"]))
+    _finish(run, engine, prefix.reason, _doubts(prepared, run.manifest["inputs"], engine.ticks))
 
 
 def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
@@ -122,6 +122,13 @@ def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
     if steps > ticks:
         what = f"{steps - ticks:,} of {counted(steps, 'frame')}"
         report_damage(f"{run.folder}: the last {what} were not kept; omninav.resume takes them again")
+
+
+def _doubts(prepared: PreparedRun, inputs: dict[str, str], ticks: int) -> list[str]:
+    """Warnings on the run as a whole."""
+    source = prepared.graph.source
+    nothing = [f"{source.name} gave no tick, so nothing has run in the loop"] if source and not ticks else []
+    return nothing + same_inputs(prepared, inputs)
 
 
 def _finish(run: RunFolder, engine: Engine, prefix_reason: str, doubts: list[str]) -> None:

@@ -45,6 +45,12 @@ def test_an_artifact_of_the_input_that_is_run_is_told(
     assert warnings == [sentence] * told
 
 
+def test_a_source_that_gives_no_tick_is_told(tmp_path: Path) -> None:
+    graph = graph_of_toys({"source": "Count"}, {}, variant="toy", runs=str(tmp_path))
+    graph["nodes"]["source"] |= {"length_": 0}
+    assert ended(graph).manifest["warnings"] == ["source gave no tick, so nothing has run in the loop"]
+
+
 @pytest.fixture
 def known(tmp_path: Path) -> Path:
     write_artifact(tmp_path / "known.omap", toys.Number(3.0))
