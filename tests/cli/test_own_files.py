@@ -8,7 +8,7 @@ from hydra._internal.core_plugins.importlib_resources_config_source import Impor
 from hydra.core.global_hydra import GlobalHydra
 
 from omninav.pipeline.cli.composition import complete, composed
-from omninav.pipeline.cli.config_groups import group_options, listed_groups
+from omninav.pipeline.cli.config_groups import group_options, listed_groups, suggest_option
 from omninav.pipeline.cli.config_sources import OwnFiles
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.graph.registry import is_role, of_role
@@ -95,3 +95,9 @@ def test_a_source_of_ones_own_is_told_how_to_replace_the_option(tmp_path: Path, 
         prepare_run(settings)
     assert ("write `override /source: null` below `defaults:`" in str(found.value)) is hinted
     assert ("Count has no parameter" in str(found.value)) is hinted
+
+
+def test_an_option_that_is_offered_twice_is_told_to_be_left_out_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", "features.lab=toys:Scale,features.lab=toys:Add")
+    said = suggest_option("features", "lab", ["hsv"], "options")
+    assert said == "'features.lab' is toys:Scale and toys:Add in OMNINAV_STAGES; leave all but one out"
