@@ -18,8 +18,9 @@ from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.headlines import headline_rows
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing
+from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing, refuse_experiment
 from omninav.pipeline.run.prepared_run import load_stages
+from omninav.pipeline.run.resume import command_to_resume
 from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
 from omninav.pipeline.tables import read_table
 
@@ -68,6 +69,7 @@ class Run:
                 raise BadInput(
                     f"{folder}: a sweep, not a run folder; name a job of it, such as {shlex.quote(str(job))}"
                 )
+            refuse_experiment(self.folder)
             raise BadInput(f"{folder}: not a run folder (no {MANIFEST}); `ls runs` shows what there is")
 
     @property
@@ -141,7 +143,9 @@ class Run:
     def _file(self, name: str) -> Path:
         file = self.folder / name
         if not file.is_file():
-            hint = f"`omninav resume {shlex.quote(str(self.folder))}` continues a run that did not end"
+            hint = f"`{command_to_resume(self.folder)}` continues a run that did not end"
+            if self.status == "complete":
+                hint = f"a run of {self.manifest.get('variant')} leaves none"
             raise BadInput(f"{self.folder}: no {name} in it; {hint}")
         return file
 

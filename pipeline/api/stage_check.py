@@ -3,6 +3,8 @@
 import inspect
 import types
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import MISSING
 from typing import Any, Union, get_args, get_origin
 
 import numpy as np
@@ -14,7 +16,7 @@ from omninav.pipeline.graph.signature import Signature, signature
 from omninav.pipeline.graph.stage import Context, Stage, State
 from omninav.pipeline.graph.value import Value
 
-MAX_SUMMARY = 120
+MIN_SUMMARY, MAX_SUMMARY = 21, 120
 """Characters of a docstring's first line, which tables show."""
 
 
@@ -30,7 +32,7 @@ def check_stage(
     everything that is wrong.
     """
     cls = stage if inspect.isclass(stage) else type(stage)
-    wrong = list(broken_promises(cls))
+    wrong = [*broken_promises(cls)] or [*_unfit_frames(stage, cls, frames)]
     outputs: list[dict[str, Any]] = []
     if not wrong and frames:
         made = stage() if inspect.isclass(stage) else stage
@@ -48,8 +50,9 @@ def broken_promises(cls: type[Stage]) -> Iterator[str]:
         yield str(error)
         return
     summary = first_line(cls)
-    if not (20 < len(summary) <= MAX_SUMMARY and summary.endswith(".")):
-        yield f"its docstring begins with {summary!r:.60}, expected a sentence on one line of at most {MAX_SUMMARY}"
+    if not (MIN_SUMMARY <= len(summary) <= MAX_SUMMARY and summary.endswith(".")):
+        size = f"{MIN_SUMMARY} to {MAX_SUMMARY} characters"
+        yield f"its docstring begins with {summary!r:.60}, expected a sentence on one line, with a full stop, of {size}"
     for port in [*read.inputs.values(), *read.outputs.values()]:
         if not all(inspect.isclass(kind) and issubclass(kind, Value) for kind in _kinds(port.type)):
             yield f"port '{port.name}' is {port.type}, expected a class derived from Value"
@@ -64,6 +67,25 @@ def broken_promises(cls: type[Stage]) -> Iterator[str]:
             yield f"its State cannot be saved from the first tick on: {error}"
 
 
+def _unfit_frames(stage: type[Stage] | Stage, cls: type[Stage], frames: Any) -> Iterator[str]:
+    """What keeps `step` from being called with some frames."""
+    read, step = signature(cls), inspect.signature(cls.step).parameters
+    lacking = [name for name, each in read.parameters.items() if each.default is MISSING]
+    if stage is cls and lacking and len(frames):
+        yield f"{lacking[0]} has no default; check a stage that is made with it: {cls.__name__}({lacking[0]}=…)"
+    if not isinstance(frames, Sequence):
+        yield f"frames is a {type(frames).__name__}, expected a list with the inputs of each frame by name"
+        return
+    needed = {name for name in read.inputs if step[name].default is inspect.Parameter.empty}
+    for number, frame in enumerate(frames):
+        if not isinstance(frame, Mapping):
+            yield f"frame {number} is a {type(frame).__name__}, expected its inputs by name: {', '.join(read.inputs)}"
+        elif unknown := frame.keys() - read.inputs.keys():
+            yield f"frame {number}: there is no input {', '.join(map(str, unknown))}; inputs: {', '.join(read.inputs)}"
+        elif missing := needed - frame.keys():
+            yield f"frame {number}: {', '.join(sorted(missing))} is missing; give None where there is none"
+
+
 def _kinds(kind: Any) -> list[Any]:
     if get_origin(kind) in (Union, types.UnionType):
         return [inner for option in get_args(kind) for inner in _kinds(option)]
@@ -75,7 +97,8 @@ def _checked_steps(
 ) -> tuple[list[str], list[dict[str, Any]]]:
     read, wrong = signature(type(stage)), []
     before = [encode(dict(frame)) for frame in frames]
-    outputs = _steps(stage, read, frames, seed)
+    given: list[Any] = []
+    outputs = _steps(stage, read, frames, seed, copies=given)
     for number, out in enumerate(outputs):
         for name, port in read.outputs.items():
             what = wrong_output(out[name], port.type, port.optional)
@@ -84,6 +107,9 @@ def _checked_steps(
     if not any(port.type is not None and getattr(port.type, "in_place", False) for port in read.inputs.values()):
         after = [encode(dict(frame)) for frame in frames]
         wrong += [f"frame {n}: it changes its inputs" for n in range(len(frames)) if before[n] != after[n]]
+    if not wrong and not any(getattr(port.type, "in_place", False) for port in read.outputs.values()):
+        changed = [n for n, out in enumerate(outputs) if encode(out) != encode(given[n])]
+        wrong += [f"frame {n}: its output is changed in a later frame; give a new array each time" for n in changed]
     if not wrong:
         first = encode(outputs)
         if encode(_steps(stage, read, frames, seed)) != first:
@@ -94,9 +120,17 @@ def _checked_steps(
 
 
 def _steps(
-    stage: Stage, read: Signature, frames: Sequence[Mapping[str, Any]], seed: int, again_at: int | None = None
+    stage: Stage,
+    read: Signature,
+    frames: Sequence[Mapping[str, Any]],
+    seed: int,
+    again_at: int | None = None,
+    copies: list[Any] | None = None,
 ) -> list[dict[str, Any]]:
-    """The outputs for all frames; with `again_at` another copy of the stage continues there from what was saved."""
+    """The outputs for all frames; with `again_at` another copy of the stage continues there from what was saved.
+
+    `copies` gets a copy of the outputs of each frame as they were then.
+    """
     ctx = Context("checked", np.random.default_rng(seed))
     stage, state = _copy_of(stage, read, ctx)
     outputs = []
@@ -112,6 +146,8 @@ def _steps(
         scratch = {} if read.state is None else {read.state[0]: state}
         out = stage.step(ctx, **frame, **scratch)
         outputs.append({name: None if out is None else getattr(out, name) for name in read.outputs})
+        if copies is not None:
+            copies.append(deepcopy(outputs[-1]))
     return outputs
 
 

@@ -145,11 +145,15 @@ def _unknown_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
 
     `read`: the settings that the graph and the run read.
     """
-    groups = {item for entry in config_file()["defaults"] if isinstance(entry, Mapping) for item in entry}
-    known = {*config_file(), *groups, *OF_OTHERS, *read}
+    known = {*config_file(), *_groups(), *OF_OTHERS, *read}
     for name in config:
         if name not in known:
             yield Problem(str(name), "there is no such setting", suggest(str(name), known, "settings"))
+
+
+def _groups() -> set[str]:
+    """The groups of options that every configuration chooses from."""
+    return {item for entry in config_file()["defaults"] if isinstance(entry, Mapping) for item in entry}
 
 
 def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
@@ -157,8 +161,10 @@ def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
     hints = {name: hint for _, _, rule in stand_ins() for name, hint in rule["unread"].items()}
     elsewhere = {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open(), *_taken_over(config)}
     typed = {str(name).partition(".")[0] for name in config.get(TYPED) or ()}
-    for name in sorted({*hints, *config_file()} & typed - {*read} - elsewhere):
-        yield Problem(name, "nothing in this run reads it", hints.get(name, f"leave {name}=… out"))
+    emptied = {name for name in typed & _groups() if name in config and config[name] is None}  # by another option
+    for name in sorted(({*hints, *config_file()} & typed - {*read} - elsewhere) | emptied):
+        leave = f"leave {name}=… out"
+        yield Problem(name, "nothing in this run reads it", leave if name in emptied else hints.get(name, leave))
 
 
 def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:

@@ -45,6 +45,8 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
     if group in config_file() and not is_group(group):
         return f"a folder {group} in the --config-dir makes a group of this setting; move or rename that folder"
     for entry in plugins():
+        if entry.name == f"{group}.{option}":
+            return entry.problem or f"`omninav stages {group}` says what is wrong with it"
         if entry.name.partition(".")[2] == option:
             return f"OMNINAV_STAGES or a package names it '{entry.name}'; here it must be '{group}.{option}'"
     return replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)

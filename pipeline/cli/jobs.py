@@ -2,7 +2,6 @@
 
 import json
 import os
-import shlex
 import sys
 import traceback
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from omninav.pipeline.report.sweep_table import overview_of
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.metrics_files import read_metrics
 from omninav.pipeline.run.prepared_run import Prepare, prepare_run
-from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.resume import command_to_resume, resume
 from omninav.pipeline.run.run_folder import Interrupted, start, was_started
 
 from .composition import complete
@@ -96,7 +95,7 @@ def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run)
         of_a_file = as_bad_input(failed.__cause__) if failed.__cause__ is not None else None
         code, error = (1, str(failed)) if of_a_file is None else (2, f"{of_a_file} ({failed})")
     except Interrupted as stopped:
-        code, error = 130, f"stopped; `omninav resume {shlex.quote(shown(stopped.folder))}` continues it"
+        code, error = 130, f"stopped; `{command_to_resume(stopped.folder, shown(stopped.folder))}` continues it"
     except KeyboardInterrupt:
         code, error = 130, "stopped; the same command continues it" if of_experiment else "stopped before it had begun"
     except BrokenPipeError:

@@ -20,7 +20,7 @@ from .typing_mistakes import command_first, mistyped_word, with_homes
 COMMANDS = tuple(each.name for each in iter_modules(commands.__path__) if each.name not in ("run", "tool"))
 """Each is the function `command` of its module in `commands`; all else is a tool, or runs a variant or experiment."""
 
-WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "experiments", "doctor")
+WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "doctor")
 """Those that compose none, and have no use for flags of it."""
 
 

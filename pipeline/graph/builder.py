@@ -11,7 +11,7 @@ from .ordering import Following
 from .parameters import BadStage
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
-from .registry import UnknownStage, entries, resolve
+from .registry import BUILT_IN, UnknownStage, entries, resolve
 from .signature import Port, signature
 from .value import Tick
 
@@ -112,6 +112,9 @@ class _Builder:
             return None
         path = where if name in self.shared else self.prefix + where
         parameters, found = convert_fields(spec, cls, path, skip=("_target_",))
+        if found and not target.startswith(f"{BUILT_IN}.") and found[0].what.startswith(f"{cls.__name__} has no"):
+            of_option = f"if an option of its own sets it, write `override /{name}: null` below `defaults:`"
+            found[0] = dataclasses.replace(found[0], hint=f"{found[0].hint}; {of_option}".removeprefix("; "))
         self.problems += found
         if found:  # with default parameters, where each has one, so that its wires are checked too
             needed = any(parameter.default is dataclasses.MISSING for parameter in read.parameters.values())

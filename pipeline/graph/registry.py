@@ -86,17 +86,22 @@ def resolve(target: str) -> type[Stage]:
     return thing
 
 
+def module_of(target: str) -> str:
+    """The module, or the file, that a target's class is in; empty where it names none."""
+    return target.rpartition(":" if ":" in target else ".")[0]
+
+
 def _thing(target: str) -> Any:
     named = {entry.name: entry.target for entry in plugins() if not entry.problem}
     target = named.get(target, target)
-    module_name, _, class_name = target.rpartition(":") if ":" in target else target.rpartition(".")
+    module_name = module_of(target)
     if not module_name:
         raise UnknownStage(f"'{target}' is no full name; write package.module.Class or path/to/file.py:Class")
     typed = _TYPED.get()
     if typed is not None and not {target, module_name} & {*typed} and not is_listed(target):
-        again = f"if you trust it, name it behind the folder, as in omninav resume FOLDER {module_name}"
+        again = f"if you trust it, name it behind the folder: … FOLDER {module_name}"
         raise BadInput(f"{cut(target)} is code that `omninav stages` does not list, and is not run unasked; {again}")
-    module = _load(module_name)
+    module, class_name = _load(module_name), target[len(module_name) + 1 :]
     thing = getattr(module, class_name, None)
     if thing is None:
         here = [name for name, value in vars(module).items() if _is_stage(value)]

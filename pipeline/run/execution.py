@@ -27,7 +27,7 @@ from omninav.pipeline.report.run_page import write_report
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
 from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
-from .prepared_run import PreparedRun
+from .prepared_run import PreparedRun, same_inputs
 from .run_folder import CONFIG, STEPS, Interrupted, RunFolder, recorded_name
 from .run_results import notes_of, results_of
 from .timing import stage_times
@@ -113,7 +113,7 @@ def _running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | N
         with whole_file(run.folder / recorded_name(origin)) as part:
             engine.sequences[origin].flush()
             shutil.copyfile(engine.sequences[origin].path, part)
-    _finish(run, engine, prefix.reason)
+    _finish(run, engine, prefix.reason, _doubts(prepared, run.manifest["inputs"], engine.ticks))
 
 
 def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
@@ -124,7 +124,14 @@ def _say_what_is_missing(run: RunFolder, ticks: int) -> None:
         report_damage(f"{run.folder}: the last {what} were not kept; omninav.resume takes them again")
 
 
-def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
+def _doubts(prepared: PreparedRun, inputs: dict[str, str], ticks: int) -> list[str]:
+    """Warnings on the run as a whole."""
+    source = prepared.graph.source
+    nothing = [f"{source.name} gave no tick, so nothing has run in the loop"] if source and not ticks else []
+    return nothing + same_inputs(prepared, inputs)
+
+
+def _finish(run: RunFolder, engine: Engine, prefix_reason: str, doubts: list[str]) -> None:
     metrics, plots, tables = results_of(engine)
     notes, timing = notes_of(engine), stage_times(engine)
     write_metrics(run.folder, metrics)
@@ -147,7 +154,7 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
         "ticks": engine.ticks,
         "dropped": dropped,
         "facts": facts | notes["facts"],
-        "warnings": warnings + notes["warnings"],
+        "warnings": doubts + warnings + notes["warnings"],
         "prefix": prefix_reason,
     }
     for kind, entry in dropped.items():

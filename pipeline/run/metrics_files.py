@@ -31,7 +31,10 @@ def read_metrics(folder: Path) -> Metrics:
     Raises `BadInput` where there are none, or not those that the run wrote.
     """
     file, description = folder / "metrics.json", folder / "quantities.json"
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: there is no such folder; `ls runs` shows what there is")
     if not file.is_file():
+        refuse_experiment(folder)
         raise BadInput(f"{folder}: no metrics.json in it; is it a run that ended?")
     values = _read(file)
     if not description.is_file():
@@ -42,6 +45,14 @@ def read_metrics(folder: Path) -> Metrics:
         return Metrics(values, specs, tuple(described["headlines"]), tuple(described["details"]))
     except (LookupError, TypeError, AttributeError, ValueError):
         raise _damaged(description) from None
+
+
+def refuse_experiment(folder: Path) -> None:
+    """Raise `BadInput` for the folder of an experiment, which is no run, with its page."""
+    if (folder / "experiment.json").is_file():
+        page = next(iter(sorted(folder.glob("*.html"))), None)
+        seen = f"open {page}" if page else f"`omninav resume {shlex.quote(str(folder))}` continues it"
+        raise BadInput(f"{folder}: an experiment, not a run; {seen}")
 
 
 def read_timing(folder: Path) -> dict[str, Any]:

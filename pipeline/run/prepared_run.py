@@ -11,7 +11,7 @@ from typing import Any
 from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, check_artifact, type_and_facts
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.graph.builder import build
-from omninav.pipeline.graph.graph import ARTIFACTS, Graph
+from omninav.pipeline.graph.graph import ARTIFACTS, Graph, Node
 from omninav.pipeline.graph.ports import convert, type_name
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
@@ -264,6 +264,27 @@ def input_digests(prepared: PreparedRun) -> dict[str, str]:
         elif artifact.file is not None:
             digests[artifact.name] = artifact_digest(artifact.file)
     return digests
+
+
+def same_inputs(prepared: PreparedRun, digests: Mapping[str, str]) -> list[str]:
+    """Sentences on artifacts that are made from the very input that the run goes through; `digests` as above."""
+    specs, own = read_specifications(prepared.config), prepared.graph.source
+    found = []
+    for artifact in prepared.artifacts:
+        other = None if artifact.graph is None else artifact.graph.source
+        spec = specs[artifact.name]
+        if own is None or other is None or spec.together_with is not None:
+            continue
+        if digests.get(f"{artifact.name}.{other.name}", "") == digests.get(own.name) and _choice(own) == _choice(other):
+            give = "".join(f"; give another {setting}=…" for setting in spec.made_from[:1])
+            found.append(f"{artifact.name}: it is made from the input of this run, so figures are too good{give}")
+    return found
+
+
+def _choice(source: Node) -> dict[str, Any]:
+    """The numbers that choose what is used of a source's input."""
+    values = {name: getattr(source.stage, name) for name in source.signature.parameters}
+    return {name: value for name, value in values.items() if isinstance(value, int | float)}
 
 
 def check_inputs(prepared: PreparedRun) -> None:

@@ -13,8 +13,9 @@ from omninav.pipeline.engine.damage import report_damage
 from omninav.pipeline.files import Damaged, digest_file, digest_text, read_json
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.graph.registry import is_listed, module_of
 from omninav.pipeline.graph.results import Metrics
-from omninav.pipeline.graph.small_files import parse_yaml
+from omninav.pipeline.graph.small_files import parse_yaml, read_mapping
 
 from .artifacts import ProgressDisplay
 from .execution import execute
@@ -50,6 +51,22 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFol
     with run.owned():
         prepared = reopened(run, folder)
         return run, read_metrics(folder) if prepared is None else execute(run, prepared, display)
+
+
+def command_to_resume(folder: Path, shown: str = "") -> str:
+    """The command that continues the run in a folder (as `shown`), with the code that it asks to be typed."""
+    targets: list[str] = []
+    _find_targets(read_mapping(folder / CONFIG) if (folder / CONFIG).is_file() else {}, targets)
+    of_others = dict.fromkeys(module_of(target) for target in targets if not is_listed(target))
+    return shlex.join(["omninav", "resume", shown or str(folder), *of_others])
+
+
+def _find_targets(content: Any, found: list[str]) -> None:
+    for name, value in content.items() if isinstance(content, dict) else enumerate(content):
+        if name == "_target_":
+            found.append(str(value))
+        elif isinstance(value, dict | list):
+            _find_targets(value, found)
 
 
 def no_run(folder: Path) -> BadInput:

@@ -42,6 +42,8 @@ FAR_PX = 1e6
 """No place of a camera's image, and no radius in it, is further from its corner than this."""
 FAR_M = 20.0
 """Largest distance of a camera from its robot's origin along x or y, m."""
+MAX_HEIGHT_M = 10.0
+"""Largest height of a camera above its floor, m: more is a height in centimetres or millimetres."""
 MAX_DELAY_S = 10.0
 """Largest delay of a camera's images, early or late, s."""
 FocalX = Annotated[float, Key("K", 0), Bounds(ge=1, le=FAR_PX)]
@@ -90,7 +92,7 @@ class Camera(Value, ABC):
     height_px: Annotated[int, Key("image", "height"), Bounds(gt=0, le=MAX_SIDE)]
     """Rows of an image, pixels."""
     _: KW_ONLY
-    height: Annotated[float, Bounds(ge=0, le=1000)] | None = None
+    height: Annotated[float, Bounds(ge=0, le=MAX_HEIGHT_M)] | None = None
     """Height of the projection centre above the floor, m; None where it is not known."""
     yaw: Annotated[float, Bounds(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
     """Angle by which the camera is turned against the robot, radians, counter-clockwise."""
@@ -228,9 +230,9 @@ def seen_at(camera: Camera, rays: Array) -> Array:
     return np.where(shown[..., None], pixels, np.nan)
 
 
-SIGHT_STEPS, LEAST_SIGHT = (144, 73), 0.001
-"""Azimuths and elevations at which a camera is asked what it sees, and the share of the sphere that it must see: 7 by 7
-degrees."""
+SIGHT_STEPS, LEAST_SIGHT, LEAST_AROUND = (144, 73), 0.001, 0.75
+"""Azimuths and elevations at which a camera is asked what it sees, the share of the sphere that it must see: 7 by 7
+degrees, and the share of all azimuths that a ring must show."""
 
 
 def require_sight(camera: Camera) -> None:
@@ -250,6 +252,12 @@ def require_sight(camera: Camera) -> None:
         raise BadInput(
             f"camera: with these numbers a {camera.projection} camera of {camera.width} x {camera.height_px} pixels "
             f"sees {100 * share:.2g} % of all directions; check the model, the mask and the size in camera.yaml"
+        )
+    around = float(shown.any(axis=1).mean())
+    if camera.ring is not None and around < LEAST_AROUND:
+        raise BadInput(
+            f"camera: of the ring around ({camera.ring.centre_x:g}, {camera.ring.centre_y:g}) an image of "
+            f"{camera.width} x {camera.height_px} shows {100 * around:.0f} % of all azimuths; correct the centre"
         )
 
 

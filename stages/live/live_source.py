@@ -246,6 +246,8 @@ class LiveSource(Source):
 
     def _leave(self, ctx: Context, synchronizer: TimeSynchronizer) -> None:
         self._count_losses(ctx, synchronizer)
+        if gap := synchronizer.gap():
+            ctx.warn(gap)
         status = self._transport.status
         if status.latencies_ms is not None:
             ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1), of_run=True)

@@ -1,5 +1,6 @@
 """Inputs from a robot, put together: the newest image that odometry reaches, and what belongs to it."""
 
+import math
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -50,6 +51,8 @@ MAX_CLOCKS_S = 60.0
 """Difference of the newest stamps of images and odometry beyond which they are of different clocks (s)."""
 MAX_BEHIND_S = 1.0
 """Age of an image against odometry above which, once its clock was set back, odometry's was not (s)."""
+GAP_S = 5.0
+"""Wait for an image of a robot that had sent some above which a run's result tells of it, seconds."""
 UNUSED_S = 2.0
 """Images of which none becomes a tick for so long are a trouble."""
 
@@ -104,6 +107,8 @@ class TimeSynchronizer:
         self._received: dict[str, float] = {}
         self._used_any = self.last_stamp is not None
         self._last_used, self._counts_at_last = self._since, Counter[str]()
+        self._waits_since: float | None = math.inf
+        self._longest_wait = 0.0, 0
 
     def subscribe(self) -> None:
         """Ask for all topics. Of images, only the newest is kept while nobody takes them."""
@@ -119,6 +124,7 @@ class TimeSynchronizer:
     def next(self, wait_s: float) -> SyncedFrame | None:
         """The newest image that can be used, of all that has come; None where none can within that time."""
         until = time.monotonic() + wait_s
+        self._waits_since = until - wait_s if self._waits_since is None else self._waits_since
         while True:
             while (message := self.transport.take()) is not None:
                 self._take(message)
@@ -129,6 +135,19 @@ class TimeSynchronizer:
             message = self.transport.take(left)
             if message is not None:
                 self._take(message)
+
+    def gap(self) -> str:
+        """Sentence on the longest wait for an image since the first one that was used; "" where it was short."""
+        self._end_wait()
+        seconds, stamp = self._longest_wait
+        if seconds < GAP_S:
+            return ""
+        return f"the robot sent no image that could be used for {seconds:.0f} s after that of {stamp / 1e9:.3f} s"
+
+    def _end_wait(self) -> None:
+        if self._waits_since is not None:
+            self._longest_wait = max(self._longest_wait, (time.monotonic() - self._waits_since, self.last_stamp or 0))
+            self._waits_since = None
 
     def watch(self) -> None:
         """Note what is missing, and what is well again."""
@@ -360,6 +379,7 @@ class TimeSynchronizer:
         frame, scans = made
         self._without_scan = frame.scan is None
         messages = [*self.recordable(), *scans, image.message]
+        self._end_wait()
         self.last_stamp, self._used_any, self._earlier = image.stamp, True, None
         self._last_used, self._counts_at_last = time.monotonic(), self.counts.copy()
         self.status.taken(image.stamp, image.message.received)

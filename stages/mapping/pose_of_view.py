@@ -2,11 +2,20 @@
 
 from typing import Literal
 
-from omninav.pipeline import BadInput, Context
+from omninav.pipeline import BadInput, Context, counted
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import OWN_FRAMES, SOURCE_WORDS, Pose, PoseSource, frame_of
 
 Supervised = Literal["auto", "truth", "odometry"]
+FEW_VIEWS = 5
+"""Views up to which a map tells of one place only."""
+
+
+def warn_of_few(ctx: Context, views: int) -> None:
+    """Warn of a finished map of so few views that no robot is found by it."""
+    if views <= FEW_VIEWS:
+        has = f"has {counted(views, 'view')}, and a robot is found near those only"
+        ctx.warn(f"mapping: the map {has}; drive a tour of all places, an image every 0.5 m")
 
 
 def pose_of_view(

@@ -11,6 +11,8 @@ from omninav.stages.geometry.plane.drive_graph import closure_sigmas, straighten
 from omninav.stages.geometry.plane.se2 import distances_along
 from omninav.stages.values.maps import ReferenceGraph
 
+from .pose_of_view import warn_of_few
+
 SPECS = {
     "straightened.closures": MetricSpec(title="Loop closures found", context=True),
     "straightened.rejected": MetricSpec(title="Loop closures rejected, as the others contradict them", context=True),
@@ -39,6 +41,7 @@ class StraightenMap(Stage):
 
     def step(self, ctx: Context, map: ReferenceGraph, ticks: Sequence[Tick]) -> Out:
         """The finished map; `ticks` are collected so that it is finished."""
+        warn_of_few(ctx, len(map))
         if map.pose_source == "truth":
             return self.Out(map=map)
         unit = length_scale(map.poses, map.features, map.kind) if map.features.shape[1] > 1 else None

@@ -11,6 +11,8 @@ from omninav.stages.values.projection import Projection
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
 
+from .pose_of_view import warn_of_few
+
 SIGMA_M = 0.25
 """Standard deviation of a learned position, metres."""
 SIGMA_DEG = 10.0
@@ -54,4 +56,5 @@ class SupervisedViews(Stage):
                 "mapping: the tour has no ground truth; name it: tour_settings.truth=FILE or topics.truth=TOPIC"
             )
         ctx.fact("map_poses", "truth")
+        warn_of_few(ctx, len(map))
         return self.Out(map=map)

@@ -16,6 +16,8 @@ from omninav.stages.values.local_features import LocalFeatures, view_features
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, TopologicalMap, stored
 
+from .pose_of_view import warn_of_few
+
 MAX_PATH_STEP = 5
 """Views of the drive from one path image to the next, the paper's 1 to 5 m."""
 WINDOW = 3
@@ -55,6 +57,7 @@ class TopologicalMapping(Stage):
         rooms: Rooms | None = None,
     ) -> Out:
         """The whole tour at once."""
+        warn_of_few(ctx, len(views))
         place = hypotheses.place
         made = self._assembled(views, place, known)
         spread = spread_to_medoids(made, views, place) if self.spread == "within_places" else views.deviation()

@@ -20,6 +20,9 @@ JUMP_M = 0.5
 """Distance between true motion and odometry of one frame from which the robot was kidnapped, metres."""
 JUMP_DEG = 15.0
 """Largest difference of their turns, degrees."""
+MAX_KIDNAPPED, MAX_SHARE = 4, 0.2
+"""Kidnappings in a drive, and their share of its frames, of which one may be exceeded: odometry that misses the truth
+in more frames is of another unit, and nobody carried the robot."""
 
 
 class KidnapRecovery(MetricStage):
@@ -60,4 +63,9 @@ def kidnapped_rows(log: Drive, jump_m: float, jump_deg: float = 360.0) -> Ints:
     true: Array = between(log.truth[:-1], log.truth[1:])
     gap = true - log.motion[1:]
     jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))
-    return np.flatnonzero(jumped) + 1
+    return rare(np.flatnonzero(jumped) + 1, len(log))
+
+
+def rare(rows: Ints, frames: int) -> Ints:
+    """Rows of kidnappings among so many frames; none where they are too many to be some."""
+    return rows[:0] if len(rows) > max(MAX_KIDNAPPED, MAX_SHARE * frames) else rows

@@ -10,6 +10,8 @@ from omninav.stages.geometry.plane.pose_errors import first_settled, heading_err
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
 
+from .kidnap_recovery import rare
+
 UNIMODAL_SHARE = 0.5
 """Share of the belief that its heaviest mode must hold to be the only one; from a half on no other is as heavy."""
 KIDNAPPED_M = 1.0
@@ -80,4 +82,4 @@ def kidnapped_before(drive: Drive, min_distance_m: float) -> Ints:
     """Frames before which the robot was kidnapped: its true position is that far from where its odometry leads."""
     led = compose(drive.truth[:-1], np.nan_to_num(drive.motion[1:]))
     off = np.hypot(*(drive.truth[1:, :2] - led[:, :2]).T)
-    return np.flatnonzero(off > min_distance_m) + 1
+    return rare(np.flatnonzero(off > min_distance_m) + 1, len(drive))

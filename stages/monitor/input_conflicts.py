@@ -479,9 +479,9 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
             "wheels' driver runs"
         )
     if abs(math.log2(fit.scale)) > MISSCALED_OCTAVES:
-        times = float(f"{1.0 / fit.scale:.3g}")
+        times = float(f"{1.0 / fit.scale:.2g}")
         return (
-            f"odometry is {times:g} times as long as the way between the best matches in the map ({agree}):"
+            f"odometry is about {times:g} times as long as the way between the best matches in the map ({agree}):"
             " check the unit of both (m), and the wheels' diameter"
         )
     if abs(fit.angle) > MISTURNED:

@@ -32,6 +32,8 @@ OTHER_SIZE = 1.5
 """Ratio of an image's centre to half its sides above which it is of another resolution."""
 SAME_SIDES = 0.1
 """Relative difference up to which the ratios of columns and rows agree."""
+UNITS = {"height": ", in metres above the floor", "yaw": ", in radians", "delay": ", in seconds"}
+"""Units of keys that are often given in others, for messages."""
 MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of a pixel or more"
 
 
@@ -57,8 +59,8 @@ def camera_from(content: Any, where: str, size: tuple[int, int] | None = None) -
     _refuse_misspelt(content, known, where)
     try:
         camera = model(**{name: value for name, value in found.items() if value is not None})
-        require_sight(camera)
         _require_own_centre(camera)
+        require_sight(camera)
     except (ValueError, BadInput) as error:
         raise UnreadableRecording(f"{where}: {error}") from None
     return camera
@@ -182,7 +184,7 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
                 raise UnreadableRecording(f"{where}: '{path}' must {expected}, not {shown(part)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
-            what = f" {MATRIX}" if isinstance(key.name, int) else f": {problems[0].what}"
+            what = f" {MATRIX}" if isinstance(key.name, int) else f": {problems[0].what}{UNITS.get(path, '')}"
             raise UnreadableRecording(f"{where}: '{path}'{what}")
         return converted
     if parameter.default is dataclasses.MISSING:

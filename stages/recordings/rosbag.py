@@ -26,6 +26,8 @@ from .topics import record_topics
 STEPS, MIN_STEPS, STEPS_PER_BYTE = 10_000, 2_000_000, 20
 """SQLite calls the progress handler every `STEPS` steps of its virtual machine. A query may take `MIN_STEPS`, and
 `STEPS_PER_BYTE` more for each byte of the file: a row has at least 25 bytes and takes some 30 steps."""
+ROS1 = b"#ROSBAG V2.0"
+"""What a bag of ROS 1 begins with."""
 MIN_VALUE_BYTES = 1_000_000
 """Size up to which a value in an SQLite file is always accepted, however small the file is."""
 
@@ -166,6 +168,13 @@ class BagFeed(Losses):
         for part in (path / "metadata.yaml", *path.glob("*.db3")) if path.is_dir() else (path,):
             if part.exists() and not part.is_file():
                 raise UnreadableRecording(f"{part}: this is a folder, a pipe or a device, expected a file")
+        if path.suffix == ".bag" and path.is_file():
+            with path.open("rb") as file:
+                if file.read(len(ROS1)) != ROS1:
+                    raise UnreadableRecording(
+                        f"{path}: this is no bag of ROS 1, which begins with '{ROS1.decode()}'; if it is another kind "
+                        "of recording, rename it to end as such files do (.mcap, .db3, .mp4)"
+                    )
         self._stated: dict[str, int] = {}
         self._sound_types: set[str] = set()
         files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]

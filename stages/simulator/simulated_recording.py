@@ -50,7 +50,7 @@ class SimulatedRecording(Recording):
     The same seed, route, day and kidnappings give the same bytes. Images can be asked for in any order.
     The day decides the line that is driven, the odometry's errors, the noise and which goods were moved. `collisions`
     counts contacts.
-    Raises `UnreadableRecording` for a route that the world does not have.
+    Raises `UnreadableRecording` for a route that the world does not have, or that leads nowhere.
     """
 
     def __init__(self, world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping] = ()) -> None:
@@ -119,6 +119,11 @@ class SimulatedRecording(Recording):
     def _schedule_images(self) -> None:
         timing, delivery = self.world.timing, self.world.delivery
         count = max(0, int(np.floor((self._seconds[-1] - FIRST_IMAGE_S) * timing.images + 1e-9)) + 1)
+        if not count:
+            raise UnreadableRecording(
+                f"route '{self.route}' of world '{self.world.name}' ends before its first image; give it two waypoints "
+                "at least 0.3 m apart"
+            )
         self._shots = FIRST_IMAGE_S + np.arange(count) / timing.images
         fate = self._stream("delivery").uniform(size=(count, 2))
         stamps = self._stamps(self._shots)

@@ -24,6 +24,9 @@ that was lifted."""
 MIN_JUMP_M, JUMP_RATIO, MAX_LEFT = 1.0, 10.0, 0.3
 """Smallest jump of truth against odometry (m, and times the median difference of their steps), and the share of it that
 may be left once the truth has jumped back."""
+STRIDE_M, MIN_STRIDES, MAX_RATIO = 1.0, 5, 2.0
+"""Metres of truth over which odometry is compared with it, well above its noise; how many of them at
+least; and the ratio of their lengths that neither slip nor wear explains."""
 OdometryKind = Literal["measured", "synthetic", "guessed"]
 
 
@@ -106,6 +109,24 @@ def frozen_steps(odometry: Array, truth: Array) -> tuple[int, float]:
             steps, metres = steps + length, metres + float(moved[at : at + length].sum())
         at += length
     return steps, metres
+
+
+def odometry_scale(odometry: Array, truth: Array) -> float | None:
+    """Times as far as truth that odometry drives, where that is no robot's error; else None.
+
+    Both are poses (N, 3) at the images, NaN where truth is not known. It is the median over strides of truth, so that
+    a robot that stood, slipped for a while or was carried changes nothing.
+    """
+    known = np.flatnonzero(np.isfinite(truth).all(axis=1))
+    if not len(known):
+        return None
+    ends = [known[0]]
+    for row in known[1:]:
+        if np.hypot(*(truth[row, :2] - truth[ends[-1], :2])) >= STRIDE_M:
+            ends.append(row)
+    true, driven = (np.hypot(*np.diff(poses[ends, :2], axis=0).T) for poses in (truth, odometry))
+    ratio = float(np.median(driven / true)) if len(true) >= MIN_STRIDES else 1.0
+    return None if 1.0 / MAX_RATIO <= ratio <= MAX_RATIO else ratio
 
 
 def truth_excursion(odometry: Array, truth: Array) -> tuple[int, int, float] | None:

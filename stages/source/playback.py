@@ -18,10 +18,14 @@ from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 
-from .cuts import Cut
+from .cuts import Cut, remaining_frames
 from .dead_reckoning import DeadReckoning
-from .log_parts import LogPart, frozen_steps, parts_of, pauses
+from .log_parts import LogPart, frozen_steps, odometry_scale, parts_of, pauses
 from .outputs import DriveOutputs, motion_of, pose_of
+
+LOW_RATE_HZ, LOW_SHARE, FEW_IMAGES = 0.2, 0.05, 3
+"""Images a second below which a rate is a slip if it uses less than this share of all images, and the number of images
+below which any rate is."""
 
 
 class PlaybackState(DeadReckoning):
@@ -75,6 +79,8 @@ class Playback(Source, ABC):
         for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
             ctx.warn(f"assumed: {sentence}")
         for sentence in dict.fromkeys([*self._doubts, *pauses(self._parts)]):
+            ctx.warn(sentence)
+        if sentence := self._few_used():
             ctx.warn(sentence)
         for part in self._parts:
             self._begin(ctx, part)
@@ -148,6 +154,15 @@ class Playback(Source, ABC):
             goal=None if live is None else live.goal,
         )
 
+    def _few_used(self) -> str:
+        """Sentence on a rate by which hardly any image is used; "" otherwise."""
+        used, chosen = sum(len(part.frames) for part in self._parts), slice(self.first, self.stop, self.stride)
+        taken = sum(len(remaining_frames(self.cuts, len(each.stamps))[chosen]) for each in self._opened)
+        few = self.rate_hz is not None and self.rate_hz < LOW_RATE_HZ and used < LOW_SHARE * taken
+        if self.rate_hz is None or used == taken or not (few or used < FEW_IMAGES):
+            return ""
+        return f"rate={self.rate_hz:g} uses {used} of {counted(taken, 'image')}: type a higher one, or leave it out"
+
     def _begin(self, ctx: Context, part: LogPart) -> None:
         """Say what one has to know of a drive before it begins."""
         recording, truth = part.recording, part.truth
@@ -157,6 +172,11 @@ class Playback(Source, ABC):
         if steps:
             still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
             ctx.warn(f"{recording.name}: {still}")
+        elif (times := odometry_scale(recording.odometry[part.frames], truth[part.frames])) is not None:
+            ctx.warn(
+                f"{recording.name}: odometry drives {times:.2g} times as far as ground truth: check that both are in "
+                "metres, and of the same robot"
+            )
 
     def _motion(
         self, ctx: Context, position: PlaybackState, part: LogPart, image: Image

@@ -226,6 +226,8 @@ def test_compare_and_report_print_tables(omninav, demo: Path, tmp_path: Path):
     assert "What happened, stretch by stretch" in (demo / "report.html").read_text()
     assert omninav("compare", str(demo)).returncode == 2
     assert omninav("report", str(tmp_path)).returncode == 2
+    assert "nowhere: there is no such folder" in omninav("compare", str(demo), "nowhere").stderr
+    assert "several side by side: omninav compare" in omninav("report", str(demo), str(demo)).stderr
     for command, word in (("report", "lost_m=1"), ("resume", "seed=3")):
         assert "keeps its settings" in omninav(command, str(demo), word).stderr
     cut_off = shutil.copytree(demo, tmp_path / "cut_off")

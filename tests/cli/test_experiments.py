@@ -269,6 +269,16 @@ def test_a_finished_experiment_is_found_and_its_folder_can_be_resumed(dice: Fini
     assert dice.computed() == before
 
 
+def test_a_finished_experiment_of_ones_own_has_pages_and_is_no_run(dice: Finished):
+    said = dice.go("experiments", "runs/dice_full", "pages", "--config-dir", "mine")
+    assert "claims: pages/claims.md" in said
+    for words in (("report",), ("explain",), ("compare", "runs/dice_full")):
+        ended = run_here(dice.place, *words, "runs/dice_full")
+        assert ended.returncode == 2
+        assert "an experiment, not a run; open " in ended.stderr
+        assert "dice_full/dice.html" in ended.stderr
+
+
 def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, place: Path):
     said = omninav("check", "--config-dir", "mine", "+experiment=laps", check=True).stdout
     assert "3 conditions (2 method, 2 noise), each with 2 repetitions in each of 6 scenarios" in said

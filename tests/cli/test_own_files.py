@@ -8,10 +8,11 @@ from hydra._internal.core_plugins.importlib_resources_config_source import Impor
 from hydra.core.global_hydra import GlobalHydra
 
 from omninav.pipeline.cli.composition import complete, composed
-from omninav.pipeline.cli.config_groups import group_options, listed_groups
+from omninav.pipeline.cli.config_groups import group_options, listed_groups, suggest_option
 from omninav.pipeline.cli.config_sources import OwnFiles
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.graph.registry import is_role, of_role
+from omninav.pipeline.run.prepared_run import prepare_run
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 
@@ -80,3 +81,23 @@ def test_another_program_of_hydras_in_the_same_process_does_not_find_them():
         providers = {each.provider for each in GlobalHydra.instance().config_loader().get_search_path().get_path()}
         assert "hydra" in providers
         assert "main" not in providers
+
+
+@pytest.mark.parametrize(("defaults", "hinted"), [("", True), ("  - override /source: null\n", False)])
+def test_a_source_of_ones_own_is_told_how_to_replace_the_option(tmp_path: Path, defaults: str, hinted: bool):
+    (tmp_path / "variant").mkdir()
+    node = "nodes: {source: {_target_: toys.Count}}\n"
+    head = f"# @package _global_\ndefaults:\n  - omniview_cml\n{defaults}  - _self_\n"
+    (tmp_path / "variant" / "mine.yaml").write_text(f"{head}variant: mine\n{node}")
+    with composed(["--config-dir", str(tmp_path), "variant=mine"]) as config:
+        settings = complete(config)
+    with pytest.raises(ProblemsFound) as found:  # of the wires, in any case
+        prepare_run(settings)
+    assert ("write `override /source: null` below `defaults:`" in str(found.value)) is hinted
+    assert ("Count has no parameter" in str(found.value)) is hinted
+
+
+def test_an_option_that_is_offered_twice_is_told_to_be_left_out_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", "features.lab=toys:Scale,features.lab=toys:Add")
+    said = suggest_option("features", "lab", ["hsv"], "options")
+    assert said == "'features.lab' is toys:Scale and toys:Add in OMNINAV_STAGES; leave all but one out"

@@ -55,6 +55,7 @@ def test_a_recorded_log_is_read_and_its_configuration_says_nothing_of_worlds():
         ((*LOGS, "kidnappings=[{at: 30.0, turn: 1.5}]"), "a robot is lifted in the built-in world alone; cuts="),
         ((*LOGS, "route=kitchen"), "route: nothing in this run reads it"),
         ((*LOGS, "world=office"), "world: nothing in this run reads it"),
+        (("source=live", "publish=ros2", "log=live", "world=office"), "world: nothing in this run reads it"),
         (("camera=camera.yaml",), "camera: without log=… nothing reads it"),
         (("speed=0.4", "rate=2"), "speed: without log=… nothing reads it"),
         (("variant=retrieval_mcl", "forgetting=none"), "forgetting: nothing in this run reads it"),

@@ -31,7 +31,7 @@ def test_in_its_loop_its_own_folder_is_named(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Engine, "tick", stop)
     assert main(RUN) == 130
     (folder,) = (tmp_path / "runs").glob("*_toy")
-    assert capsys.readouterr().err.splitlines()[-1] == f"stopped; `omninav resume runs/{folder.name}` continues it"
+    assert capsys.readouterr().err.splitlines()[-1] == f"stopped; `omninav resume runs/{folder.name} toys` continues it"
     assert main(["resume", str(folder), "toys"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == "stopped; the same command continues it"
 

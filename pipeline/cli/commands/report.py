@@ -1,5 +1,6 @@
 """`omninav report`: a run's results, and the path of its report; with `plots=all` drawn again."""
 
+import os
 import shlex
 from pathlib import Path
 
@@ -9,7 +10,8 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
-from omninav.pipeline.run.metrics_files import read_metrics
+from omninav.pipeline.run.metrics_files import read_metrics, refuse_experiment
+from omninav.pipeline.run.resume import command_to_resume
 
 
 def command(arguments: list[str]) -> int:
@@ -20,6 +22,9 @@ def command(arguments: list[str]) -> int:
     """
     plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
     named = [word for word in arguments if not word.startswith("plots=")]
+    if any(map(os.path.isdir, named[1:])):
+        several = shlex.join(["omninav", "compare", *named])
+        raise BadInput(f"report: give one run folder: omninav report runs/latest; several side by side: {several}")
     folder = Path(named[0] if named else "runs/latest").absolute()
     with only_listed(named[1:]), Progress() as progress:
         if plots:
@@ -32,11 +37,11 @@ def command(arguments: list[str]) -> int:
     if not (folder / "report.html").is_file():
         if not folder.is_dir():
             raise BadInput(f"{folder}: there is no such folder; `ls runs` shows what there is")
+        refuse_experiment(folder)
         if not (folder / "manifest.json").is_file():
             raise BadInput(f"{folder}: there is no run in it; `ls runs` shows what there is")
         raise BadInput(
-            f"{folder}: no report.html in it; `omninav resume {shlex.quote(str(folder))}` continues a run that did "
-            "not end"
+            f"{folder}: no report.html in it; `{command_to_resume(folder)}` continues a run that did not end"
         )
     show(results_table(read_metrics(folder)))
     print(f"report: {shown(folder / 'report.html')}")

@@ -30,6 +30,27 @@ def of_file(file: Path | None) -> dict[str, Any]:
     return configuration(file=None if file is None else str(file), required=False)
 
 
+@pytest.mark.parametrize(("inputs", "stop", "told"), [("same", 0, 1), ("same", 3, 0), ("other", 0, 0)])
+def test_an_artifact_of_the_input_that_is_run_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, inputs: str, stop: int, told: int
+) -> None:
+    monkeypatch.setattr(toys.Count, "inputs_digest", lambda self: inputs if self.logs > 1 else "same")
+    config = two_of_one_graph(tmp_path)
+    config["nodes"]["source"] |= {"gap": stop}
+    config["artifacts"]["map"] |= {"made_from": ["tour"]}
+    if inputs == "other":
+        config["nodes"]["source"] |= {"logs": 2}
+    warnings = ended(config).manifest["warnings"]
+    sentence = "map: it is made from the input of this run, so figures are too good; give another tour=…"
+    assert warnings == [sentence] * told
+
+
+def test_a_source_that_gives_no_tick_is_told(tmp_path: Path) -> None:
+    graph = graph_of_toys({"source": "Count"}, {}, variant="toy", runs=str(tmp_path))
+    graph["nodes"]["source"] |= {"length_": 0}
+    assert ended(graph).manifest["warnings"] == ["source gave no tick, so nothing has run in the loop"]
+
+
 @pytest.fixture
 def known(tmp_path: Path) -> Path:
     write_artifact(tmp_path / "known.omap", toys.Number(3.0))

@@ -46,6 +46,7 @@ def test_a_localiser_bridges_ten_seconds_without_images_by_odometry(localised: L
     said = {status.message for message in robot.on("/diagnostics") for status in message.status}
     assert any(f"{IMAGE} (sensor_msgs/msg/CompressedImage) has been silent for 9 s" in words for words in said), said
     assert "running" in said
+    assert any("the robot sent no image that could be used for " in line for line in run.manifest["warnings"])
     seconds = run.frames["stamp_ns"].to_numpy() / 1e9
     (gap,) = np.flatnonzero(np.diff(seconds) > 1.5)
     assert np.diff(seconds)[gap] == len(SILENT) + 1

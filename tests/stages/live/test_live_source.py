@@ -221,6 +221,18 @@ def test_while_a_robot_says_nothing_what_is_missing_is_noted(wire: Wire, tmp_pat
     assert not wire.status.troubles
 
 
+@pytest.mark.parametrize(("seconds", "told"), [(12.0, True), (2.0, False)])
+def test_a_robot_that_fell_silent_is_in_the_result(
+    wire: Wire, tmp_path: Path, now: list[float], seconds: float, told: bool
+):
+    drive = Drive(tmp_path)
+    drive.feed(wire, said())
+    drive.synchronizer.next(0.0)
+    now[0] += seconds
+    drive.end()
+    assert any("sent no image that could be used for 12 s after that of" in line for line in drive.ctx.warnings) == told
+
+
 def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
     wire: Wire, tmp_path: Path, now: list[float]
 ):

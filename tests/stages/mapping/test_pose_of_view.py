@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from made_references import references
 from made_ticks import at_tick
 
+from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.mapping.pose_of_view import Supervised, pose_of_view
+from omninav.stages.mapping.straightened_map import StraightenMap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedPose, Pose
 
@@ -78,3 +81,12 @@ def test_logs_with_ground_truth_go_into_one_map() -> None:
     map.put(pose_source="truth")
     map.insert(TRUE, VIEW, "histograms")
     assert pose_of_view(at_tick(first=True, log=1), DRIVEN, TRUE, map, "auto") is TRUE
+
+
+@pytest.mark.parametrize(("views", "told"), [(1, ["has 1 view,"]), (5, ["has 5 views,"]), (6, [])])
+def test_a_map_of_few_views_is_told(views: int, told: list[str]) -> None:
+    map = references(np.zeros((views, 3)), np.ones((views, 1, 4), np.float32), source="truth")
+    ctx = Context("straightened")
+    StraightenMap().step(ctx, map, [])
+    assert [words for line in ctx.warnings for words in told if words in line] == told
+    assert len(ctx.warnings) == len(told)

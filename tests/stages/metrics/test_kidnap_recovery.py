@@ -3,6 +3,7 @@ import pytest
 from measured_drives import AT_ORIGIN, figures, made_drive
 
 from omninav.stages.metrics.kidnap_recovery import KidnapRecovery
+from omninav.stages.metrics.success_rate import SuccessRate
 
 
 def lifted_drive(wrong_for: int | None):
@@ -65,6 +66,13 @@ def test_what_is_at_a_limit_is_no_lift(monkeypatch: pytest.MonkeyPatch):
 
     assert standing(0.0, 0.5, 0.0) is standing(0.0, 0.0, np.pi / 2) is None
     assert standing(0.0, 0.51, 0.0)["number"] == 1
+
+
+def test_odometry_of_another_unit_is_no_lift():
+    drive = lifted_drive(0)
+    drive.motion[1:] *= (10.0, 10.0, 1.0)
+    assert lifts(drive) is None
+    assert "kidnapped_at" not in figures(SuccessRate(), drive)["success"]
 
 
 def test_frames_without_truth_or_estimate_do_not_count_and_one_frame_alone_has_no_lift():

@@ -4,6 +4,7 @@ import dataclasses
 from contextlib import nullcontext
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -66,6 +67,8 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
         ("a: 28.095", "a: 1.0e-300", r"'mirror\.a': 1e-300 is out of bounds"),
         ("yaw: 0.3", "yaw: 90.0", r"'yaw': 90\.0 is out of bounds, expected float >= -6\.28319 and <= 6\.28319"),
         ("\nheight: ", "\nheight: -", r"'height': -0\.\d+ is out of bounds, expected float >= 0"),
+        ("\nheight: ", "\nheight: 9", r"'height': 90\.9.* expected float >= 0 and <= 10, in metres above the floor"),
+        ("- 319.5", "- 0.0", r"the ring around \(0, 239\.5\) an image of 640 x 480 shows 5\d % of all azimuths"),
         ("497.0", "1.0e-300", "with focal lengths of a pixel or more"),
         ("497.0", "900000.0", "% of all directions; check the model, the mask and the size"),
         (
@@ -161,3 +164,11 @@ def test_a_projection_comes_before_a_file_of_its_name(tmp_path: Path, monkeypatc
     camera, files = named_camera("donut", lambda: (640, 640))
     assert isinstance(camera, Donut)
     assert files == []
+
+
+def test_a_full_panorama_of_mirror_images_is_refused_and_a_strip_is_not() -> None:
+    with refused("images of 640 x 480 are no equirectangular ones, twice as wide as high"):
+        named_camera("equirectangular", lambda: (640, 480))
+    assert named_camera("equirectangular", lambda: (720, 144))[0].elevations == pytest.approx(
+        (0.2 * np.pi, -0.2 * np.pi)
+    )

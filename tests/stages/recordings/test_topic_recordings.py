@@ -373,7 +373,7 @@ def test_every_user_error_is_one_line_that_names_the_log(tmp_path: Path) -> None
     halved = write_mcap(tmp_path / "half.mcap", camera=CAMERA.replace(b"48", b"96").replace(b"16", b"32"))
     for log, said in (
         (halved, "says 96 x 32; they are 0.5 times as large: the description is of another resolution; give camera="),
-        (tmp_path / "text.bag", "not a readable bag"),
+        (tmp_path / "text.bag", "this is no bag of ROS 1, which begins with '#ROSBAG V2.0'"),
         (tmp_path / "gone.mcap", "no such file"),
         (nothing, "no images"),
         (no_camera, "give camera="),

@@ -252,3 +252,13 @@ def test_a_log_that_was_not_simulated_is_not_written_over(tmp_path: Path):
     with pytest.raises(BadInput, match=r"mine\.mcap: it is there, and was not simulated"):
         record_log(tmp_path / "mine.mcap", EXACT, "there", 1, (), Context("simulate"))
     assert (tmp_path / "mine.mcap").read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("waypoints", [((2.0, 1.5),), ((2.0, 1.5), (2.0, 1.5))])
+def test_a_route_that_leads_nowhere_is_refused_and_leaves_no_file(
+    waypoints: tuple[tuple[float, float], ...], tmp_path: Path
+) -> None:
+    world = replace(EXACT, routes={"one": Route(waypoints)})
+    with pytest.raises(UnreadableRecording, match=f"route 'one' of world '{world.name}' ends before its first image"):
+        record_log(tmp_path / "w.mcap", world, "one", 1, (), Context("simulate"))
+    assert not list(tmp_path.iterdir())

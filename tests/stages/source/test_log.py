@@ -5,6 +5,7 @@ import dataclasses
 import math
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource, synthetic_increment
+from omninav.stages.source.log_parts import LogPart
 from omninav.stages.source.playback import PlaybackState
 from omninav.stages.values.pose import AssumedMotion
 
@@ -254,6 +256,22 @@ def test_odometry_that_stands_still_while_ground_truth_moves_is_said(tmp_path: P
     assert [line.partition(": ")[2] for line in ctx.warnings] == [
         "odometry stands still at 19 images, ground truth moves 1.9 m"
     ]
+
+
+@pytest.mark.parametrize(("rate", "told"), [(0.01, ["rate=0.01 uses 1 of 20 images: type"]), (1.0, []), (None, [])])
+def test_a_rate_that_uses_hardly_an_image_is_told(log: str, rate: float | None, told: list[str]) -> None:
+    ctx = Context("source")
+    LogSource(log=log, rate_hz=rate).setup(ctx)
+    assert [line[: len(begins)] for line, begins in zip(ctx.warnings, told, strict=True)] == told
+
+
+def test_odometry_that_drives_farther_than_ground_truth_is_said() -> None:
+    truth = np.column_stack([np.arange(40) * 0.2, np.zeros((40, 2))])
+    part = LogPart(SimpleNamespace(name="log", odometry=3.0 * truth), np.arange(40), truth, truth, "measured")  # type: ignore[arg-type]
+    ctx = Context("source")
+    LogSource(log="log")._begin(ctx, part)
+    assert [line.partition(":")[0] for line in ctx.warnings] == ["log"]
+    assert "odometry drives 3 times as far as ground truth" in ctx.warnings[0]
 
 
 def test_images_that_the_truth_places_elsewhere_for_a_while_have_none(tmp_path: Path) -> None:

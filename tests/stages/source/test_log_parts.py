@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.source.log_parts import frozen_steps, truth_excursion
+from omninav.stages.source.log_parts import frozen_steps, odometry_scale, truth_excursion
 
 AHEAD = np.column_stack([np.arange(20) * 0.2, np.zeros(20), np.zeros(20)])
 
@@ -42,6 +42,27 @@ def test_odometry_that_stops_while_the_robot_goes_on_is_counted() -> None:
 )
 def test_a_robot_that_moves_stands_or_is_lifted_is_not(odometry: np.ndarray, truth: np.ndarray) -> None:
     assert frozen_steps(odometry, truth) == (0, 0.0)
+
+
+FAR = np.column_stack([np.arange(200) * 0.2, np.zeros(200), np.zeros(200)])
+NOISE = np.random.default_rng(1).normal(scale=0.05, size=(200, 3))
+
+
+@pytest.mark.parametrize(
+    ("odometry", "truth", "found"),
+    [
+        (10.0 * FAR, FAR + NOISE, 10.0),
+        (0.001 * FAR, FAR + NOISE, 0.001),
+        (0.9 * FAR, FAR + NOISE, None),
+        (0.0 * FAR, NOISE, None),
+        (FAR, FAR + (np.arange(200) > 90)[:, None] * 30.0, None),
+        (FAR, np.where(np.arange(200)[:, None] < 100, FAR, np.nan), None),
+        (0.0 * FAR, np.full((200, 3), np.nan), None),
+    ],
+    ids=["10 times", "mm", "slips", "stands in noise", "is carried", "truth ends", "no truth"],
+)
+def test_odometry_in_another_unit_than_truth_is_told(odometry: np.ndarray, truth: np.ndarray, found: float | None):
+    assert odometry_scale(odometry, truth) == (found and pytest.approx(found, rel=0.05))
 
 
 @pytest.mark.parametrize(
