@@ -68,7 +68,7 @@ def broken_promises(cls: type[Stage]) -> Iterator[str]:
 
 
 def _unfit_frames(stage: type[Stage] | Stage, cls: type[Stage], frames: Any) -> Iterator[str]:
-    """What keeps `step` from being called with some frames."""
+    """Reasons why `step` cannot be called with some frames."""
     read, step = signature(cls), inspect.signature(cls.step).parameters
     lacking = [name for name, each in read.parameters.items() if each.default is MISSING]
     if stage is cls and lacking and len(frames):

@@ -162,7 +162,7 @@ def _unread_settings(config: Any, read: Collection[str]) -> Iterator[Problem]:
     elsewhere = {*OF_THE_VARIANT, *OF_THE_RUN, *OF_OTHERS, *OF_COMMANDS, *settings_left_open(), *_taken_over(config)}
     typed = {str(name).partition(".")[0] for name in config.get(TYPED) or ()}
     emptied = {name for name in typed & _groups() if name in config and config[name] is None}  # by another option
-    for name in sorted(({*hints, *config_file()} & typed - {*read} - elsewhere) | emptied):
+    for name in sorted((({*hints, *config_file()} & typed - {*read}) | emptied) - elsewhere):
         leave = f"leave {name}=… out"
         yield Problem(name, "nothing in this run reads it", leave if name in emptied else hints.get(name, leave))
 

@@ -108,7 +108,7 @@ class TimeSynchronizer:
         self._used_any = self.last_stamp is not None
         self._last_used, self._counts_at_last = self._since, Counter[str]()
         self._waits_since: float | None = math.inf
-        self._longest_wait = 0.0, 0
+        self._max_wait = 0.0, 0
 
     def subscribe(self) -> None:
         """Ask for all topics. Of images, only the newest is kept while nobody takes them."""
@@ -139,14 +139,14 @@ class TimeSynchronizer:
     def gap(self) -> str:
         """Sentence on the longest wait for an image since the first one that was used; "" where it was short."""
         self._end_wait()
-        seconds, stamp = self._longest_wait
+        seconds, stamp = self._max_wait
         if seconds < GAP_S:
             return ""
         return f"the robot sent no image that could be used for {seconds:.0f} s after that of {stamp / 1e9:.3f} s"
 
     def _end_wait(self) -> None:
         if self._waits_since is not None:
-            self._longest_wait = max(self._longest_wait, (time.monotonic() - self._waits_since, self.last_stamp or 0))
+            self._max_wait = max(self._max_wait, (time.monotonic() - self._waits_since, self.last_stamp or 0))
             self._waits_since = None
 
     def watch(self) -> None:

@@ -27,7 +27,7 @@ STEPS, MIN_STEPS, STEPS_PER_BYTE = 10_000, 2_000_000, 20
 """SQLite calls the progress handler every `STEPS` steps of its virtual machine. A query may take `MIN_STEPS`, and
 `STEPS_PER_BYTE` more for each byte of the file: a row has at least 25 bytes and takes some 30 steps."""
 ROS1 = b"#ROSBAG V2.0"
-"""What a bag of ROS 1 begins with."""
+"""First bytes of a bag of ROS 1."""
 MIN_VALUE_BYTES = 1_000_000
 """Size up to which a value in an SQLite file is always accepted, however small the file is."""
 
