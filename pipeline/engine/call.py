@@ -21,8 +21,8 @@ VALIDATED_TICKS = 10
 """First calls of a stage of ours whose outputs are checked against what their types state; another's always are, since
 a NaN may come late."""
 GUARDED_EVERY = 8
-"""Every so many calls of another's stage, and in its first `VALIDATED_TICKS`, its inputs and what it gave before must be
-as they were; encoding them takes longer than a small stage."""
+"""Every so many calls of another's stage, and in its first `VALIDATED_TICKS`, its inputs and what it gave before must
+be as they were; encoding them takes longer than a small stage."""
 
 
 class StageFailed(Exception):
