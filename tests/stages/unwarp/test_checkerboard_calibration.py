@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from made_boards import COLUMNS, LENS, MIRROR, ROWS, seen, worst_deg
 
-from omninav.stages.camera.model import Camera
 from omninav.pipeline import BadInput
+from omninav.stages.camera.model import Camera
 from omninav.stages.unwarp.checkerboard_calibration import board_points, calibrated
 
 
