@@ -145,7 +145,7 @@ class Run:
         if not file.is_file():
             hint = f"`{command_to_resume(self.folder)}` continues a run that did not end"
             if self.status == "complete":
-                hint = f"a run of {self.manifest.get('variant')} leaves none"
+                hint = f"a complete run of {self.manifest.get('variant')} leaves none, or it was removed"
             raise BadInput(f"{self.folder}: no {name} in it; {hint}")
         return file
 

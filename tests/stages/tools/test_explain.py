@@ -22,9 +22,11 @@ def test_a_run_that_estimates_no_pose_or_did_not_end_is_refused(tmp_path):
     run_folder(tmp_path, collected(run.ticks, run.truth))
     with pytest.raises(BadInput, match="homing estimates no pose"):
         ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
-    (tmp_path / "frames.parquet").unlink()
-    with pytest.raises(BadInput, match="omninav resume"):
-        ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
+    for status, said in (("complete", "a complete run of homing leaves none"), ("interrupted", "omninav resume")):
+        run_folder(tmp_path, collected(run.ticks, run.truth), status=status)
+        (tmp_path / "frames.parquet").unlink()
+        with pytest.raises(BadInput, match=said):
+            ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
 
 
 def test_a_run_that_failed_is_said_to_be_no_whole_one(tmp_path, capsys):
