@@ -20,7 +20,6 @@ from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing, refuse_experiment
 from omninav.pipeline.run.prepared_run import load_stages
-from omninav.pipeline.run.resume import command_to_resume
 from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
 from omninav.pipeline.tables import read_table
 
@@ -143,7 +142,7 @@ class Run:
     def _file(self, name: str) -> Path:
         file = self.folder / name
         if not file.is_file():
-            hint = f"`{command_to_resume(self.folder)}` continues a run that did not end"
+            hint = f"`omninav resume {shlex.quote(str(self.folder))}` continues a run that did not end"
             if self.status == "complete":
                 hint = f"a complete run of {self.manifest.get('variant')} leaves none, or it was removed"
             raise BadInput(f"{self.folder}: no {name} in it; {hint}")

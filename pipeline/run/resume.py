@@ -54,7 +54,7 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFol
 
 
 def command_to_resume(folder: Path, shown: str = "") -> str:
-    """The command that continues the run in a folder (as `shown`), with the code that it asks to be typed."""
+    """The command that continues a run of one's own (`shown`: its folder), with the code that it asks to be typed."""
     targets: list[str] = []
     _find_targets(read_mapping(folder / CONFIG) if (folder / CONFIG).is_file() else {}, targets)
     of_others = dict.fromkeys(module_of(target) for target in targets if not is_listed(target))

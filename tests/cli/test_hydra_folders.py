@@ -169,7 +169,7 @@ def test_what_is_said_to_be_typed_is_quoted_for_the_shell(toy, omninav, tmp_path
     assert "all metrics: omninav report 'a b'\n" in ended.stdout
     folder = tmp_path / "a b"
     (folder / "report.html").unlink()
-    assert f"`omninav resume '{folder}' toys` continues" in omninav("report", "a b").stderr
+    assert f"`omninav resume '{folder}'` continues" in omninav("report", "a b").stderr
     with pytest.raises(BadInput, match="a complete run of toy leaves none, or it was removed"):
         _ = open_run(folder).report
     (folder / "metrics.json").write_text("{}")

@@ -11,7 +11,6 @@ from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.metrics_files import read_metrics, refuse_experiment
-from omninav.pipeline.run.resume import command_to_resume
 
 
 def command(arguments: list[str]) -> int:
@@ -41,7 +40,8 @@ def command(arguments: list[str]) -> int:
         if not (folder / "manifest.json").is_file():
             raise BadInput(f"{folder}: there is no run in it; `ls runs` shows what there is")
         raise BadInput(
-            f"{folder}: no report.html in it; `{command_to_resume(folder)}` continues a run that did not end"
+            f"{folder}: no report.html in it; `omninav resume {shlex.quote(str(folder))}` continues a run that did "
+            "not end"
         )
     show(results_table(read_metrics(folder)))
     print(f"report: {shown(folder / 'report.html')}")
