@@ -57,6 +57,12 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     problems += options
     if not problems and message.startswith(("Ambiguous value", "Sweep parameters")):
         problems = [_several_values(word) for word in parsed if word.is_sweep_override()]
+    if not problems and (lacking := re.search(r"Could not find '([\w/]+)/(\w+)'", message)):
+        group, option = lacking.groups()
+        near = suggest_option(group, option, _options(group, folders), "options")
+        if "/" not in group and group != "variant":
+            near = f"a stage of your own is offered by OMNINAV_STAGES={group}.{option}=FILE.py:CLASS; {near}"
+        return [Problem(group, f"the defaults of a file choose '{option}', which there is not", near)]
     return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
 
 
