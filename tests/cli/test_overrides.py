@@ -23,7 +23,7 @@ def test_where_no_word_is_to_blame_hydras_own_message_is_given_in_one_line():
 def test_an_option_that_a_file_chooses_and_nobody_offers_is_named_with_what_offers_it():
     (problem,) = invalid_overrides(["seed=3"], (), "In 'config': Could not find 'match/mine'\nAvailable options …")
     assert (problem.where, problem.what) == ("match", "the defaults of a file choose 'mine', which there is not")
-    assert problem.hint.startswith("a stage of your own is offered by OMNINAV_STAGES=match.mine=FILE.py:CLASS; options:")
+    assert problem.hint.startswith("a stage of your own is offered by OMNINAV_STAGES=match.mine=FILE.py:CLASS; ")
 
 
 def test_an_unknown_option_comes_before_what_depends_on_it():
