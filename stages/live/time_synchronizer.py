@@ -225,7 +225,11 @@ class TimeSynchronizer:
                 "use one (chrony, PTP; use_sim_time for all nodes or for none)"
             )
         kind, number = unused.most_common(1)[0]
-        return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200})"
+        ahead, advice = (stamp - last) / 1e9, ""
+        if kind == "outside_odometry" and abs(ahead) > self.patience_s:
+            beside = f"; images are stamped {ahead:+.1f} s from odometry"
+            advice = f"{beside}: use one clock, or `delay: {ahead:.1f}` in camera.yaml"
+        return f"no image is used: {kind} {number} times ({self._latest.get(kind, kind):.200}){advice}"
 
     def first_dropped(self, kind: str) -> str:
         """Describes the first item of a kind that was left out."""

@@ -313,6 +313,7 @@ def test_a_topic_for_two_things_or_of_transforms_is_refused_before_anything_runs
     [
         (40, "no image is used: outside_odometry"),
         (40, "odometry has up to"),
+        (40, "use one clock, or `delay: "),
         (1000, "are stamped by different clocks"),
         (0, "images carry no time stamp (0)"),
     ],
