@@ -114,3 +114,14 @@ def test_elevations_are_those_of_the_edges_of_what_is_seen() -> None:
     assert UNKNOWN.elevations == pytest.approx((25 * math.pi / 120, -25 * math.pi / 120))  # of square pixels
     assert not UNKNOWN.elevations_known
     assert Cylindrical(40, 100, 20.0).elevations == (QUARTER, -QUARTER)
+    half_known = Cylindrical(120, 25, 60.0, elevation_top=1.0), Cylindrical(120, 25, 60.0, elevation_bottom=-1.0)
+    assert [camera.elevations == UNKNOWN.elevations for camera in half_known] == [True, True]
+    assert [camera.elevations_known for camera in (*half_known, CYLINDER)] == [False, False, True]
+
+
+def test_an_ordinary_camera_sees_60_degrees_and_a_lens_a_half_sphere_unless_more_is_known() -> None:
+    camera, lens = Perspective.of_size(640, 480), Fisheye.of_size(640, 480)
+    left, top = camera.unproject(np.array([[-0.5, 239.5], [319.5, -0.5]]))[0]
+    assert math.degrees(math.atan2(left[1], left[0])) == pytest.approx(30.0)
+    assert top[2] / top[0] == pytest.approx(0.75 * math.tan(math.pi / 6))  # of square pixels
+    assert (lens.elevations[0], lens.elevations[1]) == (pytest.approx(QUARTER), pytest.approx(0.0))

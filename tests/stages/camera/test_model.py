@@ -51,6 +51,16 @@ def test_rays_that_the_image_does_not_show_are_seen_nowhere() -> None:
     assert np.isnan(seen[1]).all()
 
 
+def test_a_mount_is_what_the_description_states_and_bearings_are_turned_already() -> None:
+    plain = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0)
+    mounted = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, position_y=-0.2, yaw=0.3, delay=0.0125)
+    beside = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, position_x=0.1)
+    assert [*plain.mount, *mounted.mount, *beside.mount] == [0.0, 0.0, 0.0, 0.0, -0.2, 0.3, 0.1, 0.0, 0.0]
+    assert [*mounted.arm, *beside.arm] == [0.0, -0.2, 0.0, 0.1, 0.0, 0.0]
+    assert [camera.placed for camera in (plain, mounted, beside)] == [False, True, True]
+    assert (plain.delay_ns, mounted.delay_ns) == (0, 12_500_000)
+
+
 def test_a_ring_turned_inside_out_is_refused() -> None:
     with pytest.raises(ValueError, match=r"inner_radius_px' must be below"):
         Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, 240.0)
