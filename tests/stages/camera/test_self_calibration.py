@@ -64,11 +64,11 @@ def test_what_is_no_number_of_a_camera_is_refused(name):
 
 
 def test_a_camera_leans_by_its_last_two_corrections_roll_first():
-    lens = adjustable(TRUE, np.array([[319.5, 60.0], [500.0, 300.0]]))
+    lens = adjustable(TRUE, np.array([[319.5, 60.0], [500.0, 300.0]]), AXIS | {"yaw": 0.1})
     tilted = with_tilt(lens)
-    assert tilted.sigmas.tolist() == [np.inf, np.inf, TILT_SIGMA, TILT_SIGMA]
-    leaning = Rotation.from_euler("xy", [0.1, 0.2]).apply(lens.bearings(np.array([1.0, -2.0])))
-    assert tilted.bearings(np.array([1.0, -2.0, 0.1, 0.2])) == pytest.approx(leaning)
+    assert tilted.sigmas.tolist() == [np.inf, np.inf, 0.1, TILT_SIGMA, TILT_SIGMA]
+    leaning = Rotation.from_euler("xy", [0.1, 0.2]).apply(lens.bearings(np.array([1.0, -2.0, 0.3])))
+    assert tilted.bearings(np.array([1.0, -2.0, 0.3, 0.1, 0.2])) == pytest.approx(leaning)
 
 
 def test_a_drive_shows_the_axis_of_a_ring_whose_elevations_are_known_and_the_yaw_where_poses_are_given():
