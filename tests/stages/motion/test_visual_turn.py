@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState, _line, turn_by_flow
+from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState, _line, smoothness, turn_by_flow
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
 
@@ -50,6 +50,12 @@ def test_the_turn_is_seen_although_what_is_near_moves_by(guess):
     seen = turn_by_flow(BEFORE.pixels[..., 0], AFTER.pixels[..., 0], guess, 0.05)
     assert seen.turn == pytest.approx(TURN, abs=math.radians(0.3))
     assert seen.sigma < math.radians(0.2)
+
+
+def test_smoothness_compares_pixels_two_columns_apart_with_neighbours_all_around():
+    assert smoothness(np.array([[0, 0, 9, 9]], np.uint8)) == 2.0  # 1 of 1 against 1 of 2
+    assert smoothness(np.array([[0, 9, 0, 9], [0, 9, 9, 9]], np.uint8)) == pytest.approx(2 / 6)
+    assert smoothness(np.full((2, 4), 7, np.uint8)) == 0.0
 
 
 def test_a_line_through_flow_is_as_sure_as_its_points_are_alike_and_outliers_hardly_count():
