@@ -31,12 +31,16 @@ def test_a_fisheye_projects_as_opencv_does() -> None:
 
 
 def test_the_unified_model_worked_by_hand() -> None:
-    # (3, 0, 4) / 5 from 0.5 behind the centre: x = 0.6 / 1.3, and k1, k2, p1, p2 distort it.
+    # (2, -1, 2) / 3 from 0.5 behind the centre: (4, -2) / 7, and k1, k2, p1, p2 distort it.
     camera = Unified(640, 480, 200.0, 100.0, 320.0, 240.0, 0.5, (-0.1, 0.02, 0.001, 0.002), outer_radius_px=200.0)
-    square = (0.6 / 1.3) ** 2
-    x = 0.6 / 1.3 * (1.0 - 0.1 * square + 0.02 * square**2) + 0.002 * 3.0 * square
-    expected = (320.0 + 200.0 * x, 240.0 + 100.0 * 0.001 * square)
-    assert camera.project(np.array([3.0, 0.0, 4.0]))[0] == pytest.approx(expected, abs=1e-9)
+    x, y = 4 / 7, -2 / 7
+    square = x * x + y * y
+    radial = 1.0 - 0.1 * square + 0.02 * square**2
+    u = x * radial + 2.0 * 0.001 * x * y + 0.002 * (square + 2.0 * x * x)
+    v = y * radial + 0.001 * (square + 2.0 * y * y) + 2.0 * 0.002 * x * y
+    expected = (320.0 + 200.0 * u, 240.0 + 100.0 * v)
+    assert camera.project(np.array([2.0, -1.0, 2.0]))[0] == pytest.approx(expected, abs=1e-9)
+    assert camera.unproject(np.array(expected))[0] == pytest.approx(np.array([2.0, -1.0, 2.0]) / 3)
 
 
 def test_a_mirror_above_the_camera_shows_the_floor_in_the_middle_and_bearings_as_a_lens_does() -> None:

@@ -114,3 +114,38 @@ def test_elevations_are_those_of_the_edges_of_what_is_seen() -> None:
     assert UNKNOWN.elevations == pytest.approx((25 * math.pi / 120, -25 * math.pi / 120))  # of square pixels
     assert not UNKNOWN.elevations_known
     assert Cylindrical(40, 100, 20.0).elevations == (QUARTER, -QUARTER)
+    half_known = Cylindrical(120, 25, 60.0, elevation_top=1.0), Cylindrical(120, 25, 60.0, elevation_bottom=-1.0)
+    assert [camera.elevations == UNKNOWN.elevations for camera in half_known] == [True, True]
+    assert [camera.elevations_known for camera in (*half_known, CYLINDER)] == [False, False, True]
+
+
+def test_a_camera_info_gives_the_camera_back_and_another_model_none() -> None:
+    skewed = Perspective(640, 480, 500.0, 480.0, 320.0, 240.0, skew=0.3)
+    mirror = HyperbolicMirror(640, 480, 497.0, 490.0, 330.5, 230.5, 28.0, 23.0, 0.0, 230.5, skew=0.4)
+    k = mirror.camera_info()["k"]
+    assert k == [497.0, 0.4, 330.5, 0.0, 490.0, 230.5, 0.0, 0.0, 1.0]
+    for model, d in (("plumb_bob", [0.0] * 5), ("", [])):
+        back = Perspective.from_camera_info(model, (640, 480), skewed.camera_info()["k"], d)
+        assert vars(back) == vars(skewed)
+    assert vars(HyperbolicMirror.from_camera_info("hyperbolic_mirror", (640, 480), k, [28.0, 23.0])) == vars(mirror)
+    for width, height in ((500, 480), (640, 400)):  # what is right of or below the centre is nearer
+        cut = HyperbolicMirror.from_camera_info("hyperbolic_mirror", (width, height), k, [28.0, 23.0])
+        assert cut.outer_radius_px == min(width - 331.5, height - 231.5)
+    assert Perspective.from_camera_info("plumb_bob", (640, 480), k, [0.0, 0.1]) is None
+    assert Perspective.from_camera_info("equidistant", (640, 480), k, []) is None
+    assert HyperbolicMirror.from_camera_info("plumb_bob", (640, 480), k, [28.0, 23.0]) is None
+    assert HyperbolicMirror.from_camera_info("hyperbolic_mirror", (640, 480), k, [28.0]) is None
+
+
+def test_a_picture_twice_as_wide_as_high_is_the_whole_sphere() -> None:
+    whole = Equirectangular(720, 360, 360.0, elevation_top=QUARTER, elevation_bottom=-QUARTER)
+    assert vars(Equirectangular.of_size(720, 360)) == vars(whole)
+    assert vars(Equirectangular.of_size(720, 150)) == vars(Equirectangular(720, 150, 360.0))
+
+
+def test_an_ordinary_camera_sees_60_degrees_and_a_lens_a_half_sphere_unless_more_is_known() -> None:
+    camera, lens = Perspective.of_size(640, 480), Fisheye.of_size(640, 480)
+    left, top = camera.unproject(np.array([[-0.5, 239.5], [319.5, -0.5]]))[0]
+    assert math.degrees(math.atan2(left[1], left[0])) == pytest.approx(30.0)
+    assert top[2] / top[0] == pytest.approx(0.75 * math.tan(math.pi / 6))  # of square pixels
+    assert (lens.elevations[0], lens.elevations[1]) == (pytest.approx(QUARTER), pytest.approx(0.0))

@@ -6,7 +6,7 @@ import pytest
 from omninav.pipeline import BadInput
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.fisheye import Fisheye
-from omninav.stages.camera.model import MODELS, Camera, camera_models, require_elevations, seen_at
+from omninav.stages.camera.model import MODELS, Camera, camera_models, require_elevations, require_sight, seen_at
 from omninav.stages.camera.rays import angles, normalised, turned, unit_vectors
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.recordings.camera_yaml import parse_camera
@@ -51,9 +51,28 @@ def test_rays_that_the_image_does_not_show_are_seen_nowhere() -> None:
     assert np.isnan(seen[1]).all()
 
 
+def test_a_mount_is_what_the_description_states_and_bearings_are_turned_already() -> None:
+    plain = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0)
+    mounted = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, position_y=-0.2, yaw=0.3, delay=0.0125)
+    beside = Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, position_x=0.1)
+    assert [*plain.mount, *mounted.mount, *beside.mount] == [0.0, 0.0, 0.0, 0.0, -0.2, 0.3, 0.1, 0.0, 0.0]
+    assert [*mounted.arm, *beside.arm] == [0.0, -0.2, 0.0, 0.1, 0.0, 0.0]
+    assert [camera.placed for camera in (plain, mounted, beside)] == [False, True, True]
+    assert (plain.delay_ns, mounted.delay_ns) == (0, 12_500_000)
+
+
 def test_a_ring_turned_inside_out_is_refused() -> None:
     with pytest.raises(ValueError, match=r"inner_radius_px' must be below"):
         Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, 240.0)
+
+
+def test_a_camera_that_sees_next_to_nothing_or_a_part_of_its_circle_is_refused() -> None:
+    require_sight(Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0))
+    require_sight(Fisheye(640, 480, 140.0, 180.0, 241.0, 230.0))  # cut at the left
+    with pytest.raises(BadInput, match=r"a fisheye camera of 640 x 480 pixels sees 0 % of all directions"):
+        require_sight(Fisheye(640, 480, 140.0, -400.0, 241.0, 230.0))
+    with pytest.raises(BadInput, match=r"the ring around \(0, 241\) an image of 640 x 480 shows 50 % of all azimuths"):
+        require_sight(Fisheye(640, 480, 140.0, 0.0, 241.0, 230.0, 40.0))
 
 
 def test_who_needs_elevations_is_told_how_to_get_them() -> None:

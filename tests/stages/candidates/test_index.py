@@ -13,6 +13,7 @@ from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.candidates.around_belief import AroundBelief
 from omninav.stages.candidates.index import IndexedCandidates
+from omninav.stages.candidates.inverted_file import _joined, _split
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.belief import Particles
@@ -121,6 +122,13 @@ def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> 
         assert exact[0] in among
         assert len(among) <= 200
     assert np.mean(found) > 0.95
+
+
+def test_the_number_of_a_list_is_in_the_first_bytes_the_lowest_first() -> None:
+    lists, codes = np.array([5, 0x1234, 0x0ABCDE], np.int32), np.arange(6, dtype=np.uint8).reshape(3, 2)
+    encoded = np.array([[5, 0, 0, 0, 1], [0x34, 0x12, 0, 2, 3], [0xDE, 0xBC, 0x0A, 4, 5]], np.uint8)
+    assert _joined(lists, codes, 3).tolist() == encoded.tolist()
+    assert [part.tolist() for part in _split(encoded, 3)] == [lists.tolist(), codes.tolist()]
 
 
 def test_the_index_is_the_same_in_every_run(index: ReferenceIndex) -> None:

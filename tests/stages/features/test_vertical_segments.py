@@ -116,6 +116,23 @@ def test_neighbours_that_look_alike_become_the_one_in_their_middle() -> None:
     assert len(prototypes(apart, 60, 1.6, 2.0, True)[0]) > 3  # one above the other are not the same
 
 
+@pytest.mark.parametrize(
+    ("columns", "lines", "represented"),
+    [
+        (60, [0, 4, 20], [2, 1]),  # a neighbour is at most two times two columns away
+        (60, [0, 5, 20], [1, 1, 1]),
+        (60, [0, 57, 20], [2, 1]),
+        (9, [0, 8, 4], [2, 1]),
+        (8, [0, 7, 4], [1, 1, 1]),  # where all are neighbours there is no seam
+    ],
+)
+def test_neighbours_are_so_many_columns_away_at_most(columns: int, lines: list[int], represented: list[int]) -> None:
+    looks = np.random.default_rng(3).normal(size=(2, 10)).astype(np.float32)[[0, 0, 1]]
+    order = np.argsort(lines)
+    segments = ImageSegments(np.array(lines)[order], np.tile([10.0, 30.0], (3, 1)), looks[order])
+    assert prototypes(segments, columns, 2.0, 2.0, True)[1].tolist() == represented
+
+
 def test_a_picture_of_nothing_has_no_segments() -> None:
     assert len(found(Panorama(np.full((80, 360, 3), 90, np.uint8)))) == 0
 

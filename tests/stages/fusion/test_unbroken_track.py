@@ -165,6 +165,21 @@ def test_without_recovery_particles_the_others_share_the_weight():
     assert without_recovery(lost) is lost  # it is all that is left
 
 
+def test_the_track_goes_on_from_the_likeliest_of_the_poses_that_landmarks_name():
+    here, there = np.array([1.0, 2.0, 0.3]), np.array([6.0, 2.0, 0.3])
+    fix = replace(
+        fix_at(here),
+        poses=np.stack([here, there]),
+        covariances=np.tile(np.eye(3) * 1e-4, (2, 1, 1)),
+        inliers=np.array([60, 9]),
+        probabilities=np.array([0.99, 0.01]),
+    )
+    state, belief = UnbrokenTrackState(), even(np.tile(here, (4, 1)))
+    out = UnbrokenTrack().step(Context("track"), state, belief, seen_from(here[None])[0], fix)
+    assert state.pose.tolist() == here.tolist()
+    assert out.fix is fix
+
+
 def test_a_rival_elsewhere_is_left_out_and_the_pose_on_the_track_is_as_probable_as_without_it():
     pose, poses = np.zeros(3), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
     rivals = replace(fix_at(pose), poses=poses[::-1], inliers=np.array([40, 30]), probabilities=np.array([0.9, 0.08]))

@@ -41,6 +41,25 @@ def test_an_image_without_its_camera_is_refused():
         working_image(Image(TEXTURE), None, 1000)
 
 
+@pytest.mark.parametrize("seam", [0, SEAM])
+def test_a_point_is_chosen_and_described_by_the_pixels_around_it(seam: int):
+    image = panorama()
+    rows, columns = image.grey.shape[0], image.columns
+    if not seam:
+        image = image._replace(grey=np.ascontiguousarray(image.grey[:, SEAM:-SEAM]), seam=0)
+    points = np.array([[1.2, 0.8], [100.4, 50.0], [columns - 1.0, rows - 2.0], [0.0, 40.0], [columns - 3.6, 7.0]])
+    strength = np.random.default_rng(1).random(image.grey.shape).astype(np.float32)
+    best, looks = best_nearby(strength, image, points), histograms(image, points)
+    for (x, y), chosen, look in zip(np.rint(points).astype(int).tolist(), best.tolist(), looks, strict=True):
+        square = [(u, v) for v in range(y - 3, y + 4) for u in range(x - 3, x + 4)]
+        inside = [(u, v) for u, v in square if 0 <= v < rows and -seam <= u < columns + seam]
+        assert tuple(chosen) == max(inside, key=lambda at: strength[at[1], at[0] + seam])
+        disc = [(x + u, y + v) for u in range(-5, 6) for v in range(-5, 6) if u * u + v * v <= 5.5**2]
+        within = [(min(max(u, -seam), columns - 1 + seam), min(max(v, 0), rows - 1)) for u, v in disc]
+        seen = [image.grey[v, u + seam] // 16 for u, v in within]
+        assert look == pytest.approx(np.bincount(seen, minlength=16) / len(disc))
+
+
 def test_points_are_followed_through_a_turn_also_across_the_edge():
     before, after = panorama(), panorama(6)
     strength = trackability(before)

@@ -23,6 +23,7 @@ from omninav.stages.homing.feature_tracker import MAX_PIXELS, FeatureTracker, Fe
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.image_tracking import histograms
 from omninav.stages.homing.local_mapping import (
+    MAX_OUTLIER_DEG,
     MIN_VERIFIED_INLIERS,
     LocalMapping,
     LocalMappingState,
@@ -33,7 +34,16 @@ from omninav.stages.homing.local_mapping import (
 from omninav.stages.homing.vertical import levelling
 from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
+from omninav.stages.values.homing import (
+    FOUND_AGAIN,
+    LOST,
+    MATCHED,
+    TRACKED,
+    HomingTarget,
+    HomingVector,
+    LocalMap,
+    TrackedFeatures,
+)
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
@@ -332,6 +342,92 @@ def test_at_the_target_seven_of_ten_matches_have_its_bearings(share: int, depth_
     left = np.flatnonzero(seen_here[:share, 1] > 0)  # all agree, in one half of the directions
     of_one_side = Matches(seen_here[left], np.zeros((len(left), 2)), seen_there[left], left, seen_here, seen_there)
     assert homing.mapping._contradicted(near, of_one_side)
+
+
+@pytest.mark.parametrize(("beyond", "contradicted"), [(0.98, False), (1.02, True)])
+def test_near_the_target_bearings_may_be_off_by_twice_what_is_left_of_the_way(
+    beyond: float, contradicted: bool
+) -> None:
+    rng = np.random.default_rng(0)
+    there, aside = (each / np.linalg.norm(each, axis=1)[:, None] for each in rng.normal(size=(2, 100, 3)))
+    axis = np.cross(there, aside)
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    off = beyond * (math.radians(MAX_OUTLIER_DEG) + 2.0 * 0.02)
+    turned = math.cos(off) * there + math.sin(off) * np.cross(axis, there)
+    here, goal = turn_about_vertical(0.5), turn_about_vertical(0.8)
+    map = LocalMap(
+        1, 3, "tracking", 6, rows=np.arange(100), places=5.0 * there, kinds=np.full(100, TRACKED),
+        rotation=here, goal_rotation=goal, goal_translation=np.array([0.06, 0.08, 0.0]),
+    )  # fmt: skip
+    first = turned @ (here.T @ goal).T
+    matches = Matches(first, np.zeros((100, 2)), there, np.arange(100), first, there)
+    assert LocalMapping(verify=False)._contradicted(map, matches) is contradicted
+
+
+@pytest.mark.parametrize(
+    ("turned", "way", "heading", "odometry", "verified"),
+    [
+        (0.3, 0.3, 0.2, True, True),  # the target's heading was 0.5 before the robot turned by 0.3
+        (0.3, 0.3, 0.2 + math.radians(4.9), True, True),
+        (0.3, 0.3, 0.2 - math.radians(5.1), True, False),
+        (-0.3, 0.3, 0.2, True, False),
+        (0.3, 0.19, 0.2, True, False),  # from the same place
+        (-0.3, 0.1, 0.2, False, True),  # without odometry neither counts
+    ],
+)
+def test_two_images_agree_on_the_heading_of_the_target(
+    turned: float, way: float, heading: float, odometry: bool, verified: bool
+) -> None:
+    state = LocalMappingState(witness=0.5, since=np.array([0.6 * way, -0.8 * way, turned]))
+    new = LocalMap(1, 3, "new", MIN_VERIFIED_INLIERS, goal_rotation=turn_about_vertical(heading))
+    agreed = abs(turned + heading - 0.5) < math.radians(5.0)
+    assert LocalMapping()._verified(state, new, odometry) is verified
+    assert state.witness == pytest.approx(0.5 if agreed or not odometry else heading)
+    assert LocalMapping()._verified(state, replace(new, inliers=MIN_VERIFIED_INLIERS - 1), odometry) is False
+
+
+def test_the_robot_is_where_tracks_and_matches_agree_and_each_feature_says_how_it_was_seen() -> None:
+    rng = np.random.default_rng(0)
+    places = rng.uniform(-4.0, 4.0, (30, 3))
+    turn, at = turn_about_vertical(0.35), np.array([0.55, -0.15, 0.0])
+    rays = (places - at) @ turn
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    kinds = np.array([TRACKED] * 15 + [FOUND_AGAIN] * 3 + [LOST] * 12)
+    kinds[1] = LOST
+    bearings = np.where((kinds != LOST)[:, None], rays, np.nan)
+    bearings[3] = -bearings[3]
+    rows, pixels = np.arange(10, 40), np.arange(60.0).reshape(30, 2)
+    tracks = TrackedFeatures(2, rows, kinds, pixels, bearings, places)
+    seen = np.array([5, 20, 21, 22, 1])  # the last one is of another of the target's features
+    first = np.where(seen[:, None] == 22, -rays[seen], rays[seen])
+    matches = Matches(first, 100.0 + pixels[seen], first, np.array([15, 30, 31, 32, 99]), first, first)
+    before = LocalMap(
+        2, 3, "tracking", rows=rows, places=places, kinds=kinds, points=np.full((30, 2), np.nan),
+        rotation=turn_about_vertical(0.3), translation=at - [0.05, 0.05, 0.0], metres=2.0,
+        odometry=np.array([0.6, 0.8, 0.0]),
+    )  # fmt: skip
+    mapping = LocalMapping()
+
+    def found(map: LocalMap = before, tracks: TrackedFeatures | None = tracks) -> LocalMap:
+        return mapping._resection(Context("local_map", np.random.default_rng(0)), map, tracks, matches, np.eye(3))
+
+    map = found()
+    assert (map.state, map.inliers, map.why) == ("tracking", 16 + 2, "")
+    assert map.translation == pytest.approx(at, abs=1e-6)
+    assert map.rotation == pytest.approx(turn, abs=1e-6)
+    expected = kinds.copy()
+    expected[[3, 20, 21]] = LOST, MATCHED, MATCHED
+    assert map.kinds.tolist() == expected.tolist()
+    assert map.points[[20, 21]].tolist() == (100.0 + pixels[[20, 21]]).tolist()
+    assert np.isnan(np.delete(map.points, [20, 21], axis=0)).all()
+    assert map.metres == pytest.approx(1.0 / math.hypot(*at[:2]))
+    assert found(replace(before, odometry=np.zeros(3))).metres == 2.0
+    far = found(replace(before, metres=3.0))
+    assert (far.state, far.why) == (
+        "lost", "the place on which 18 features agree is 0.2 m from where odometry leads"
+    )  # fmt: skip
+    for gone in (None, replace(tracks, number=1)):
+        assert found(tracks=gone).why.endswith("tracked features agree on where the robot is, 6 are needed")
 
 
 def test_the_target_is_seen_in_a_direction_by_a_fifth_of_its_features() -> None:

@@ -9,9 +9,12 @@ from made_beliefs import along_x
 from made_references import references
 
 from omninav.pipeline import Context
+from omninav.stages.geometry.probability.likelihood_ratio import standard_scores
+from omninav.stages.match import map_calibration
 from omninav.stages.match.map_calibration import calibrated, compared_with, right_and_wrong, spacing
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -81,6 +84,45 @@ def test_a_match_calibrates_its_map_once_and_the_same_each_time(match: Selective
     walk.insert(Pose(8.0, 0.0, 0.0), walk.features[0], "histograms")
     grown = match.step(ctx, view, walk).calibration  # without a length scale, one and a half of its spacings of 0.1 m
     assert (grown.images, grown.right_distance_m) == (81, pytest.approx(0.15))
+
+
+@pytest.mark.parametrize("headings", [1, HEADINGS])
+def test_each_image_counts_the_same_and_views_of_one_heading_correlate_where_they_look_alike(
+    headings: int, monkeypatch: pytest.MonkeyPatch
+):
+    given: list[tuple] = []
+    monkeypatch.setattr(map_calibration, "logistic_fit", lambda *all: given.append(all) or (2.0, 3.0))
+    monkeypatch.setattr(map_calibration, "correlation_length", lambda *all: given.append(all))
+    poses = np.column_stack([np.arange(12) * 0.2, np.zeros(12), np.radians([0, 20, 29, 50, 31, 5] * 2)])
+    likeness = np.random.default_rng(0).uniform(0.1, 1, (12, 12, headings)).astype(np.float32)
+    found = calibrated(references(poses), lambda view, chosen: likeness[view, chosen], 0.3)
+    (scores, weights, right), (evidence, places, alike) = given
+    assert vars(found) == vars(SimilarityCalibration(2.0, 3.0, 12, 0.3, 0.3))
+    assert weights[right].sum() == pytest.approx(12)
+    assert weights[~right].sum() == pytest.approx(12)
+    others = np.delete(np.arange(12), 4)
+    each = standard_scores(likeness[4, others])
+    cells = right_and_wrong(poses[4], poses[others], headings, 0.3)[0]
+    assert evidence[4] == pytest.approx(each[cells].mean(), abs=1e-6)
+    assert set(each[cells].tolist()) <= set(scores[right].tolist())
+    assert np.array_equal(places, poses[:, :2])
+    gaps = np.abs(np.degrees(poses[:, None, 2] - poses[:, 2]))
+    assert alike is None if headings > 1 else np.array_equal(alike, gaps <= 30.0)
+
+
+@pytest.mark.parametrize("segments", [1, SEGMENTS])
+def test_a_map_s_own_views_are_retrieved_at_one_heading_where_they_are_single_pictures(
+    segments: int, monkeypatch: pytest.MonkeyPatch
+):
+    given: list = []
+    monkeypatch.setattr(map_calibration, "calibrated", lambda map, compare, length: given.append(compare))
+    full = a_walk()
+    map = references(full.poses, full.features[:, :segments])
+    for directions in (None, np.zeros(1))[: 2 if segments == 1 else 1]:
+        out = Retrieval(headings=HEADINGS).step(Context("match"), SegmentHistograms(map.features[7], directions), map)
+        seen = given.pop()(7, np.array([3, 9]))
+        assert seen.shape == (2, 1 if segments == 1 else HEADINGS)
+        assert seen == pytest.approx(out.similarities.values[[3, 9]], abs=1e-6)
 
 
 def test_nothing_is_compared_where_nobody_reads_the_calibration():

@@ -1,5 +1,6 @@
 """The present view against the places of a made-up world's map, and against one other view."""
 
+from dataclasses import replace
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -11,7 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.match.place_words import MatchPlaceWords
 from omninav.stages.match.visual_distance import VisualDistance
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -67,6 +68,20 @@ def test_correspondences_lead_from_the_present_view_to_the_target(search: str) -
     assert len(np.unique(pairs.second)) == len(pairs)
     nothing = MatchFeatures(search=search).step(Context("match"), features=here, target=there.chosen(slice(0, 0)))
     assert len(nothing.correspondences) == 0
+
+
+def test_both_ends_of_matching_columns_are_pairs_after_those_of_patches() -> None:
+    looks = np.random.default_rng(0).normal(size=(12, 10)).astype(np.float32)
+    columns = VerticalSegments(np.zeros(12), np.zeros((12, 2)), looks, np.ones(12, np.float32), np.zeros((12, 2, 2)))
+    order = np.random.default_rng(1).permutation(12)
+    patches = WORLD.seen(Pose(10.0, 7.0, 0.5))
+    here = replace(patches.chosen(slice(0, 3)), columns=columns)
+    there = replace(patches.chosen(slice(3, 8)), columns=columns.chosen(order))
+    pairs = MatchFeatures().step(Context("match"), features=here, target=there).correspondences
+    row_of = np.argsort(order)
+    expected = [(3 + 2 * row + end, 5 + 2 * row_of[row] + end) for row in range(12) for end in (0, 1)]
+    assert sorted(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)) == expected
+    assert pairs.distance == pytest.approx(np.zeros(24), abs=1e-3)
 
 
 def test_a_place_is_as_similar_by_words_as_its_most_similar_view() -> None:

@@ -44,6 +44,18 @@ def test_whitened_vectors_have_equal_variances_and_no_mean():
     assert np.cov(white.T) == pytest.approx(np.eye(3), abs=0.03)  # a hundredth of the mean variance is added
 
 
+def test_a_large_map_is_learned_from_references_at_even_steps_the_first_and_the_last_among_them(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr("omninav.stages.match.whitened.MAX_LEARNED", 3)
+    stage, map = WhitenedMatch(components=6), a_map(7)
+    values = matched(stage, map.features[5], map).values
+    own = learned_whitening(map.features[[0, 3, 6]].reshape(-1, 20), 6)
+    white = own.of(map.features[:])
+    alike = np.einsum("nsk,sk->n", white, white[5]) / SEGMENTS
+    assert values[:, 0] == pytest.approx(np.maximum(alike, 0.0), abs=1e-5)
+
+
 def test_a_place_stands_out_from_views_that_a_network_finds_all_alike():
     map, seen = a_map(), np.roll(views(30)[7], 5, axis=0) + np.random.default_rng(2).normal(0, 0.005, (SEGMENTS, 20))
     plain = matched(CosineMatch(headings=SEGMENTS), seen, map).values

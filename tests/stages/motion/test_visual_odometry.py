@@ -14,7 +14,7 @@ from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState
+from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState, _scale_by_map
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
@@ -135,6 +135,36 @@ def test_poses_by_the_maps_landmarks_give_metres() -> None:
     lengths = np.array([math.hypot(out.motion.x, out.motion.y) for out in outs[1:]])
     assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
     assert "the map's landmarks" in ctx.facts["scale"]
+
+
+def test_three_ways_by_the_maps_landmarks_that_agree_give_the_scale() -> None:
+    state, exact = VisualOdometryState(), np.eye(3)[None] * 1e-4
+
+    def at(seen: float, true: float, probability: float = 0.95, fixed: bool = True) -> tuple[list[float], bool]:
+        state.pose = np.array([1.0, 2.0 + seen, 0.3])
+        pose = np.array([[true, 5.0, 0.3]])
+        fix = LandmarkFix(pose, exact, np.array([60]), np.array([probability]), 80) if fixed else None
+        _scale_by_map(state, fix, NONE)
+        return state.map_scales.tolist(), state.by_map
+
+    at(0.0, 0.0, fixed=False)
+    at(0.0, 0.0, 0.94)
+    assert state.anchor is None
+    assert at(0.0, 0.0) == ([], False)
+    assert at(0.14, 0.28) == ([], False)  # too short a way
+    assert at(0.5, 1.0) == ([pytest.approx(2.0)], False)
+    assert at(0.55, 2.0) == ([pytest.approx(2.0)], False)  # twenty times as far: wrong
+    assert at(1.05, 2.75) == (pytest.approx([2.0, 1.5]), False)
+    at(1.55, 3.75)
+    assert at(2.05, 4.75) == (pytest.approx([2.0, 1.5, 2.0, 2.0]), False)
+    assert not len(state.scales)
+    at(2.5, 5.75)  # the last three are within a fifth
+    assert state.by_map
+    assert state.scales == pytest.approx(np.array([2.0, 1.5, 2.0, 2.0, 1.0 / 0.45]) / 2.0)
+    assert state.map_scales.tolist() == state.scales.tolist()
+    assert state.pose == pytest.approx([2.0, 9.0, 0.3])
+    assert state.speed_ratio == pytest.approx(2.0)
+    assert state.anchor == pytest.approx(np.array([[2.0, 9.0], [5.75, 5.0]]))
 
 
 def test_one_jump_of_these_poses_gives_no_scale() -> None:

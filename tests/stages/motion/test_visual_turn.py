@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState, turn_by_flow
+from omninav.stages.motion.visual_turn import VisualTurn, VisualTurnState, _line, smoothness, turn_by_flow
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import AssumedMotion, Motion
 
@@ -50,6 +50,23 @@ def test_the_turn_is_seen_although_what_is_near_moves_by(guess):
     seen = turn_by_flow(BEFORE.pixels[..., 0], AFTER.pixels[..., 0], guess, 0.05)
     assert seen.turn == pytest.approx(TURN, abs=math.radians(0.3))
     assert seen.sigma < math.radians(0.2)
+
+
+def test_smoothness_compares_pixels_two_columns_apart_with_neighbours_all_around():
+    assert smoothness(np.array([[0, 0, 9, 9]], np.uint8)) == 2.0  # 1 of 1 against 1 of 2
+    assert smoothness(np.array([[0, 9, 0, 9], [0, 9, 9, 9]], np.uint8)) == pytest.approx(2 / 6)
+    assert smoothness(np.full((2, 4), 7, np.uint8)) == 0.0
+
+
+def test_a_line_through_flow_is_as_sure_as_its_points_are_alike_and_outliers_hardly_count():
+    sines, off = np.array([-0.6, -0.6, 0.6, 0.6, -0.2, -0.2, 0.2, 0.2]), 0.003 * np.tile([1.0, -1.0], 4)
+    weights = np.array([1.0, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0])
+    level, sigma = _line(sines, 0.1 + 0.5 * sines + off, weights)
+    scale = 1.5 * 0.003 + 1e-5  # one and a half of the median gap
+    counted = 1.0 / (1.0 + (0.003 / scale) ** 2)  # by Cauchy's loss
+    assert (level, sigma) == pytest.approx((0.1, scale / math.sqrt(20.0 * counted)))
+    worse = _line(np.append(sines, 0.2), np.append(0.1 + 0.5 * sines + off, 3.0), np.append(weights, 4.0))
+    assert worse[0] == pytest.approx(0.1, abs=0.001)
 
 
 def test_a_wrong_turn_of_odometry_is_corrected_and_its_translation_turned_by_half():

@@ -23,7 +23,7 @@ from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.homing import DrivingStatus
+from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
@@ -157,7 +157,18 @@ def test_where_no_likely_place_looks_like_a_doubtful_goal_the_robot_says_so(pose
     doubtful(drive, *poses, probabilities=probabilities)
     route = looked(drive).route
     assert route.state == "gave up"
-    assert "where landmarks put shelf.png it looks different" in route.why
+    assert "where landmarks put shelf.png it looks different; give an image" in route.why
+
+
+def test_a_robot_that_judges_a_place_from_before_it_says_so() -> None:
+    before = np.array((WRONG[0] - 0.2, WRONG[1], WRONG[2]))
+    drive = Drive(start=before)
+    doubtful(drive, WRONG)
+    for _ in range(6):
+        drive.pose = before
+        out = drive.step(status=BLOCKED)
+    assert out.route.state == "gave up"
+    assert "it looks different, from as close as what is there allows; give an image" in out.route.why
 
 
 def test_a_robot_that_is_not_sure_where_it_is_judges_no_place() -> None:
@@ -246,6 +257,23 @@ def test_an_image_of_elsewhere_is_refused_with_what_was_seen() -> None:
     drive = Drive(goal_features=elsewhere)
     with pytest.raises(BadInput, match=rf"where shelf.png was taken: it shows {len(elsewhere)} features, and .* agree"):
         drive.step()
+    found = fix_at(GOAL)
+    few = replace(
+        found,
+        poses=np.array([GOAL, WRONG, START]),
+        covariances=np.repeat(found.covariances[:1], 3, axis=0),
+        inliers=np.array([7, 5, 4]),
+        probabilities=np.array([0.15, 0.1, 0.1]),
+        agree=None,
+    )
+    with pytest.raises(BadInput, match=rf"it shows {len(elsewhere)} features, and 7 landmarks .*; 5 on another place;"):
+        goal_poses("shelf.png", few, elsewhere, mapped_room())
+    alone = few.without(np.array([False, True, True]))
+    with pytest.raises(BadInput, match=r"it shows 0 features, and 7 landmarks .* on one side of it; give an image"):
+        goal_poses("shelf.png", alone, None, mapped_room())
+    for probabilities, poses, is_doubtful in (([0.95, 0.0, 0.05], 1, False), ([0.75, 0.2, 0.05], 2, True)):
+        likely = goal_poses("", replace(few, probabilities=np.array(probabilities)), None, mapped_room())
+        assert (likely[0].tolist(), likely[1]) == ([list(GOAL), list(WRONG)][:poses], is_doubtful)
     with pytest.raises(BadInput, match="without landmarks; learn it again"):
         goal_poses("shelf.png", None, None, graph_of(tour_poses()))
 
@@ -289,7 +317,24 @@ def test_it_drives_to_a_point_ahead_and_its_ratio_falls_from_one_within_each_leg
     assert [v.number for v in vectors] == [1, 1, 1, 2, 3, 3]
     assert [v.ratio for v in vectors] == pytest.approx([1.0, 0.5, 0.05, 1.0, 1.0, 0.8])
     assert [line.at(x).progress.last for x in (4.5, 5.5)] == [False, True]
+    assert vars(line.at(5.5).progress) == vars(PathProgress(0, 0, 1, 3, True, False, False))
     assert line.at(5.5, confidence=0.49).vector.state == "lost"
+
+
+def test_a_leg_is_done_beyond_two_metres_and_none_begins_before_the_robot_knows_where_it_is() -> None:
+    line = Line(6.0)
+    lost = line.at(0.0, confidence=0.3).vector
+    assert (lost.number, lost.ratio, lost.metres, lost.distance) == (0, 1.0, None, pytest.approx(6.0))
+    vectors = [line.at(x).vector for x in (0.0, 2.0, 2.001)]
+    assert [(v.number, v.ratio) for v in vectors] == [(1, 1.0), (1, pytest.approx(0.0)), (2, 1.0)]
+
+
+def test_where_the_map_falls_apart_no_path_leads_to_the_goal() -> None:
+    line = Line(6.0)
+    line.map = graph_of(np.column_stack([np.arange(7.0), np.zeros((7, 2))]))
+    line.map = replace(line.map, edges=np.delete(line.map.edges, 3, axis=0))
+    route = line.at(0.0).route
+    assert (route.state, route.why) == ("gave up", "no path leads to the goal")
 
 
 def test_it_goes_to_points_within_five_metres_of_the_map_and_has_arrived_after_ten_seconds_within_a_decimetre() -> None:

@@ -235,6 +235,17 @@ def test_sure_of_another_place_it_looks_around_no_longer(monkeypatch: pytest.Mon
     assert out.route.places.tolist()[0] == 4
 
 
+@pytest.mark.parametrize("share", [0.5, 0.49])
+def test_on_its_first_route_too_it_looks_around_where_it_was_lost_before(share: float, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(f"{MODULE}.SETTLE_S", 0.4)
+    planner = Planner(3, search_s=2.0)
+    assert planned(planner.look(1) for _ in range(3)) == [False, False, True]
+    planner.state.failed_links, planner.state.failures = np.array([[1, 1]]), np.array([1])
+    belief = PlaceBelief(np.array([0.0, 0.3, 0.0, 0.0, share, 0.0]), np.zeros((6, 3)))
+    outs = [planner.look(belief, "lost", at=0) for _ in range(11)]  # at least half sure of another place
+    assert planned(outs).index(True) == (2 if share == 0.5 else 10)
+
+
 def test_lost_again_on_the_same_link_it_looks_around_too():
     planner = Planner(4)
     planner.look(2)

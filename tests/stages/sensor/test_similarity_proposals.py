@@ -6,7 +6,7 @@ from made_references import references
 
 from omninav.pipeline import Context
 from omninav.stages.sensor.near_references import similarity_field
-from omninav.stages.sensor.similarity_proposals import SimilarityProposals, draw_cells
+from omninav.stages.sensor.similarity_proposals import SimilarityProposals, _search, _steps, draw_cells
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.track import Track
@@ -29,6 +29,12 @@ def test_cells_are_drawn_by_weight_and_sampling_weight() -> None:
     assert shares[1] == pytest.approx(1 / 12, abs=0.004)
     # Half of the draws are by what is above the floor: 0.75 at one cell, three times as much at the other.
     assert np.bincount(drawn, minlength=12)[1] / 40_000 == pytest.approx(0.5 / 12 + 0.5 / 4, abs=0.01)
+
+
+def test_a_running_sum_is_searched_and_taken_apart_again() -> None:
+    running = np.array([1.0, 3.0, 3.0, 7.0])
+    assert _steps(running, np.array([3, 0, 1, 2, 1])).tolist() == [4.0, 1.0, 2.0, 0.0, 2.0]
+    assert _search(running, np.array([0.0, 0.9, 1.0, 2.9, 3.0, 6.9, 7.0])).tolist() == [0, 0, 1, 1, 3, 3, 3]
 
 
 @pytest.mark.parametrize("floor", [0.0, 2.0])

@@ -157,8 +157,9 @@ def test_the_velocity_is_that_of_the_middle_of_a_turning_motion() -> None:
 def test_jitter_counts_from_a_fifth_of_probability_on(odds: float, share: float) -> None:
     likelihood = np.full(StampJitter.unknown().hypotheses.shape, -50.0)
     likelihood[0, 0, 2], likelihood[0, 5, 3] = 3.0, 3.0 + np.log(odds)
-    found = replace(StampJitter.unknown(), hypotheses=likelihood).variance()
-    assert found == pytest.approx(share * 0.02**2, rel=1e-6)
+    for past in (0.0, -900.0, 900.0):  # of many images
+        found = replace(StampJitter.unknown(), hypotheses=likelihood + past).variance()
+        assert found == pytest.approx(share * 0.02**2, rel=1e-6)
 
 
 def test_what_is_not_known_is_nan() -> None:

@@ -11,6 +11,7 @@ from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.perspective import Perspective
+from omninav.stages.unwarp.table import remap_table
 from omninav.stages.unwarp.window import PerspectiveWindow, window_rays
 from omninav.stages.values.image import Image, Pixels, Windows
 
@@ -66,6 +67,19 @@ def test_rays_of_a_level_window_are_a_pinhole_camera_s() -> None:
     assert np.allclose(turned[0, 0], (-1.5 / focal, 1.0, 1.5 / focal))
     up = window_rays(0.0, math.pi / 2, math.radians(90.0), 4, 4)
     assert np.allclose(up[0, 0], (-1.5 / focal, 1.5 / focal, 1.0))
+    odd = window_rays(0.0, 0.0, math.radians(90.0), 4, 3)
+    assert np.allclose(odd[1], [(1.0, left / focal, 0.0) for left in (1.5, 0.5, -0.5, -1.5)])
+
+
+def test_pixels_that_are_not_shown_are_black_and_the_top_and_bottom_of_a_circle_are_its_own_rows() -> None:
+    overhead = np.tile([0.0, 0.0, 1.0], (2, 3, 1))
+    table, shown = remap_table(MIRROR, overhead)
+    assert not shown.any()
+    assert not table.remap(np.full((480, 640, 3), 255, np.uint8)).any()
+    rows = np.zeros((240, 720, 3), np.uint8)
+    rows[0], rows[-1] = 90, 200
+    ends = EQUIRECTANGULAR.unproject(np.array([[[300.0, -0.4]], [[300.0, 239.4]]]))[0]
+    assert remap_table(EQUIRECTANGULAR, ends)[0].remap(rows)[:, 0, 0].tolist() == [90, 200]
 
 
 def test_what_the_camera_does_not_see_is_black_and_said() -> None:

@@ -35,6 +35,8 @@ def test_the_size_in_the_head_is_that_of_the_decoded_image(suffix: str):
 def test_the_size_of_a_progressive_jpeg_and_of_a_lossless_webp_is_read():
     assert size_of(encoded(".jpg", cv2.IMWRITE_JPEG_PROGRESSIVE, 1)) == (20, 12)
     assert size_of(encoded(".webp", cv2.IMWRITE_WEBP_QUALITY, 101)) == (20, 12)
+    lossless = b"RIFF....WEBPVP8L" + bytes(5)
+    assert size_of(lossless + struct.pack("<I", 16383 << 14 | 0x1234) + bytes(9)) == (0x1235, 16384)
     assert size_of(b"P5\n# a comment\n20 # and one more\n12\n255\n") == (20, 12)
 
 
@@ -48,6 +50,7 @@ JPEG = b"\xff\xd8" + SKIPPED + b"\xff\1\xff\xd0\xff\xd7\xff\0\xff\xff\xc2\0\x0b\
         JPEG,
         b"BM" + bytes(12) + struct.pack("<IHH", 12, 515, 300),
         b"BM" + bytes(12) + struct.pack("<Iii", 40, 515, -300),
+        b"RIFF....WEBPVP8 " + bytes(10) + struct.pack("<HH", 515 | 0x4000, 300 | 0x8000),
         b"RIFF....WEBPVP8X" + bytes(8) + b"\2\2\0" + b"\x2b\1\0",
         b"MM\0*" + struct.pack(">I2xHHHIHHHHII", 10, 2, 256, 3, 1, 515, 0, 257, 4, 1, 300),
     ],

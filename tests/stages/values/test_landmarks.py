@@ -6,7 +6,7 @@ from landmark_tour import FEW, mapped_room
 
 from omninav.pipeline.graph.contents import violation
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.landmarks import Landmarks
+from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors, stored_descriptors
 
 
 def seen_by(landmarks: Landmarks, row: int) -> np.ndarray:
@@ -29,6 +29,49 @@ def test_some_references_keep_what_they_see_in_their_order() -> None:
     assert some.words.weights.tolist() == np.concatenate(weights).tolist()
     cut = replace(map, poses=map.poses[rows], features=map.features[rows], edges=FEW, landmarks=some)
     assert violation(cut) is None
+
+
+def test_points_that_some_references_see_are_named_once() -> None:
+    landmarks = mapped_room().landmarks
+    seen = {*seen_by(landmarks, 4).tolist(), *seen_by(landmarks, 5).tolist()}
+    assert landmarks.seen_by(np.array([5, 4])).tolist() == sorted(seen)
+    values = np.array([[0.0, 0.25, 1.0]], np.float32)
+    assert stored_descriptors(values).tolist() == [[0, 128, 255]]
+    assert restored_descriptors(stored_descriptors(values)).tolist() == [[0.0, 0.25, 255 / 512]]
+
+
+def test_a_camera_described_as_the_tours_sits_and_lags_as_the_tours_did() -> None:
+    tours, shown = np.array([0.1, 0.2, 0.3]), np.array([0.15, 0.26, 0.37])
+    landmarks = replace(mapped_room().landmarks, described=tours, mount=shown, described_delay_s=0.1, delay_s=0.15)
+    beside, turned = np.array([0.5, 0.2, 0.3]), np.array([0.1, 0.2, 0.4])
+    for described, placed, pose in [
+        (tours, True, [0.15, 0.26, 0.07]),
+        (tours, False, [0.15, 0.26, 0.07]),
+        (beside, True, [0.5, 0.2, 0.0]),
+        (beside, False, [0.15, 0.26, 0.07]),
+        (turned, True, [0.1, 0.2, 0.0]),
+        (turned, False, [0.15, 0.26, 0.0]),
+    ]:
+        assert landmarks.mounted(described, placed) == pytest.approx(pose)
+    assert [landmarks.late_by(stated) for stated in (None, 0.1, 0.2)] == pytest.approx([0.15, 0.05, 0.0])
+
+
+def test_poses_that_are_ruled_out_leave_the_others_more_probable() -> None:
+    fix = LandmarkFix(
+        np.arange(9.0).reshape(3, 3),
+        np.eye(3) * np.array([1.0, 2.0, 3.0])[:, None, None],
+        np.array([30, 20, 10]),
+        np.array([0.5, 0.2, 0.1]),
+        90,
+        agree=np.array([0, 1, 2, -1, 2], np.int8),
+    )
+    left = fix.without(np.array([False, True, False]))
+    assert len(left) == 2
+    assert (left.poses[:, 0].tolist(), left.inliers.tolist()) == ([0.0, 6.0], [30, 10])
+    assert left.covariances[:, 0, 0].tolist() == [1.0, 3.0]
+    assert left.probabilities == pytest.approx([0.625, 0.125])
+    assert left.agree.tolist() == [0, -1, 1, -1, 1]
+    assert replace(fix, agree=None).without(np.array([True, True, False])).agree is None
 
 
 def test_references_that_came_later_and_none_at_all_see_nothing() -> None:
@@ -64,6 +107,10 @@ def test_landmarks_of_more_references_than_the_map_has_are_a_contradiction() -> 
     map = mapped_room()
     fewer = replace(map, poses=map.poses[:5], features=map.features[:5], edges=FEW)
     assert violation(fewer) == f"'landmarks' are of {len(map)} references, and the map has 5"
+    other = replace(map.landmarks.words, centres=map.landmarks.words.centres[:, :64])
+    assert violation(replace(map.landmarks, words=other)) == (
+        "'words' are of descriptors of 64 numbers, those of the landmarks have 128"
+    )
     grown = replace(map, poses=np.concatenate([map.poses, map.poses]), features=np.concatenate([map.features] * 2))
     assert violation(grown) is None
 

@@ -1,6 +1,10 @@
 import numpy as np
+import pytest
 
+from omninav.pipeline import BadInput
+from omninav.stages.values.map_places import map_poses
 from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
 
 def three_views() -> ViewMixtures:
@@ -28,3 +32,20 @@ def test_new_mixtures_stand_in_place_of_those_of_their_views_alone() -> None:
     map = three_views()
     map.put_mixtures(np.array([1]), np.full((1, 3), 9.0), np.eye(3)[None], np.array([0.5]), np.array([7.0]))
     assert (map.owner.tolist(), map.means[:, 0].tolist()) == ([0, 2, 1], [0.0, 3.0, 9.0])
+    assert map_poses(map) is map.means
+
+
+def test_views_of_another_kind_or_size_are_refused_and_only_a_settled_threshold_is_kept() -> None:
+    map = three_views()
+    map.check_kind(Coefficients(np.ones(2, np.float32), np.ones((1, 2), np.float32)))
+    with pytest.raises(BadInput, match="are Coefficients of 2 numbers, the current one is Coefficients of 3"):
+        map.check_kind(Coefficients(np.ones(3, np.float32), np.ones((1, 3), np.float32)))
+    for size, kind in ((3, "Coefficients"), (2, "Spectrum")):
+        with pytest.raises(ValueError, match=f"{kind} of {size} numbers in a map of Coefficients of 2"):
+            map.add_view(np.ones(size, np.float32), kind)
+    for threshold, kept in ((None, None), (NoveltyThreshold(1.0, False), None), (NoveltyThreshold(2.0), 2.0)):
+        map.keep_threshold(threshold)
+        assert (map.threshold and map.threshold.distance) == kept
+    before = map.owner.tolist()
+    map.keep_views(np.ones(3, np.bool_))
+    assert (map.owner.tolist(), map.steps) == (before, 3)
