@@ -486,7 +486,7 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
         )
     if abs(fit.angle) > MISTURNED:
         return (
-            f"the camera looks {math.degrees(fit.angle):+.0f} degrees off from where odometry drives, by the best "
+            f"the camera looks {math.degrees(-fit.angle):+.0f} degrees off from where odometry drives, by the best "
             f"matches in the map ({agree}): check `yaw` (or `column_of_forward`) in camera.yaml, and that odometry's "
             "x is forward"
         )

@@ -15,6 +15,8 @@ FAR = 1e5
 Coordinate = Annotated[float, Bounds(ge=-FAR, le=FAR)]
 Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Bounds(gt=0, le=FAR)]
+Extent = tuple[Positive, Positive]
+LampSpacing = Annotated[float, Bounds(ge=0.3, le=FAR)]
 Spread = Annotated[float, Bounds(ge=0, le=FAR)]
 Share = Annotated[float, Bounds(ge=0, le=1)]
 OfHalls = Literal["wall", "concrete", "stripes", "floor", "ceiling", "lamp"]
@@ -50,7 +52,7 @@ class Block:
     """A box: pillar, counter, inner wall, piece of furniture, mat."""
 
     centre: Point
-    size: Point
+    size: Extent
     height: Positive
     material: Material = "concrete"
     """Texture of its sides."""
@@ -85,7 +87,7 @@ class Lamp:
     """A ceiling lamp."""
 
     centre: Point
-    size: Point = (1.2, 0.3)
+    size: Extent = (1.2, 0.3)
     light: tuple[float, float, float] = (0.96, 1.0, 1.0)
     """Colour: blue, green, red; 1 is ordinary brightness."""
     z: float | None = None
@@ -98,8 +100,8 @@ class Lamp:
 class LampGrid:
     """Lamps at equal distances over the whole hall."""
 
-    spacing: Point = (3.0, 3.0)
-    size: Point = (1.2, 0.3)
+    spacing: tuple[LampSpacing, LampSpacing] = (3.0, 3.0)
+    size: Extent = (1.2, 0.3)
     light: tuple[float, float, float] = (0.96, 1.0, 1.0)
 
 
@@ -109,7 +111,7 @@ class AisleBlock:
 
     corner: Point
     """Lower left."""
-    size: Point
+    size: Extent
     name: str = ""
     along: Literal["x", "y"] = "y"
     """Direction of the aisles."""
@@ -155,7 +157,7 @@ class Room:
     name: str
     corner: Point
     """Lower left."""
-    size: Point
+    size: Extent
     doors: tuple[Door, ...] = ()
     windows: tuple[Side, ...] = ()
     """Sides with a row of windows; each has a curtain."""
@@ -398,7 +400,7 @@ class WorldConfig:
     plan: Literal["paper", "drawn"] = "paper"
     """`paper`: walls, doors, rooms, aisles, lamps and routes as listed, of the papers' kind and size; `drawn`: by the
     seed, others in each draw."""
-    size: Point = (12.0, 9.0)
+    size: Extent = (12.0, 9.0)
     height: Positive = 3.2
     wall: Material = "wall"
     floor: Material = "floor"

@@ -28,6 +28,8 @@ COMFORT_DISTANCE_M = 0.6
 """Distance (m) beyond the radius from which on obstacles cost nothing."""
 POINT_SPACING_M = 0.4
 """Metres between the points of a path."""
+RECENT = 40
+"""Largest number of aisles visited last to which a random route does not return."""
 MAX_GOAL_SHIFT_M = 1.2
 """Metres by which a goal without room for the robot may be moved."""
 JITTER_PERIOD_M = 2.5
@@ -193,7 +195,7 @@ def _at_random(
             near = sorted(
                 (math.dist(at, aisles[k].ends[end]), k, end)
                 for k in open_aisles
-                if k not in seen[-40:]
+                if k not in seen[-min(RECENT, len(open_aisles) - 1) :] or len(open_aisles) == 1
                 for end in (0, 1)
             )[:16]
             _, number, end = near[int(rng.integers(len(near)))]

@@ -95,7 +95,7 @@ class ExportMap(Tool):
         if self.images is None and not file.exists():
             raise BadInput(
                 f"{source.path}: a map holds no images, and there is no {BESIDE} beside it; export the map in the "
-                f"folder of a run that learned it from a tour, or type images=FOLDER/{BESIDE}"
+                f"folder of a run with tour=… and log=…, or type images=FOLDER/{BESIDE}"
             )
         images = read_artifact(file)
         if not isinstance(images, Thumbnails):

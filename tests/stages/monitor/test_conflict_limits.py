@@ -174,7 +174,7 @@ def placed(
         (tracked, {"scale": 2.0}, "odometry is about 0.5 times as long"),
         (tracked, {"scale": 0.5}, "odometry is about 2 times as long"),
         (tracked, {"angle_deg": 15.0}, ""),
-        (tracked, {"angle_deg": 90.0}, "degrees off from where odometry drives"),
+        (tracked, {"angle_deg": 90.0}, "the camera looks +90 degrees off from where odometry drives"),
         (tracked, {"scale": 2.0, "correlation": 0.98}, ""),  # the best match of a standing robot goes back and forth
         (tracked, {"scale": 2.0, "correlation": 0.96}, "odometry is about 0.5 times as long"),
     ],

@@ -275,6 +275,19 @@ def test_a_place_without_room_is_refused_with_its_coordinates() -> None:
 # Lay-outs
 
 
+def test_a_random_route_returns_to_aisles_where_there_are_few() -> None:
+    world = world_of("home_store_small")
+    routes = world.routes | {"far": Route(kind="random", length=250.0)}
+    far = SimulatedRecording(dataclasses.replace(world, routes=routes), "far", 0)
+    assert distances_along(far.true_poses)[-1] > 200.0
+
+
+def test_sizes_of_zero_and_lamps_without_number_are_refused() -> None:
+    for given, said in (({"size": [0, 5]}, "size[0]: 0"), ({"lamp_grid": {"spacing": [3, 0.001]}}, "spacing[1]: 0.001")):
+        problems = convert(given, WorldConfig, "world")[1]
+        assert any(said in str(problem) for problem in problems)
+
+
 def test_an_aisle_block_fills_its_rectangle_with_rows_no_closer_than_an_aisle() -> None:
     block = AisleBlock((10.0, 5.0), (20.0, 12.0), "paint", aisle=2.0, depth=1.0, cross_aisles=1)
     layout = expand(WorldConfig(size=(40.0, 30.0), aisle_blocks=(block,)))
