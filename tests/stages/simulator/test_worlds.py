@@ -283,7 +283,10 @@ def test_a_random_route_returns_to_aisles_where_there_are_few() -> None:
 
 
 def test_sizes_of_zero_and_lamps_without_number_are_refused() -> None:
-    for given, said in (({"size": [0, 5]}, "size[0]: 0"), ({"lamp_grid": {"spacing": [3, 0.001]}}, "spacing[1]: 0.001")):
+    for given, said in (
+        ({"size": [0, 5]}, "size[0]: 0"),
+        ({"lamp_grid": {"spacing": [3, 0.001]}}, "spacing[1]: 0.001"),
+    ):
         problems = convert(given, WorldConfig, "world")[1]
         assert any(said in str(problem) for problem in problems)
 
