@@ -6,12 +6,13 @@ import numpy as np
 
 from omninav.pipeline import BadInput, Context, Tool, user_path
 from omninav.pipeline.api.run import Run
+from omninav.pipeline.report.warning_lines import grouped, warning_lines
 from omninav.stages.metrics.causes import stretches
 from omninav.stages.metrics.stretches import logs_of, row_of, summaries
 
 
 class ExplainRun(Tool):
-    """Prints where a run was searching, unsure, blind or wrong, what happened there, and what to do.
+    """Prints where a run was searching, unsure, blind or wrong, what happened there, what to do, and its warnings.
 
     Raises BadInput for a folder that is no run, or whose run did not end or estimates no pose.
     """
@@ -39,6 +40,8 @@ class ExplainRun(Tool):
             print(f"\nimages {images:<9} {seconds:>12} s {metres:>6} m   {state:<10} {cause}\n  {evidence}")
             if advice:
                 print(f"  -> {advice}")
+        for line in grouped(warning_lines(ended.manifest)):
+            print(f"\nwarning: {line}")
 
 
 def columns_of_run(run: Run) -> dict[str, Any]:

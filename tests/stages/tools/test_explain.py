@@ -30,10 +30,13 @@ def test_a_run_that_estimates_no_pose_or_did_not_end_is_refused(tmp_path):
 
 
 def test_a_run_that_failed_is_said_to_be_no_whole_one(tmp_path, capsys):
-    run_folder(tmp_path, small_run(frames=60).drive, status="failed", error="the disk is full")
+    run_folder(
+        tmp_path, small_run(frames=60).drive, status="failed", error="the disk is full", warnings=["images come late"]
+    )
     ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
     said = capsys.readouterr().out
     assert said.startswith("the run is failed (the disk is full); this is of its first 60 images\n")
+    assert said.endswith("\nwarning: images come late\n")
 
 
 def run_folder(folder, drive, **manifest):
