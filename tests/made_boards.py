@@ -1,4 +1,4 @@
-"""Where checkerboards are held around cameras that are known."""
+"""Checkerboards around cameras that are known."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +15,7 @@ COLUMNS, ROWS = 6, 5
 
 
 def boards(elevation: float, count: int = 6) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Where boards are held: around the camera, facing it, turned and tilted; rotation and place, in squares."""
+    """Poses of boards around the camera, facing it, turned and tilted: rotation, and place in squares."""
     found = []
     for number in range(count):
         away = unit_vectors(2 * np.pi * number / count + 0.3, elevation)

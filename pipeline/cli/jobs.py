@@ -140,8 +140,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prep
     check_objective(settings.get("objective"), prepared.graph)
     if sweep is None and folder is not None:
         no_run_in(folder)
-    other = None if sweep is None else _job_of(sweep.folder)
-    if sweep is not None and other not in (None, sweep.number):
+    if sweep is not None and (other := _left_in(sweep.folder).get("job", sweep.number)) != sweep.number:
         own = "hydra.sweep.subdir='${hydra.job.num}'"
         raise BadInput(f"{sweep.folder}: job {other} has left its run there; give each job its own folder: {own}")
     argv = ["omninav", *(sweep.overrides if sweep else sys.argv[1:])]
@@ -195,20 +194,19 @@ def _sweep_job() -> SweepJob | None:
     return SweepJob(sweep, own, str(settings.job.num), tuple(settings.overrides.task))
 
 
-def _job_of(folder: Path) -> str | None:
-    """The number of the job that left a run in a folder."""
+def _left_in(folder: Path) -> dict[str, Any]:
+    """The manifest of the run that a job left in a folder; empty where there is none."""
     file = folder / "manifest.json"
-    return json.loads(file.read_text(encoding="utf-8")).get("job") if file.exists() else None
+    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else {}
 
 
 def note_end(job: SweepJob, end: JobEnd) -> None:
     """Put a job's end into its manifest, where its sweep's page finds it; not into that of another job."""
-    if _job_of(job.folder) not in (None, job.number):
+    manifest = _left_in(job.folder) or {"status": "refused"}
+    if manifest.get("job", job.number) != job.number:
         return
-    file = job.folder / "manifest.json"
-    manifest = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"status": "refused"}
     manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": end.error} if end.error else {})
-    write_json(file, manifest)
+    write_json(job.folder / "manifest.json", manifest)
 
 
 def write_page(sweep: Path) -> Path:

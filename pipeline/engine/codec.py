@@ -103,10 +103,15 @@ def _describe_all(things: Sequence[Any], arrays: _Arrays) -> Any:
         columns = [[thing[key] for thing in things] for key in keys]
         return ["dicts", _describe(keys, arrays), *(_describe_all(column, arrays) for column in columns)]
     forms = {(thing.dtype, thing.shape) for thing in things} if not kinds and kind is np.ndarray else ()
-    if len(forms) == 1 and not things[0].dtype.hasobject and not things[0].dtype.names:
+    if len(forms) == 1 and _of_numbers(things[0].dtype):
         offset = arrays.add(b"".join([thing.tobytes() for thing in things]))
         return ["arrays", things[0].dtype.str, list(things[0].shape), offset]
     return ["each", *(_describe(thing, arrays) for thing in things)]
+
+
+def _of_numbers(dtype: np.dtype[Any]) -> bool:
+    """Tells whether arrays of this type are plain: neither objects nor records with names."""
+    return not (dtype.hasobject or dtype.names)
 
 
 def _restore_all(header: Any, data: memoryview, number: int) -> list[Any]:
@@ -143,7 +148,7 @@ def _describe(thing: Any, arrays: _Arrays) -> Any:
     if isinstance(thing, _PLAIN):
         return thing
     if isinstance(thing, np.ndarray | StoredRows):
-        if thing.dtype.hasobject or thing.dtype.names or isinstance(thing, np.ma.MaskedArray):
+        if not _of_numbers(thing.dtype) or isinstance(thing, np.ma.MaskedArray):
             such = "with a mask" if isinstance(thing, np.ma.MaskedArray) else f"of {thing.dtype}"
             raise BadEncoding(f"an array {such} cannot be written: use a plain array of numbers")
         return ["array", thing.dtype.str, list(thing.shape), arrays.add(np.ascontiguousarray(thing).tobytes())]

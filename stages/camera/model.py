@@ -230,9 +230,9 @@ def seen_at(camera: Camera, rays: Array) -> Array:
     return np.where(shown[..., None], pixels, np.nan)
 
 
-SIGHT_STEPS, LEAST_SIGHT, LEAST_AROUND = (144, 73), 0.001, 0.75
-"""Azimuths and elevations at which a camera is asked what it sees, the share of the sphere that it must see: 7 by 7
-degrees, and the share of all azimuths that a ring must show."""
+SIGHT_STEPS, MIN_SIGHT, MIN_AZIMUTHS = (144, 73), 0.001, 0.75
+"""Numbers of azimuths and elevations at which a camera is asked what it sees; smallest share of the sphere that it sees
+(7 by 7 degrees), and of all azimuths that a ring shows."""
 
 
 def require_sight(camera: Camera) -> None:
@@ -248,13 +248,13 @@ def require_sight(camera: Camera) -> None:
         pixels, shown = camera.project(unit_vectors(azimuths[:, None], elevations))
         looks = camera.unproject(camera.grid()[:: max(1, camera.height_px // 64), :: max(1, camera.width // 64)])[1]
     share = float((shown * np.cos(elevations)).sum() / (SIGHT_STEPS[0] * np.cos(elevations).sum()))
-    if not np.isfinite(pixels[shown]).all() or share < LEAST_SIGHT or not looks.any():
+    if not np.isfinite(pixels[shown]).all() or share < MIN_SIGHT or not looks.any():
         raise BadInput(
             f"camera: with these numbers a {camera.projection} camera of {camera.width} x {camera.height_px} pixels "
             f"sees {100 * share:.2g} % of all directions; check the model, the mask and the size in camera.yaml"
         )
     around = float(shown.any(axis=1).mean())
-    if camera.ring is not None and around < LEAST_AROUND:
+    if camera.ring is not None and around < MIN_AZIMUTHS:
         raise BadInput(
             f"camera: of the ring around ({camera.ring.centre_x:g}, {camera.ring.centre_y:g}) an image of "
             f"{camera.width} x {camera.height_px} shows {100 * around:.0f} % of all azimuths; correct the centre"

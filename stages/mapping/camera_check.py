@@ -66,9 +66,8 @@ class CameraCheck(NamedTuple):
     ) -> "CameraCheck":
         """The check of a map's features with these bearings (F, 3) of all references in order."""
         pixels = np.concatenate([np.empty((0, 2)), *(each.points for each in found if each is not None)])
-        if camera is None or not camera.elevations_known or camera.elevations is None or not len(pixels):
-            return cls(None, {}, pixels, bearings)
-        if len(found) < MIN_VIEWS:
+        few = len(found) < MIN_VIEWS or not len(pixels)
+        if few or camera is None or not camera.elevations_known or camera.elevations is None:
             return cls(None, {}, pixels, bearings)
         names = observed(camera, poses_given)
         rays = adjustable(camera, pixels, names).bearings(np.zeros(len(names)))

@@ -16,7 +16,7 @@ from .recording import UnreadableRecording
 DARK = 24
 """Mean grey level of what is outside the circles of two fisheyes; JPEG and video compression let no black be 0."""
 
-LEAST_SIDES = 1.5
+MIN_ASPECT = 1.5
 """Smallest ratio of columns to rows of an image that goes full circle."""
 
 
@@ -34,7 +34,7 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
             f"camera={name}: images of {width} x {height} are no two fisheyes side by side; join a video's two tracks: "
             "`ffmpeg -i VIDEO -filter_complex [0:v:0][0:v:1]hstack both.mp4`"
         )
-    if name == "equirectangular" and width < LEAST_SIDES * height:
+    if name == "equirectangular" and width < MIN_ASPECT * height:
         raise UnreadableRecording(
             f"camera={name}: images of {width} x {height} are no equirectangular ones, twice as wide as high, "
             "or wider where they are a strip; a mirror's are camera=donut, or better a camera.yaml with its numbers"

@@ -1,4 +1,4 @@
-"""What `check_stage` says of stages, and of frames, that are wrong."""
+"""`check_stage` names what is wrong with stages and frames."""
 
 from typing import Any
 
