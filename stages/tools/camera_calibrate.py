@@ -13,6 +13,7 @@ from omninav.stages.camera.model import Ring
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.unwarp.checkerboard_calibration import BoardFit, Model, board_points, calibrated
 from omninav.stages.values.image import Image, Pixels
 
@@ -20,6 +21,8 @@ from .camera_look import draw_panorama
 
 MAX_SQUARES = 40
 """Inner corners of a board along one side."""
+SAME_PX = 1.0
+"""Images whose every corner is this near (pixels) to another image's show one view of the board."""
 
 
 class CalibrateCamera(Tool):
@@ -27,7 +30,7 @@ class CalibrateCamera(Tool):
 
     Writes camera.yaml, and beside it a picture: the panorama that it gives, every corner's residual, and each image's.
     Height and yaw are not known from a board; the ring of the mirror is found in the image. Raises BadInput where the
-    board is seen in fewer than three images, or no camera of that model explains them.
+    board is seen in fewer than three views, images are of several sizes, or no camera of that model explains them.
     """
 
     example = "images=FOLDER board=9x6"
@@ -52,18 +55,34 @@ class CalibrateCamera(Tool):
         if there := next((each for each in (path, picture) if each.exists()), None):
             raise BadInput(f"calibrate: {there} is there; type another name, or delete it")
         columns, rows = board_size(self.board)
-        recording = open_recording(self.images, camera="perspective")  # of which no number is used
+        try:
+            recording = open_recording(self.images, camera="perspective")  # of which no number is used
+        except UnreadableRecording as error:  # it speaks of the setting of a run
+            raise BadInput(re.sub(r"(^|type )log=", r"\1images=", str(error))) from None
         chosen = np.unique(np.linspace(0, len(recording.stamps) - 1, self.max_images).round().astype(int)).tolist()
         ctx.status("looking for the board in the images")
         seen: dict[int, Array] = {}
+        copies: list[int] = []
         first: Pixels | None = None
         for done, frame in enumerate(chosen):
             ctx.progress(done, len(chosen))
             pixels = recording.image(frame)
             corners = None if pixels is None else find_corners(pixels, columns, rows)
-            if corners is not None:
+            if corners is None:
+                continue
+            same = next((other for other in seen if np.abs(seen[other] - corners).max() < SAME_PX), None)
+            if same is None:
                 seen[frame] = corners
                 first = pixels if first is None else first
+            else:
+                copies.append(frame)
+                print(f"image {frame}: left out, it shows the board where image {same} does")
+        if odd := recording.dropped["wrong_size"]:
+            which = recording.details["wrong_size"].replace("the camera", "the first one")
+            raise BadInput(
+                f"calibrate: {odd} of {len(chosen)} images are of another size than the first one: {which}; "
+                "give images of one size"
+            )
         if first is None:
             raise BadInput(
                 f"calibrate: no board of {columns} x {rows} inner corners is seen in any of {len(chosen)} images; "
@@ -77,10 +96,10 @@ class CalibrateCamera(Tool):
         write_whole(picture, draw_calibration(found, list(seen), list(seen.values()), first))
         for frame, rms in zip(seen, found.rms_px, strict=True):
             print(f"image {frame}: {rms:.2f} px")
-        missed = f"; no board in images {', '.join(str(frame) for frame in chosen if frame not in seen)}"
+        empty = [str(frame) for frame in chosen if frame not in seen and frame not in copies]
         print(
             f"{path}: {self.projection}, {np.sqrt(np.mean(found.rms_px**2)):.2f} px over {len(seen)} images"
-            f"{missed if len(seen) < len(chosen) else ''}; look at {picture}"
+            f"{'; no board in images ' if empty else ''}{', '.join(empty)}; look at {picture}"
         )
 
 

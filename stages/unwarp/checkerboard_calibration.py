@@ -16,7 +16,7 @@ from omninav.stages.geometry.arrays import Array
 Model = Literal["ocamcalib", "hyperbolic", "fisheye"]
 Make = Callable[[tuple[int, int], Ring, Array], Camera]
 MIN_BOARDS = 3
-"""Images of a board: with fewer, focal length and distance cannot be separated."""
+"""Views of a board: with fewer, focal length and distance cannot be separated."""
 SHAPES = (1.02, 1.08, 1.2, 1.5, 2.0)
 TOP_DEG = (0.0, 10.0, 20.0, 30.0, 45.0)
 """Mirrors that are tried as a start: `k` of `mirror_camera`, and the elevation of the image's rim."""
@@ -116,7 +116,7 @@ def calibrated(model: Model, size: tuple[int, int], ring: Ring, corners: Sequenc
     BadInput for fewer than `MIN_BOARDS`, and where no start fits.
     """
     if len(corners) < MIN_BOARDS:
-        raise BadInput(f"calibrate: the board is seen in {len(corners)} images, at least {MIN_BOARDS} are needed")
+        raise BadInput(f"calibrate: {MIN_BOARDS} different views of the board are needed, {len(corners)} found")
     found = np.stack(corners)
     make: Make = lens_camera if model == "fisheye" else mirror_camera
     starts = lens_starts(ring) if model == "fisheye" else mirror_starts(ring)

@@ -68,3 +68,22 @@ def test_what_cannot_be_calibrated_is_said(tmp_path: Path) -> None:
     ):
         with pytest.raises(BadInput, match=what):
             stage.run(Context("calibrate"))
+
+
+def test_copies_of_an_image_are_one_view_and_odd_sizes_and_names_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    board, other = (rendered(MIRROR, *pose) for pose in boards(-0.1)[:2])
+    images = tmp_path / "images"
+    images.mkdir()
+    stage = CalibrateCamera(images=str(images), board=f"{COLUMNS}x{ROWS}", out=str(tmp_path / "camera.yaml"))
+    with pytest.raises(BadInput, match=f"type images=LAYOUT:{images}"):
+        stage.run(Context("calibrate"))
+    for number in range(3):
+        cv2.imwrite(str(images / f"{number}.png"), board)
+    with pytest.raises(BadInput, match="3 different views of the board are needed, 1 found"):
+        stage.run(Context("calibrate"))
+    assert "image 2: left out, it shows the board where image 0 does" in capsys.readouterr().out
+    cv2.imwrite(str(images / "1.png"), other[::2, ::2])
+    with pytest.raises(BadInput, match=r"1 of 3 images .*1\.png is 320 x 240, the first one 640 x 480; give images"):
+        stage.run(Context("calibrate"))

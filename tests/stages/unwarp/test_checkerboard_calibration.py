@@ -123,7 +123,7 @@ def test_one_board_that_is_wrong_does_not_bend_the_camera() -> None:
 def test_three_boards_are_enough_and_two_too_few() -> None:
     corners = seen(MIRROR, -0.1)
     assert calibrated("hyperbolic", SIZE, MIRROR.ring, corners[:3], BOARD).rms_px.max() < 0.05
-    with pytest.raises(BadInput, match="in 2 images, at least 3 are needed"):
+    with pytest.raises(BadInput, match="3 different views of the board are needed, 2 found"):
         calibrated("hyperbolic", SIZE, MIRROR.ring, corners[:2], BOARD)
 
 
