@@ -55,13 +55,19 @@ class CameraDevice:
 
 
 def device_camera(device: str, camera: str | None, pixels: Pixels) -> tuple[Camera, str]:
-    """Camera model of a device, and what was assumed ("": nothing). Raises `BadInput` where it is unknown.
+    """Camera model of a device, and what was assumed ("": nothing). Raises `BadInput` where it is unknown or misfits.
 
     `camera`: a camera.yaml, or the name of a projection; null: assumed where an image looks like one. `pixels`: one.
     """
     if camera is None:
         return assumed_camera(f"camera {device:.100}", pixels)
-    return named_camera(camera, lambda: pixels.shape[1::-1])[0], ""
+    model, (height, width) = named_camera(camera, lambda: pixels.shape[1::-1])[0], pixels.shape[:2]
+    if (model.width, model.height_px) != (width, height):
+        raise BadInput(
+            f"camera={camera:.100} is of images of {model.width} x {model.height_px}, camera {device:.100} gives "
+            f"{width} x {height}; name the camera.yaml of this size"
+        )
+    return model, ""
 
 
 def image_message(pixels: Pixels, stamp: int, quality: int) -> bytes:

@@ -38,11 +38,14 @@ def test_images_that_come_too_fast_are_left_out(tmp_path: Path, device: str) -> 
 
 
 def test_what_cannot_be_recorded_is_said(tmp_path: Path, device: str) -> None:
+    other, made = tmp_path / "camera.yaml", tmp_path / "x.mcap"
+    other.write_text("{projection: cylindrical, image: {width: 16, height: 4}, column_of_forward: 8, sense: clockwise}")
     for stage, what in (
+        (RecordCamera(device=device, camera=str(other), out=str(made)), "of images of 16 x 4, .* gives 80 x 64; name"),
         (RecordCamera(device="/dev/none"), "there is no camera /dev/none; type its number"),
         (RecordCamera(device="987"), "camera 987 cannot be opened"),
         (RecordCamera(device=device, out="drive.avi"), "type out=camera.mcap"),
-        (RecordCamera(device=device, out=str(tmp_path / "x.mcap")), "nothing states how its images of 80 x 64"),
+        (RecordCamera(device=device, out=str(made)), "nothing states how its images of 80 x 64"),
     ):
         with pytest.raises(BadInput, match=what):
             stage.run(Context("record"))
