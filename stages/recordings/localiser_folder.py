@@ -14,7 +14,7 @@ from .tables import NO_TIME, Time, read_table
 from .truth_file import trajectory_rows
 
 POSES = ("poses.csv", "poses.tum")
-"""Files that hold its poses: the first that is there."""
+"""Files of which one holds its poses."""
 COST = "cpu_ms"
 """The column of `poses.csv` with the processor time that each image took, which it may have."""
 
@@ -70,10 +70,14 @@ def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, Array]:
     """Poses (N, 3) that the localiser left, NaN where it gave none; and the processor time of each image (ms).
 
     `poses.csv` (time, x, y and heading, or qx, qy, qz, qw; perhaps `cpu_ms`) or `poses.tum` (time x y z qx qy qz qw).
-    There are as many of these as the file states. Raises `BadInput` where there is no such file, where it cannot be
-    read or is doubted, and where one of its times is that of no image, or of an image that has a pose.
+    There are as many of these as the file states. Raises `BadInput` where there is no such file, or both, where it
+    cannot be read or is doubted, where a row holds half a place, and where one of its times is that of no image, or of
+    an image that has a pose.
     """
-    file = next((folder / name for name in POSES if (folder / name).is_file()), None)
+    files = [folder / name for name in POSES if (folder / name).is_file()]
+    if len(files) > 1:
+        raise BadInput(f"it left {' and '.join(POSES)}; leave only the one that holds its poses")
+    file = next(iter(files), None)
     if file is None:
         raise BadInput(f"it left no {' and no '.join(POSES)} in the folder that it was given; docs/peers.md says how")
     poses = np.full((len(drive), 3), np.nan)
@@ -84,7 +88,11 @@ def read_poses(folder: Path, drive: RecordedImages) -> tuple[Array, Array]:
         raise BadInput(f"{file.name}: {counted(impossible, 'quaternion')} of no rotation")
     if doubts:
         raise BadInput(f"{file.name}: {doubts[0]}")
-    given = np.isfinite(rows[:, :2]).all(axis=1)
+    placed = np.isfinite(rows[:, :2])
+    given = placed.all(axis=1)
+    if (half := placed.any(axis=1) & ~given).any():
+        where = f"{counted(int(half.sum()), 'row')} with x or y alone, the first at {times[half][0] / 1e9:.6f} s"
+        raise BadInput(f"{file.name}: {where}; leave out the row of an image that has no pose")
     times = times[given]
     if (times == NO_TIME).any():
         raise BadInput(f"{file.name}: a pose without a time; it is that of the image in drive/images.csv")

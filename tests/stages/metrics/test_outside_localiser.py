@@ -81,6 +81,8 @@ def test_a_tum_file_will_do_and_an_empty_one_says_that_no_image_has_a_pose(tmp_p
         ("write('time,x,y,heading\\n1000000000,1e40,2,0')", "out of all proportion"),
         ("write('time,x,y,heading\\n1000000000,1,2,90')", "headings of up to 90 are read as radians"),
         ("write('time,x,y,qx,qy,qz,qw\\n1000000000,1,2,1,0,0,0')", "is w the first of their quaternions"),
+        ("write('time,x,y,heading\\n1000000000,1,two,0')", "1 row with x or y alone, the first at 1000000000.000000 s"),
+        ("write('time,x,y,heading'); open(sys.argv[-1] + '/poses.tum', 'w')", "it left poses.csv and poses.tum; leave"),
         ("write('time,x,y,heading\\n,1,2,0.5')", "a pose without a time"),
         ("write('time,x,y,heading' + 5 * '\\n1000000000,1,2,0')", "5 poses of 4 images"),
     ],
