@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from omninav.pipeline import BadInput, Context, Tool
+from omninav.pipeline.engine.artifact import artifact_digest
 from omninav.stages.map_files.aligned import aligned
 from omninav.stages.map_files.aligned_by_landmarks import aligned_by_landmarks
 from omninav.stages.map_files.places import joined_places
@@ -25,7 +26,7 @@ class JoinMaps(Tool):
     All must be of one kind, with views made in the same way. Maps of references whose poses are in frames of their own
     are moved as a whole to where the landmarks that they share agree, or else aligned by references that look alike,
     which also straightens them (`aligned`). No edge or link is added between maps. Raises BadInput where a map does not
-    fit the first, and where too little that looks alike joins it to the others.
+    fit the first or is given twice, and where too little that looks alike joins it to the others.
     """
 
     example = "a.omap b.omap out=joined.omap"
@@ -42,8 +43,13 @@ class JoinMaps(Tool):
         sources = read_saved(self.maps, at_least=2)
         path = target(self.out, sources)
         refuse_other_views(sources)
+        digests = [artifact_digest(source.path) for source in sources]
+        if again := next((source for n, source in enumerate(sources) if digests[n] in digests[:n]), None):
+            raise BadInput(f"{again.path}: this map is given twice, here or under another name; name each map once")
         given: list[PoseSource] = [source.map.pose_source for source in sources]
         frame: PoseSource = next((source for source in given if source != "truth"), "truth")
+        if "truth" in given and frame != "truth" and (self.same_frame or given[0] == "truth"):
+            frame = "estimate"  # measured poses, brought into the frame of true ones
         map = joined([source.map for source in sources], frame)
         if not self.same_frame:
             map = _in_one_frame(sources, map, ctx.rng) if frame != "truth" else _checked(sources, map, ctx.rng)
