@@ -19,6 +19,10 @@ Extent = tuple[Positive, Positive]
 LampSpacing = Annotated[float, Bounds(ge=0.3, le=FAR)]
 Spread = Annotated[float, Bounds(ge=0, le=FAR)]
 Share = Annotated[float, Bounds(ge=0, le=1)]
+MAX_PEOPLE_PER_M2 = 1.0
+"""Most people in a world, per square metre of its floor: closer together nobody walks."""
+MAX_BESIDE_M = 0.02
+"""Metres by which a room or a door may be over an edge: plans are drawn to the centimetre."""
 OfHalls = Literal["wall", "concrete", "stripes", "floor", "ceiling", "lamp"]
 OfStores = Literal["wood", "mat", "counter", "door", "window", "poster", "carton", "goods"]
 OfRooms = Literal["plaster", "brick", "facade", "carpet", "parquet", "linoleum"]
@@ -430,6 +434,33 @@ class WorldConfig:
     delivery: Delivery = Delivery()
     camera_errors: CameraErrors = CameraErrors()
     ramps: Ramps = Ramps()
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for rooms and doors out of place, crowds, and names of lamps that are none."""
+        floor = f"{self.size[0]:g} x {self.size[1]:g} m (size)"
+        names = {room.name for room in self.rooms} | {lamp.name for lamp in self.lamps}
+        for number, room in enumerate(self.rooms):
+            where, (x, y), (width, depth) = f"rooms.{number} ('{room.name:.40}')", room.corner, room.size
+            over = max(-x, -y, x + width - self.size[0], y + depth - self.size[1])
+            if over > MAX_BESIDE_M:
+                raise ValueError(f"{where} is {over:g} m over the edge of the floor of {floor}; move its corner")
+            for k, door in enumerate(room.doors):
+                length = width if door.side in ("north", "south") else depth
+                if max(door.width / 2 - door.at, door.at + door.width / 2 - length) > MAX_BESIDE_M:
+                    raise ValueError(
+                        f"{where}, doors.{k}: {door.width:g} m at {door.at:g} m are not within its {door.side} wall, "
+                        f"which is {length:g} m long"
+                    )
+        for number, day in enumerate(self.days):
+            most = int(self.size[0] * self.size[1] * MAX_PEOPLE_PER_M2)
+            if day.people > most:
+                raise ValueError(f"days.{number}.people: {day.people}, expected at most {most} on a floor of {floor}")
+            unknown = set(day.lamps_off) - names if isinstance(day.lamps_off, tuple) else set()
+            if unknown:
+                known = ", ".join(sorted(names - {""})) or "none"
+                raise ValueError(
+                    f"days.{number}.lamps_off: there is no '{min(unknown):.40}'; rooms and lamps: {known:.300}"
+                )
 
     @property
     def draw_seed(self) -> int:

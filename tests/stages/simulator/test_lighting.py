@@ -73,7 +73,7 @@ def test_lamps_that_are_off_take_their_light_away_and_dim_days_dim_it() -> None:
 
 def test_a_days_lamps_are_named_or_hit_by_a_share() -> None:
     lamps = [Lamp((float(k), 1.0), name="kitchen" if k < 3 else f"lamp {k}") for k in range(200)]
-    config = WorldConfig(days=(Day(), Day(lamps_off=("kitchen", "lamp 7")), Day(lamps_off=0.3)))
+    config = WorldConfig(lamps=tuple(lamps), days=(Day(), Day(lamps_off=("kitchen", "lamp 7")), Day(lamps_off=0.3)))
     assert all(lamps_on(lamps, config, 0))
     assert [k for k, on in enumerate(lamps_on(lamps, config, 1)) if not on] == [0, 1, 2, 7]
     assert 0.2 < 1.0 - np.mean(lamps_on(lamps, config, 2)) < 0.4

@@ -1,10 +1,12 @@
 """Rooms as bodies: walls cut by doors, windows, furniture."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator.config import Block, Day, Door, Room, WorldConfig
 from omninav.stages.simulator.rooms import DOOR_HEIGHT_M, INNER_WALL_M, doors, furnish, openings, roof, walls, windows
 
@@ -12,6 +14,7 @@ KITCHEN = Room(
     "kitchen", (2.0, 3.0), (4.0, 5.0), doors=(Door("south", 1.5, 1.0),), windows=("north",), furniture="kitchen"
 )
 WORLD = WorldConfig(rooms=(KITCHEN,), height=3.0)
+DEN = {"name": "den", "corner": (8.0, 0.0), "size": (4.0, 3.0), "doors": ({"side": "east", "at": 2.5},)}
 
 
 def extent(block: Block) -> tuple[float, float, float, float]:
@@ -71,3 +74,21 @@ def test_furniture_stands_in_its_room_away_from_the_door_and_is_the_same_each_ti
         assert not (low_x < 4.0 and high_x > 3.0 and low_y < 3.6)
     assert furnish(WORLD, KITCHEN, cuts, Day(), 0) == fittings
     assert furnish(WORLD, KITCHEN, cuts, Day(furniture=0.1), 1).blocks != fittings.blocks
+
+
+@pytest.mark.parametrize(
+    ("world", "said"),
+    [
+        ({"rooms": ({**DEN, "corner": (9.0, 0.0)},)}, r"rooms\.0 \('den'\) is 1 m over the edge .* of 12 x 9 m"),
+        (
+            {"rooms": ({**DEN, "doors": ({"side": "east", "at": 2.8},)},)},
+            r"rooms\.0 .*doors\.0: .* east wall, which is 3",
+        ),
+        ({"days": ({"people": 1000},)}, r"days\.0\.people: 1000, expected at most 108"),
+        ({"rooms": (DEN,), "days": ({}, {"lamps_off": ("dne",)})}, r"days\.1\.lamps_off: .* 'dne'; .*: den$"),
+    ],
+)
+def test_what_has_no_place_in_a_world_is_said_with_its_key(world: dict[str, object], said: str):
+    assert convert({"rooms": (DEN,)}, WorldConfig, "world")[1] == []
+    (problem,) = convert(world, WorldConfig, "world")[1]
+    assert re.search(f"^world: {said}", str(problem))
