@@ -64,6 +64,8 @@ class MakeVideo(Tool):
         log, out = user_path(self.run_folder) / "result.mcap", user_path(self.out)
         if out.suffix not in CODECS:
             raise BadInput(f"out: {self.out} is no .mp4 or .webm; type out=video.mp4")
+        if self.end is not None and self.begin >= self.end:
+            raise BadInput(f"begin={self.begin:g} is not before end={self.end:g}; both are seconds of the run")
         if out.is_file() and not _is_such(out):
             raise BadInput(f"out: {out} is there, and no such video; type another name, or delete it")
         if not log.is_file():

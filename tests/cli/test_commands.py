@@ -186,6 +186,13 @@ def test_variants_and_doctor_answer(omninav):
     assert "0 unusable" in omninav("doctor", check=True).stdout
 
 
+def test_a_word_that_doctor_does_not_read_and_a_report_of_nothing_say_what_to_type(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, said in ((["doctor", "foo"], "type omninav doctor alone"), (["report"], "type omninav report FOLDER")):
+        assert main(words) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_graph_draws_the_graph_and_that_of_its_map(omninav, tmp_path: Path):
     said = omninav("graph", "variant=omniview_mcl", "out=drawn", check=True).stdout
     assert f"written to {tmp_path / 'drawn'}" in said

@@ -5,11 +5,14 @@ import platform
 from pathlib import Path
 
 from omninav.pipeline.engine.code_version import LIBRARIES, version
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.registry import entries
 
 
 def command(arguments: list[str]) -> int:
     """Print what is installed, and which plugins cannot be used (then 1)."""
+    if arguments:
+        raise BadInput(f"doctor: '{arguments[0]:.60}' is not read; type omninav doctor alone")
     print(f"omninav {version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores")
     rows = list(entries())
     for name in LIBRARIES:

@@ -34,6 +34,8 @@ def command(arguments: list[str]) -> int:
         show_sweep(folder)
         return 0
     if not (folder / "report.html").is_file():
+        if not named and not folder.is_dir():
+            raise BadInput("report: there is no runs/latest here; type omninav report FOLDER")
         if not folder.is_dir():
             raise BadInput(f"{folder}: there is no such folder; `ls runs` shows what there is")
         refuse_experiment(folder)

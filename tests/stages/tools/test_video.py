@@ -140,6 +140,7 @@ def test_a_scene_holds_the_last_of_each_topic(folder):
     [
         ({"out": "video.gif"}, "type out=video.mp4"),
         ({"run_folder": "nowhere"}, "no result.mcap"),
+        ({"begin": 8.0, "end": 2.0}, r"begin=8 is not before end=2; both are seconds"),
         ({"begin": 20.0}, "no poses between 20 s"),
         ({"out": "nowhere/video.mp4"}, "is its folder there"),
     ],
