@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
-from omninav.stages.geometry.arrays import Bools, Ints
+from omninav.stages.geometry.arrays import Bools
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
 
-from .kidnap_recovery import rare
+from .kidnap_recovery import kidnapped_rows
 
 UNIMODAL_SHARE = 0.5
 """Share of the belief that its heaviest mode must hold to be the only one; from a half on no other is as heavy."""
@@ -59,7 +58,7 @@ class SuccessRate(MetricStage):
             "at_end": float(good[-1]),
             "unimodal_after_frames": int(frames[np.argmax(single)]) if single.any() else None,
         }
-        kidnapped = kidnapped_before(last, KIDNAPPED_M)
+        kidnapped = kidnapped_rows(last, KIDNAPPED_M)
         if len(kidnapped):
             at = int(kidnapped[-1])
             later = int(np.searchsorted(frames, at))
@@ -76,10 +75,3 @@ def is_good(drive: Drive) -> Bools:
     """Which frames have an estimate close to the truth, (N,); without an estimate it is none."""
     near = position_errors(drive.estimate, drive.truth) <= WITHIN_M
     return near & (heading_errors_deg(drive.estimate, drive.truth) <= WITHIN_DEG)
-
-
-def kidnapped_before(drive: Drive, min_distance_m: float) -> Ints:
-    """Frames before which the robot was kidnapped: its true position is that far from where its odometry leads."""
-    led = compose(drive.truth[:-1], np.nan_to_num(drive.motion[1:]))
-    off = np.hypot(*(drive.truth[1:, :2] - led[:, :2]).T)
-    return rare(np.flatnonzero(off > min_distance_m) + 1, len(drive))

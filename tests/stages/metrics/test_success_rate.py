@@ -47,17 +47,24 @@ def test_without_truth_there_is_nothing_to_say() -> None:
 def test_a_robot_that_odometry_misses_by_more_than_a_metre_was_kidnapped(sideways, metres, kidnapped) -> None:
     truth = np.zeros((14, 3))
     truth[2:, int(sideways)] = metres
-    found = figures(SuccessRate(), made_drive(truth, truth))["success"]
+    found = figures(SuccessRate(), made_drive(truth, truth, motion=[None, *[(0.0, 0.0, 0.0)] * 13]))["success"]
     assert found.get("kidnapped_at") == (2 if kidnapped else None)
 
 
 def test_frames_are_those_of_the_log_and_the_last_kidnapping_counts() -> None:
     xs = [None] * 2 + [0.0] * 4 + [5.0] * 6 + [20.0] * 14
     believed = [((x or 0.0) + (3.0 if n < 14 else 0.5), 0.0, 0.0) for n, x in enumerate(xs)]
-    assert figures(SuccessRate(), made_drive(on_x(xs), believed))["success"] == {
+    stood = made_drive(on_x(xs), believed, motion=[None, *[(0.0, 0.0, 0.0)] * (len(xs) - 1)])
+    assert figures(SuccessRate(), stood)["success"] == {
         "kidnapped_at": 12,
         "recovered_after_frames": 2,
         "unimodal_after_frames": 14,
         "within_rate": pytest.approx(12 / 24),
         "at_end": 1.0,
     }
+
+
+def test_a_motion_that_no_odometry_measured_is_no_kidnapping() -> None:
+    truth = np.zeros((14, 3))
+    truth[2:, 0] = 5.0
+    assert "kidnapped_at" not in figures(SuccessRate(), made_drive(truth, truth))["success"]
