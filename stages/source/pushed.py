@@ -37,6 +37,8 @@ MAX_READINGS = 100_000
 MAX_MOTION_M = 1000.0
 """Largest motion between two images, m: more than any robot drives unseen. A drive that begins elsewhere is a
 `new_log`."""
+ANY_SIZE = (64, 32)
+"""Width and height (pixels) by which a camera's name is tried: every model that a size is enough for takes it."""
 LIMITS = MotionLimits()
 """Largest speeds of a robot that are not warned of."""
 
@@ -88,11 +90,11 @@ class PushedSource(Source):
             self._opened = self._camera_of(self.camera, (0, 0))
 
     def inputs_digest(self) -> str | None:
-        """Hash of the camera, where a file describes it fully. Raises `BadInput` where there is no camera."""
+        """Hash of the camera, where a file describes it fully. Raises `BadInput` where there is none."""
         if self.camera is None:
             raise BadInput("camera: what took the images is not known; type camera=FILE.yaml or camera=NAME")
-        is_file = user_path(self.camera).is_file()
-        return digest_text(write_camera(self._camera_of(self.camera, (0, 0)))) if is_file else None
+        camera = self._camera_of(self.camera, ANY_SIZE)  # a name that is none is refused before the first image
+        return digest_text(write_camera(camera)) if user_path(self.camera).is_file() else None
 
     def push(
         self,

@@ -169,6 +169,13 @@ def test_a_session_that_lost_frames_says_how_many_when_it_goes_on(
     assert "steps" not in omninav.open_run(folder).manifest
 
 
+@pytest.mark.parametrize("name", ["nope", "hyperbolic"])
+def test_a_camera_that_is_none_is_refused_before_a_folder_is_made(name, tmp_path):
+    with pytest.raises(omninav.BadInput, match=rf"camera={name}: .*; type camera=PATH/camera\.yaml, or one of"):
+        omninav.open("omniview_cml", camera=name, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, batch, tmp_path):
     first, second = frames_of(recording, 0, 2)
     masked = np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False])
