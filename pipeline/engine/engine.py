@@ -188,7 +188,12 @@ class Engine:
             return False
         tick = values[f"{self.source.name}.tick"]
         if self.replay is None:
-            calls[0].ctx.tick = tick
+            last, calls[0].ctx.tick = calls[0].ctx.tick, tick
+            if tick.log == last.log and not tick.first_of_log and tick.stamp < last.stamp:
+                raise StageFailed(
+                    f"stage '{self.source.name}' ({self.source.target}), tick {self.ticks}: its stamp {tick.stamp} ns "
+                    f"is before that of the tick before, {last.stamp} ns; give ascending stamps, or begin another log"
+                )
             calls = calls[1:]
         for call in calls:
             call.ctx.tick = tick

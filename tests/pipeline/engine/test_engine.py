@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import VALIDATED_TICKS, StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
@@ -135,6 +135,17 @@ def test_a_failing_stage_is_named_with_the_place(early: bool, said: str):
     engine = Engine(graph_of(nodes, {"breaks": {"number": "source.number"}}))
     with pytest.raises(StageFailed, match=rf"stage 'breaks' \(toys.Fail\) failed {said}"):
         engine.run()
+
+
+def test_a_source_whose_stamps_go_back_within_a_log_is_named_with_both(monkeypatch: pytest.MonkeyPatch):
+    class Back(Tick):
+        def __post_init__(self) -> None:
+            object.__setattr__(self, "stamp", 100 - self.frame)
+
+    graph = graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}})
+    monkeypatch.setattr("toys.Tick", Back)
+    with pytest.raises(StageFailed, match=r"'source' \(.*Count\), tick 1: its stamp 99 ns is before .*, 100 ns"):
+        Engine(graph).run()
 
 
 def test_a_stage_that_exits_has_failed_and_does_not_end_the_program():
