@@ -2,7 +2,10 @@
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
 
 from omninav.pipeline import user_path
 
@@ -17,6 +20,8 @@ DIGITS = re.compile(r"\d+")
 """Part of a name that differs within a series."""
 MAX_SERIES = 4
 """Series of images that are named."""
+WRAP_STEPS = 10.0
+"""Number of usual steps between two images' numbers that is a gap, as where a camera begins again after 9999."""
 DEFAULT_RATE_HZ = 1.0
 """Images per second where nobody states them: then most stages take every image."""
 
@@ -46,6 +51,9 @@ class UndescribedFolder(Format):
                 f"{log}: images of {len(series)} series, {names}, are taken for one drive, one series after the other"
             )
             recording.assumed = (*recording.assumed, told)
+        elif wraps := _wrap([path.stem for path in recording.paths]):
+            told = f"{log}: images are in the order of their numbers; did these begin again after {wraps}? Rename them"
+            recording.assumed = (*recording.assumed, told)
         if options.rate is None:
             recording.assumed = (*recording.assumed, f"{log}: {rate:g} image per second (rate=… says otherwise)")
         return recording
@@ -57,6 +65,15 @@ def _kinds(folder: Path) -> Counter[str]:
         return Counter()
     shown = (path.suffix.lower() for path in sorted(folder.iterdir()) if not path.name.startswith("."))
     return Counter(SUFFIXES[suffix] for suffix in shown if suffix in SUFFIXES)
+
+
+def _wrap(names: Sequence[str]) -> str:
+    """The last number (9999) of sorted names, where a camera may have begun again after it; else ''."""
+    texts = [digits[-1] for name in names if (digits := DIGITS.findall(name))]
+    if len(texts) < max(len(names), 3) or int(texts[0]) > 1 or set(texts[-1]) != {"9"}:
+        return ""
+    steps = np.diff([float(text) for text in texts])
+    return texts[-1] if steps.max() > WRAP_STEPS * np.median(steps) else ""
 
 
 def _pattern(kind: str) -> str:

@@ -1,9 +1,11 @@
 """Which format opens what a user names."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 from made_logs import IMAGE, messages, write_mcap
 
 from omninav.stages.recordings.opening import log_formats, open_recording
@@ -66,6 +68,19 @@ def test_images_of_several_series_in_one_folder_are_told(tmp_path: Path) -> None
     assert "images of" not in " ".join(open_recording(str(folder)).assumed)
     (folder / "image_1.jpg").rename(folder / "right_0.jpg")
     assert "images of 2 series, image_# (1), right_# (1)" in " ".join(open_recording(str(folder)).assumed)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "begins_again"),
+    [((9998, 9999, 0, 1, 2), True), ((9998, 9999), False), (range(0, 10_000, 3333), False), ((0, 1, 2, 3), False)],
+)
+def test_numbers_that_a_camera_may_have_begun_again_are_told(
+    tmp_path: Path, numbers: Iterable[int], begins_again: bool
+) -> None:
+    for number in numbers:
+        cv2.imwrite(str(tmp_path / f"img_{number:04}.png"), np.full((32, 64, 3), 90, np.uint8))
+    told = "did these begin again after 9999? Rename them"
+    assert (told in " ".join(open_recording(str(tmp_path)).assumed)) == begins_again
 
 
 def test_a_folder_with_files_of_two_formats_is_refused_with_its_parts(tmp_path: Path) -> None:
