@@ -25,7 +25,7 @@ from .arguments import read_flags
 from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
 from .composition_cache import TYPED
 from .config_groups import config_file, listed_groups, replaced, settings_left_open, stand_ins
-from .hydra_session import hydra_started
+from .hydra_session import hydra_started, interrupts_kept
 from .overrides import composed_of
 from .stand_ins import contradictions, take_stand_ins
 
@@ -80,6 +80,7 @@ def offer_plugins() -> None:
         ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
 
 
+@interrupts_kept()
 def complete(config: Any) -> dict[str, Any]:
     """A composed configuration, resolved, with the graphs of its artifacts composed too: plain dicts, all written out.
 

@@ -62,10 +62,24 @@ def hydra_started(folders: Sequence[str] = ()) -> Iterator[Any]:
         version.setbase(VERSION_BASE)
         session.hydra = _finding_in(tuple(folders)) if folders else _finding_own(tuple(plugins()))
         try:
-            with interpolations_limited():
+            with interpolations_limited(), interrupts_kept():
                 yield session.hydra
         finally:
             session.hydra = before
+
+
+@contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """Raise KeyboardInterrupt again where OmegaConf, putting flags back after one, has raised an error in its place."""
+    try:
+        yield
+    except Exception as error:
+        before: BaseException | None = error
+        while before is not None and not isinstance(before, KeyboardInterrupt):
+            before = before.__context__
+        if before is None:
+            raise
+        raise KeyboardInterrupt from None
 
 
 @lru_cache(maxsize=4)

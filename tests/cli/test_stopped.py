@@ -4,6 +4,7 @@ import importlib
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.engine import Engine
@@ -49,3 +50,18 @@ def test_a_command_that_is_no_run_names_none(monkeypatch: pytest.MonkeyPatch, ca
     monkeypatch.setattr(importlib.import_module("omninav.pipeline.cli.commands.doctor"), "command", stop)
     assert main(["doctor"]) == 130
     assert capsys.readouterr().err == "stopped\n"
+
+
+@pytest.mark.parametrize("where", ["hydra_session.CheckedLoader._refuse_foreign", "composition.take_stand_ins"])
+def test_an_error_that_a_library_raises_as_it_is_stopped_is_none(
+    where: str, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    def stumble(*_: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            OmegaConf.create({"a": 1}).a.b  # noqa: B018 - as OmegaConf's own clean-up
+
+    monkeypatch.setattr(f"omninav.pipeline.cli.{where}", stumble)
+    assert main(RUN) == 130
+    assert capsys.readouterr().err.splitlines()[-1].startswith("stopped")
