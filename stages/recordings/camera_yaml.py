@@ -38,8 +38,17 @@ MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths o
 
 
 def read_camera(path: Path) -> Camera:
-    """The camera that a file describes. Raises `BadInput` naming the file, and the line or key that is wrong."""
-    return camera_from(read_yaml(path), str(path))
+    """The camera that a file describes. Raises `BadInput` naming the file, and the line or key that is wrong.
+
+    A file that can be mended holds no key that no camera has; what is attached to a log may hold remarks.
+    """
+    content = read_yaml(path)
+    camera = camera_from(content, str(path))
+    keys = {key for model in camera_models().values() for key in _known_keys(model)[""]}
+    if unknown := sorted(map(str, content.keys() - keys)):
+        own = ", ".join(sorted(_known_keys(type(camera))[""]))
+        raise UnreadableRecording(f"{path}: key '{unknown[0]:.40}' is not known; keys: {own}; remarks begin with #")
+    return camera
 
 
 def parse_camera(text: str | bytes, where: str) -> Camera:

@@ -16,7 +16,7 @@ from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.perspective import Perspective
-from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
+from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, read_camera, write_camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.recording import UnreadableRecording
 
@@ -138,8 +138,16 @@ def test_a_hostile_file_is_refused_in_one_short_line(text: str | bytes) -> None:
         parse_camera(text, "camera.yaml")
 
 
-def test_remarks_in_a_camera_file_do_no_harm() -> None:
+def test_remarks_in_an_attached_camera_file_do_no_harm_and_a_file_of_its_own_has_them_behind_a_sign(
+    tmp_path: Path,
+) -> None:
     assert parse_camera(HOUSE + "serial_number: 7\n", "camera.yaml").width == 640
+    file = tmp_path / "camera.yaml"
+    file.write_text(HOUSE + "# serial number 7\ncolumn_of_forward: 3  # of another model\n")
+    assert read_camera(file).width == 640
+    file.write_text(HOUSE + "tilt_deg: 3\n")
+    with refused(r"camera\.yaml: key 'tilt_deg' is not known; keys: K, .*, yaw; remarks begin with #"):
+        read_camera(file)
 
 
 def info(model: str, d: list[float]) -> object:
