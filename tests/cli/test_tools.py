@@ -75,6 +75,7 @@ def test_maps_are_joined_thinned_cut_and_shown(tmp_path: Path, capsys: pytest.Ca
 def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     map = mapped_room()
     write_artifact(tmp_path / "a.omap", map)
+    write_artifact(tmp_path / "again.omap", map, {"tour": "again.mcap"})
     write_artifact(tmp_path / "b.omap", replace(map, landmarks=None))
     for name, said in (("a", f"{len(map.landmarks)}, a reference sees"), ("b", "none; type landmarks=sift")):
         out = tmp_path / f"{name}.png"
@@ -87,12 +88,13 @@ def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.Captur
 def test_a_joined_map_says_what_became_of_landmarks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     map = mapped_room()
     write_artifact(tmp_path / "a.omap", map)
+    write_artifact(tmp_path / "again.omap", map, {"tour": "again.mcap"})
     write_artifact(tmp_path / "b.omap", replace(map, landmarks=None))
     other = replace(map.landmarks.words, centres=map.landmarks.words.centres[::-1].copy())
     write_artifact(tmp_path / "c.omap", replace(map, landmarks=replace(map.landmarks, words=other)))
     number = len(map.landmarks)
     for maps, said in (
-        (["a", "a"], f"landmarks: {2 * number}\n"),
+        (["a", "again"], f"landmarks: {2 * number}\n"),
         (["a", "b"], f"landmarks: {number}, none from b.omap, where images are compared as a whole\n"),
         (["c", "a"], f"landmarks: {2 * number}, with visual words learned from all of them\n"),
     ):
@@ -109,6 +111,7 @@ def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: p
     write_artifact(tmp_path / "projection.omap", Projection(np.eye(3, 12, dtype=np.float32), np.array([0.5, 0.3, 0.1])))
     refused = {
         ("join", "a.omap"): "maps: 1 files are given, expected at least 2 maps",
+        ("join", "a.omap", "a.omap"): "a.omap: this map is given twice",
         ("join", "a.omap", "drift.omap"): "type same_frame=true if it is",
         ("join", "a.omap", "other.omap"): "were made with other features than a.omap's (bins=None and 4)",
         ("join", "a.omap", "places.omap"): "maps of one kind can be joined",
@@ -126,7 +129,7 @@ def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: p
         assert said in lines[-1], lines
         assert len(lines) == 1
     assert main(["map", "join", "a.omap", "drift.omap", "same_frame=true"]) == 0
-    assert read_artifact(tmp_path / "joined.omap").pose_source == "odometry"  # type: ignore[attr-defined]
+    assert read_artifact(tmp_path / "joined.omap").pose_source == "estimate"  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
