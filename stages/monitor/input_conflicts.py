@@ -66,11 +66,13 @@ class Watched:
 
     @cached_property
     def mount(self) -> Array | None:
-        """Pose (3,) of the camera against where the map has it, by the last exact estimates and odometry; else None."""
-        rows = np.flatnonzero(np.isfinite(self.exact).all(axis=1))[-MOUNT_IMAGES:]
-        mount, later = (found_mount(self.exact[each], self.odometry[each]) for each in (rows, rows[-LATER_IMAGES:]))
-        if mount is None or later is None or np.abs((mount - later) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
-            return None  # it was moved within these images
+        """Pose (3,) of the camera against where the map has it, by the last exact estimates and odometry, where both
+        halves of these show the same; else None."""
+        rows = np.flatnonzero(np.isfinite(self.exact).all(axis=1))[-2 * MOUNT_IMAGES :]
+        halves = rows[:-MOUNT_IMAGES], rows[-MOUNT_IMAGES:]
+        first, mount = (found_mount(self.exact[half], self.odometry[half]) for half in halves)
+        if first is None or mount is None or np.abs((mount - first) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
+            return None  # it was moved within these images, or estimates are off in some of them
         return mount
 
 
@@ -292,9 +294,9 @@ than as it is where images are late, by at least this many seconds."""
 MISPLACED_M = 0.5
 """A robot that drives this far within the delay of its images is not at the estimate: the confidence's tolerance
 (m)."""
-EXACT_M, MOUNT_IMAGES, LATER_IMAGES = 0.05, 32, 22
-"""Largest standard deviation of an estimate's position (m), how many of the last of these tell where the camera is, and
-how many of them must tell the same."""
+EXACT_M, MOUNT_IMAGES = 0.05, 22
+"""Largest standard deviation of an estimate's position (m), and how many of the last of these, as well as how many
+before them, must tell where the camera is."""
 MOVED_M, MOVED_RAD = 0.1, math.radians(8.0)
 """A camera that is this far (m) or turned this much (rad) from where the map has it was moved: in seven sound drives
 0.03 m and 5.6 degrees are found at most, since odometry's errors bend long steps."""
@@ -315,8 +317,8 @@ LATE_IMAGES = 48
 NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
 """A match is at the estimate within this many length scales, turned by less than this (rad)."""
 SCATTERED, ELSEWHERE = 0.05, 0.1
-"""Largest shares, over a whole window, of pairs of matches that agree with odometry and of matches at the estimate,
-with which images count as fitting no place of the map."""
+"""Largest shares, over a whole window, of pairs of matches that agree with odometry, and of matches at the estimate and
+of exact estimates, with which images count as fitting no place of the map."""
 
 
 def judge(watched: Watched, length_scale_m: float, kinds: Collection[str] = ()) -> tuple[str, str]:
@@ -443,11 +445,10 @@ def moved(watched: Watched, length_scale_m: float, min_metres: float = MOVED_M) 
     if math.hypot(*mount[:2]) < min_metres and abs(mount[2]) < MOVED_RAD:
         return ""
     forward, left, turn = mount
-    number = min(MOUNT_IMAGES, int(np.isfinite(watched.exact).all(axis=1).sum()))
     return (
-        f"by landmarks and odometry over {number} images the camera is {forward:+.2f} m forward, {left:+.2f} m "
-        f"to the left and turned by {math.degrees(turn):+.0f} degrees from where it is in the map: check whether it "
-        "was moved, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
+        f"by landmarks and odometry over {2 * MOUNT_IMAGES} images the camera is {forward:+.2f} m forward, "
+        f"{left:+.2f} m to the left and turned by {math.degrees(turn):+.0f} degrees from where it is in the map: check "
+        "whether it was moved, `position` and `yaw` in camera.yaml, and that images are stamped when they are taken"
     )
 
 
@@ -497,8 +498,8 @@ def foreign(watched: Watched, length_scale_m: float) -> str:
     """Images of another place than the map's."""
     odometry, matches = watched.placed
     believed = watched.at_estimate[np.isfinite(watched.at_estimate)]
-    if len(believed) < WINDOW:
-        return ""
+    if len(believed) < WINDOW or np.isfinite(watched.exact).all(axis=1).mean() > ELSEWHERE:
+        return ""  # in other light landmarks find the places that colours do not
     there, fit = float(believed.mean()), agreement(odometry, matches, length_scale_m)
     if fit.pairs < WINDOW or fit.share > SCATTERED or there > ELSEWHERE:
         return ""

@@ -45,9 +45,9 @@ SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 SURE = 0.95
 """Probability of a pose from which on it tells how much stamps jitter."""
-SAID_JITTER_S = 0.025
-"""Standard deviation of stamps from which on the run reports it, s: in sound drives up to 0.018 is found, since
-odometry is interpolated."""
+SAID_JITTER_S, SAID_PROBABILITY = 0.025, 0.8
+"""Standard deviation of stamps (s) and its probability from which on the run reports it: in sound drives up to 0.018 is
+found, since odometry is interpolated, or 0.025 with a probability of 0.24."""
 MAX_MOTIONS = 5.0
 """Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
@@ -136,14 +136,14 @@ class LandmarkPose(Stage):
                 jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)
             variance = jitter.variance()
             if variance > 0.0:
-                self._say_jitter(ctx, state, math.sqrt(variance))
+                self._say_jitter(ctx, state, math.sqrt(variance), jitter.probability())
                 along = turned(np.broadcast_to(moved, poses.shape), poses[:, 2] - 0.5 * moved[2])
                 motions = min(variance / seconds**2, MAX_MOTIONS**2)
                 covariances = covariances + motions * along[:, :, None] * along[:, None, :]
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
-    def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
-        if sigma < SAID_JITTER_S or state.told:
+    def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float, probability: float) -> None:
+        if sigma < SAID_JITTER_S or probability < SAID_PROBABILITY or state.told:
             return
         state.told = True
         ctx.warn(

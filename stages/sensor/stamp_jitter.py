@@ -87,9 +87,16 @@ class StampJitter(Value):
 
     def variance(self) -> float:
         """Expected variance of a stamp's error, s²; 0 as long as it is not `SHOWN`."""
+        return float(self._shares() @ np.square(JITTERS_S)) if self.probability() > SHOWN else 0.0
+
+    def probability(self) -> float:
+        """Probability that stamps jitter."""
+        return 1.0 - float(self._shares()[0])
+
+    def _shares(self) -> Array:
+        # The probabilities of JITTERS_S: (J,).
         likelihood = self.hypotheses[0]
-        shares = np.exp(likelihood - likelihood.max()).sum(axis=1)
+        shares: Array = np.exp(likelihood - likelihood.max()).sum(axis=1)
         shares[0] *= 1.0 - PRIOR
         shares[1:] *= PRIOR / (len(JITTERS_S) - 1)
-        shares /= shares.sum()
-        return float(shares @ np.square(JITTERS_S)) if shares[0] < 1.0 - SHOWN else 0.0
+        return shares / shares.sum()

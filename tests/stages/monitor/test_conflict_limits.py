@@ -122,8 +122,9 @@ def placed(
     angle_deg: float = 0.0,
     scattered: bool = False,
     correlation: float = 0.9,
+    exact: int = 0,
 ) -> Watched:
-    """Best matches of a robot on a winding way, where it is, `scale` times as far or anywhere."""
+    """Best matches of a robot on a winding way, where it is, `scale` times as far or anywhere; `exact` estimates."""
     rng, rows = np.random.default_rng(3), rows_of(number, correlation=correlation)
     times = 0.1 * np.arange(number)
     way = np.column_stack([6.0 * np.sin(times), 9.0 * np.sin(0.7 * times), np.zeros(number)])
@@ -134,6 +135,7 @@ def placed(
         matches = rng.uniform((-20.0, -20.0, -3.0), (20.0, 20.0, 3.0), (number, 3))
     rows[:, 1:4], rows[:, 4:7] = way, matches
     rows[:, 7] = np.arange(number) < at_estimate
+    rows[:exact, 11:] = way[:exact]
     return Watched(rows)
 
 
@@ -168,6 +170,8 @@ def placed(
         (foreign, {"scattered": True, "number": WINDOW - 1}, ""),
         (foreign, {"scattered": True, "at_estimate": 12}, f"best matches {1200 / WINDOW:.0f} % are at the estimate"),
         (foreign, {"scattered": True, "at_estimate": 13}, ""),
+        (foreign, {"scattered": True, "exact": 12}, "the images fit no place of the map"),
+        (foreign, {"scattered": True, "exact": 13}, ""),  # landmarks find the places
         (tracked, {}, ""),
         (tracked, {"scale": 1.25}, ""),
         (tracked, {"scale": 0.8}, ""),

@@ -21,6 +21,7 @@ from omninav.stages.sensor.landmark_pose import (
     probabilities_of,
     sectors_of,
 )
+from omninav.stages.sensor.stamp_jitter import StampJitter
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
@@ -238,8 +239,11 @@ def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion()
     assert at(4 * 10**9, replace(camera, delay=0.35)) == pytest.approx(FIRST, abs=1e-3)
 
 
-@pytest.mark.parametrize("seen", [False, True])
-def test_covariances_allow_for_stamps_that_jitter_but_not_where_images_showed_the_motion(seen: bool) -> None:
+@pytest.mark.parametrize(("seen", "probability"), [(False, 0.81), (False, 0.79), (True, 0.81)])
+def test_covariances_allow_for_stamps_that_jitter_but_not_where_images_showed_the_motion(
+    seen: bool, probability: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(StampJitter, "probability", lambda jitter: probability)
     camera = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5)
     state, ctx, rng, map = LandmarkPoseState(), Context("landmark_pose"), np.random.default_rng(1), mapped_room()
     late = rng.normal(0.0, 0.05, 30)
@@ -257,9 +261,8 @@ def test_covariances_allow_for_stamps_that_jitter_but_not_where_images_showed_th
     assert 0.5 * 0.05 * 0.5 < sigma < 0.5 * 0.05 * 1.5
     aside = np.array([-ahead[1], ahead[0], 0.0])
     assert math.sqrt(aside @ found.covariances[0] @ aside) < 0.003
-    assert len(ctx.warnings) == 1
-    assert "ms off odometry" in ctx.warnings[0]
+    assert ["ms off odometry" in warning for warning in ctx.warnings] == [True] * (probability > 0.8)
     ctx.tick = Tick(30, 0, log=1, first_of_log=True)
     LandmarkPose().step(ctx, state, features, map, camera=camera, motion=Motion(0.1, 0.0, 0.0))
     assert not state.told
-    assert state.jitter.variance() == 0.0
+    assert not state.jitter.hypotheses.any()

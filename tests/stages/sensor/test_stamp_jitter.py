@@ -82,6 +82,7 @@ def test_a_motion_that_is_wrong_by_far_counts_for_nothing() -> None:
 def test_the_variance_is_what_the_likelihoods_expect() -> None:
     unknown = StampJitter.unknown()
     assert unknown.variance() == 0.0
+    assert unknown.probability() == pytest.approx(0.1)
     likelihood = np.full(unknown.hypotheses.shape, -50.0)
     likelihood[0, 3] = 0.0
     assert replace(unknown, hypotheses=likelihood).variance() == pytest.approx(JITTERS_S[3] ** 2)
