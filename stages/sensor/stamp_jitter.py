@@ -96,7 +96,7 @@ class StampJitter(Value):
     def _shares(self) -> Array:
         # The probabilities of JITTERS_S: (J,).
         likelihood = self.hypotheses[0]
-        shares: Array = np.exp(likelihood - likelihood.max()).sum(axis=1)
+        shares = np.exp(likelihood - likelihood.max()).sum(axis=1)
         shares[0] *= 1.0 - PRIOR
         shares[1:] *= PRIOR / (len(JITTERS_S) - 1)
-        return shares / shares.sum()
+        return np.asarray(shares / shares.sum())
