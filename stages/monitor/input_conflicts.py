@@ -164,7 +164,7 @@ class InputConflicts(Stage):
             lately = judge(Watched(recent.rows[-LATE_IMAGES:]), length_scale_m, ("misplacing", "late"))
             kind, sentence = lately if lately[0] else (kind, sentence)
         recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
-        others = set(recent.standing) - {"leap", kind}
+        others = set(recent.standing) - HARMLESS - {"parted", kind}
         if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
             self._say(ctx, recent, kind, sentence)
         recent.suspected = kind
@@ -297,6 +297,12 @@ MISPLACED_M = 0.5
 EXACT_M, MOUNT_IMAGES = 0.05, 22
 """Largest standard deviation of an estimate's position (m), and how many of the last of these, as well as how many
 before them, must tell where the camera is."""
+PATH_M, PARTED_M, PARTED = 6.0, 0.5, 0.4
+"""Path over which the last exact estimates are compared with odometry, about how far apart (m), and from which share of
+that distance on they part: in sound drives it is 0.03."""
+MIN_PARTED, MAX_ASIDE = 3, math.radians(120.0)
+"""Least number of these that part, since a robot that is carried off parts once; and up to which turn of all of them
+the camera looks aside (rad): beyond, images may come in reversed order."""
 MOVED_M, MOVED_RAD = 0.1, math.radians(8.0)
 """A camera that is this far (m) or turned this much (rad) from where the map has it was moved: in seven sound drives
 0.03 m and 5.6 degrees are found at most, since odometry's errors bend long steps."""
@@ -494,6 +500,28 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     return ""
 
 
+def parted(watched: Watched, length_scale_m: float) -> str:
+    """Exact estimates that do not move as odometry does."""
+    known = np.isfinite(watched.exact).all(axis=1)
+    odometry, exact = watched.odometry[known], watched.exact[known]
+    path = np.append(0.0, np.hypot(*np.diff(odometry[:, :2], axis=0).T).cumsum())
+    apart = np.unique(np.floor((path - path[-1] + PATH_M) / PARTED_M), return_index=True)[1]
+    apart = apart[path[apart] >= path[-1] - PATH_M]
+    if len(apart) <= MIN_PARTED:
+        return ""
+    measured, seen = (between(each[apart[:-1]], each[apart[1:]])[:, :2] @ (1.0, 1j) for each in (odometry, exact))
+    turn = np.angle(np.vdot(measured, seen))  # of a camera that looks aside, which others tell
+    off = np.abs(seen - measured * np.exp(1j * turn * (abs(turn) < MAX_ASIDE)))
+    parted = off > PARTED * np.maximum(np.diff(path[apart]), PARTED_M)
+    if parted.sum() < MIN_PARTED:
+        return ""
+    return (
+        f"landmarks place {parted.sum()} of {len(parted)} images, some {PARTED_M} m apart, elsewhere than odometry "
+        "leads from one to the next: check that images are new, of this drive and in order, and odometry's unit and "
+        "wheels"
+    )
+
+
 def foreign(watched: Watched, length_scale_m: float) -> str:
     """Images of another place than the map's."""
     odometry, matches = watched.placed
@@ -516,6 +544,7 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "turned": turned,
     "misplacing": partial(late, min_metres=MISPLACED_M),
     "displaced": partial(moved, min_metres=DISPLACED_M),
+    "parted": parted,
     "late": late,
     "moved": moved,
     "tracked": tracked,

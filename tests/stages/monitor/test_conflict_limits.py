@@ -23,6 +23,7 @@ from omninav.stages.monitor.input_conflicts import (
     late,
     leap,
     lies_at,
+    parted,
     pose_now,
     remember,
     tracked,
@@ -137,6 +138,30 @@ def placed(
     rows[:, 7] = np.arange(number) < at_estimate
     rows[:exact, 11:] = way[:exact]
     return Watched(rows)
+
+
+FORWARD = 0.21 * np.arange(40.0)
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (FORWARD, ""),
+        (1.3 * FORWARD, ""),
+        (1.6 * FORWARD, "landmarks place 12 of 12 images"),
+        (np.full(40, 3.0), "landmarks place 12 of 12 images"),  # one image, with noise
+        (FORWARD[::-1], "landmarks place 12 of 12 images"),
+        (FORWARD[[*range(30), *range(10)]], ""),  # it was carried off, once
+        (FORWARD[[*range(20), *range(4), *range(4), *range(4), *range(8)]], "landmarks place 4 of 12 images"),
+        (np.where(np.arange(40) < 35, np.nan, -FORWARD), ""),  # too few are exact
+        (np.where(np.arange(40) < 33, np.nan, -FORWARD), "landmarks place 3 of 3 images"),
+    ],
+)
+def test_exact_estimates_part_from_odometry_where_images_are_of_another_time(seen: Array, said: str) -> None:
+    rows = rows_of(40, step=0.21)
+    rows[:, 11:] = np.column_stack([seen, seen * 0.0, seen * 0.0])
+    assert parted(Watched(rows), SCALE_M)[: len(said) or None] == said
+    assert judge(Watched(rows), SCALE_M)[0] == ("parted" if said else "")
 
 
 @pytest.mark.parametrize(
