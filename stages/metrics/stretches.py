@@ -33,10 +33,9 @@ scales."""
 GAP_M, GAP_SHARE = 0.5, 0.1
 """Distance (m, plus a share of the metres driven) from odometry's prediction that working odometry never exceeds."""
 MAX_HEADING_ERROR_DEG = 10.0
-"""Median error of the heading of sure estimates from which on it is reported, degrees."""
+"""Median error of the heading of sure estimates, 0 beside the true place, from which on it is reported, degrees."""
 NOT_RECORDED = (
-    "What single images show was not recorded, so causes cannot be told: run it again with nodes.evidence, which every "
-    "particle filter in a map has, as variant=omninav."
+    "This run recorded no causes, which only particle filters in a map do (nodes.evidence, as in variant=omninav)."
 )
 """Sentence on a run without `ImageEvidence`."""
 
@@ -88,7 +87,7 @@ class Log:
         """Which images show nothing, in rows of `MIN_EMPTY` and more."""
         empty = (self["correlation"] < BLIND_CORRELATION) | (self["contrast"] < MIN_CONTRAST)
         empty |= self["features"] < MIN_SEEN
-        if self.known("similarity"):
+        if self.known("similarity") and (self.known("confidence") or self.known("match_lead")):
             empty |= ~np.isfinite(self["similarity"])
         return without_short(empty, MIN_EMPTY)
 
@@ -207,7 +206,7 @@ def in_short(log: Log) -> str:
     words = f"Sure of the estimate from image {start} to the end ({images})."
     if not all_on:
         words = f"Sure of the estimate in {100 * len(sure) / len(log):.0f} % of {images}, from image {start} on."
-    turned = median(np.abs(log["heading_error_deg"][log.sure]))
+    turned = median(np.where(log["position_error_m"] > log.gate, 0.0, np.abs(log["heading_error_deg"]))[log.sure])
     if turned > MAX_HEADING_ERROR_DEG:
         words += f" By ground truth its heading is off by {turned:.0f} degrees (median): check the camera's yaw."
     return words if log.known("nearest_m") else f"{words} {NOT_RECORDED}"

@@ -47,6 +47,8 @@ def test_a_drive_that_is_sure_has_no_stretch():
     assert in_short(Log(drive(heading_error_deg=-17.2 * np.ones(N)))).startswith(
         f"{said} By ground truth its heading is off by 17 "
     )
+    beside = drive(heading_error_deg=-43.0 * np.ones(N), position_error_m=5.0 * np.ones(N))
+    assert in_short(Log(beside)) == said  # by a camera's yaw alone the position would be right
 
 
 @pytest.mark.parametrize(
@@ -103,4 +105,9 @@ def test_without_evidence_of_images_states_are_told_and_causes_are_not():
     sound = drive(confidence=0.1)
     few = {name: sound[name] for name in list(sound)[:12]}
     assert [each.cause for each in stretches([Log(few)], 2.5)] == ["not recorded"]
-    assert "nodes.evidence" in in_short(Log(few))
+    assert in_short(Log(few)).endswith(
+        "recorded no causes, which only particle filters in a map do (nodes.evidence, as in variant=omninav)."
+    )
+    slam = {name: column for name, column in few.items() if name != "confidence"}
+    slam |= {"confident": np.ones(N), "similarity": np.where(AWAY, np.nan, 0.9)}  # references are near at times only
+    assert stretches([Log(slam)], 2.5) == []
