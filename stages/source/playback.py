@@ -26,6 +26,8 @@ from .outputs import DriveOutputs, motion_of, pose_of
 LOW_RATE_HZ, LOW_SHARE, FEW_IMAGES = 0.2, 0.05, 3
 """Images a second below which a rate is a slip if it uses less than this share of all images, and the number of images
 below which any rate is."""
+MAX_UNUSED = 0.1
+"""Share of images that cannot be used above which figures of the others mislead."""
 
 
 class PlaybackState(DeadReckoning):
@@ -126,6 +128,9 @@ class Playback(Source, ABC):
             first = (details or [""])[-1]
             name = self._opened[0].name
             raise UnreadableRecording(f"{name}: not one of its images can be used ({counts}; {first:.300})")
+        images = sum(len(part.frames) for part in self._parts)
+        if (unused := images - position.ticks) > MAX_UNUSED * images:
+            ctx.warn(f"{unused} of {images} images could not be used: figures, as the share lost, are of the others")
         return None
 
     def _out(self, ctx: Context, position: PlaybackState, part: LogPart, image: Image) -> Out:

@@ -10,6 +10,9 @@ from omninav.pipeline.report.warning_lines import grouped, warning_lines
 from omninav.stages.metrics.causes import stretches
 from omninav.stages.metrics.stretches import logs_of, row_of, summaries
 
+UNUSED = ("blank_image", "undecodable_image", "wrong_size", "missing_image")
+"""Kinds of images that are skipped, as recordings count them."""
+
 
 class ExplainRun(Tool):
     """Prints where a run was searching, unsure, blind or wrong, what happened there, what to do, and its warnings.
@@ -35,6 +38,9 @@ class ExplainRun(Tool):
             print(f"the run is {ended.status} ({error:.300}); this is of its first {len(columns['estimate_x'])} images")
         logs = logs_of(columns)
         print("\n".join(summaries(logs)))
+        dropped = ended.manifest.get("dropped", {}).items()
+        if unused := sum(each["count"] for kind, each in dropped if kind.rpartition(".")[2] in UNUSED):
+            print(f"{unused} of {unused + len(columns['log'])} images could not be used, and have no estimate.")
         for stretch in stretches(logs, lost_m):
             images, seconds, metres, state, cause, evidence, advice = row_of(stretch, len(logs) > 1)
             print(f"\nimages {images:<9} {seconds:>12} s {metres:>6} m   {state:<10} {cause}\n  {evidence}")

@@ -97,6 +97,7 @@ def test_motion_spans_images_that_cannot_be_used(tmp_path: Path) -> None:
     odometry = open_recording(path).odometry
     np.testing.assert_allclose(row(outs[3].motion), between(odometry[3], odometry[6]))
     assert ctx.counts == {"undecodable_image": 3}
+    assert ctx.warnings[-1].startswith(f"3 of {FRAMES} images could not be used")
     assert "log.mcap: image 0" in ctx.details["undecodable_image"]
 
 

@@ -39,6 +39,14 @@ def test_a_run_that_failed_is_said_to_be_no_whole_one(tmp_path, capsys):
     assert said.endswith("\nwarning: images come late\n")
 
 
+def test_images_that_could_not_be_used_are_counted(tmp_path, capsys):
+    dropped = {"source.blank_image": 20, "source.undecodable_image": 20, "source.blank_image (map)": 9, "source.x": 9}
+    notes = {kind: {"count": count, "first": ""} for kind, count in dropped.items()}
+    run_folder(tmp_path, small_run(frames=60).drive, dropped=notes)
+    ExplainRun(run_folder=str(tmp_path)).run(Context("explain"))
+    assert "\n40 of 100 images could not be used, and have no estimate.\n" in capsys.readouterr().out
+
+
 def run_folder(folder, drive, **manifest):
     write_json(folder / "manifest.json", {"variant": "homing", "status": "complete", **manifest})
     (folder / "config.yaml").write_text("lost_m: 2.5\n")
