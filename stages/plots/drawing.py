@@ -107,16 +107,6 @@ def grid_extent(grid: OccupancyGrid) -> tuple[float, float, float, float]:
     return x, x + columns * grid.resolution, y, y + rows * grid.resolution
 
 
-def draw_pose(axes: "Axes", pose: Array, length: float, colour: str) -> None:
-    """A pose as a dot with an arrow of `length` metres along its heading."""
-    if not np.isfinite(pose).all():
-        return
-    tip = (pose[0] + length * np.cos(pose[2]), pose[1] + length * np.sin(pose[2]))
-    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", xy=tip, xytext=(pose[0], pose[1]), arrowprops=arrow, zorder=6)
-    axes.plot([pose[0]], [pose[1]], "o", color=colour, markersize=4.5, zorder=6)
-
-
 def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float, float] | None:
     """The part of the plane that holds all finite points, (N, 2 or more) each, with a margin; None: there are none."""
     together = np.concatenate([np.empty((0, 2)), *(p[:, :2] for p in points)])

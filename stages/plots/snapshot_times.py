@@ -1,7 +1,5 @@
 """Frames of snapshots, of drives whose length is not known while they last."""
 
-import numpy as np
-
 FRAMES = 60
 """Snapshots that are shown of a drive at most."""
 
@@ -20,8 +18,3 @@ def even_frames(frames: int) -> range:
     while frames > FRAMES * step:
         step *= 2
     return range(0, frames, step)
-
-
-def spread_out(count: int, wanted: int) -> list[int]:
-    """Up to `wanted` indices spread evenly over `count` things, the first and the last included."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, wanted)).tolist()}) if count else []

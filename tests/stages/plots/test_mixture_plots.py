@@ -1,4 +1,3 @@
-import cv2
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -10,12 +9,11 @@ from omninav.pipeline import Context
 from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.plots.map_ellipses import MapEllipses
 from omninav.stages.plots.map_growth import MapGrowth
-from omninav.stages.plots.reference_life import ReferenceLife, farthest_moved, lives_of
 from omninav.stages.plots.thin_belief import ThinBelief, heaviest
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.floor_plan import FloorPlan
-from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
+from omninav.stages.values.view_mixtures import ViewMixtures
 
 CTX = Context("view")
 PLAN = FloorPlan(np.array([[[2.0, 2.0], [4.0, 2.0], [4.0, 3.0], [2.0, 3.0]]]), 10.0, 10.0)
@@ -32,21 +30,16 @@ def learned(run):
 
 
 def all_plots(run, learned):
-    map, _, events, after = learned
-    kept = [ChangedMixtures().step(CTX, now, event).mixtures for now, event in zip(after, events, strict=True)]
+    map, _, events, _ = learned
     drive = run.drive
     yield TrajectoryOverMap().step(CTX, drive, map).plot
     yield MapEllipses().step(CTX, drive, map, PLAN).plot
     yield MapGrowth().step(CTX, drive, events).plot
-    yield ReferenceLife().step(CTX, drive, events, kept, PLAN).plot
 
 
-def test_every_picture_can_be_decoded_is_small_and_the_same_each_time(run, learned):
+def test_every_picture_is_small_and_the_same_each_time(run, learned):
     plots = list(all_plots(run, learned))
     for plot in plots:
-        if plot.media_type != "image/svg+xml":
-            pixels = cv2.imdecode(np.frombuffer(plot.content, np.uint8), cv2.IMREAD_COLOR)
-            assert pixels.std() > 5, f"{plot.name} is blank"
         assert len(plot.content) < 150_000
         assert plot.title
         assert len(plot.caption) > 30
@@ -57,49 +50,12 @@ def test_an_empty_map_and_a_run_without_events_give_no_pictures(run):
     drive, nothing = run.drive, [None] * len(run.ticks)
     assert MapEllipses().step(CTX, drive, ViewMixtures.empty()).plot is None
     assert MapGrowth().step(CTX, drive, nothing).plot is None
-    assert ReferenceLife().step(CTX, drive, nothing, nothing).plot is None
     assert TrajectoryOverMap().step(CTX, drive, ViewMixtures.empty()).plot is not None
 
 
 def test_without_truth_the_maps_picture_has_the_estimates_path_and_no_plan(run, learned):
     caption = MapEllipses().step(CTX, run.blind, learned[0], PLAN).plot.caption
     assert "line is the estimate" in caption
-
-
-def test_the_life_that_is_told_is_that_of_the_reference_whose_place_moved_most():
-    def event(name, x):
-        one = np.array([name])
-        none = np.empty(0, np.int64)
-        return ViewEvent(1, 1, none, none, none, "", one, np.ones(1), np.array([[x, 0.0]]), np.ones(1, np.int64))
-
-    moves = [event(3, 0.0), None, event(5, 0.0), event(5, 1.0), event(3, 1.5), event(5, 0.5)]
-    assert farthest_moved(moves) == 5  # 1.0 m and half of it back, as far as 3 in one go, but in more frames
-    assert farthest_moved([*moves, event(3, 1.6)]) == 3
-    assert farthest_moved([None]) is None
-
-
-def test_a_references_place_goes_on_where_a_component_is_near_and_ends_where_none_is():
-    far = np.array([[9.0, 0.0]])
-    here, there = np.array([[0.0, 0.0]]), np.array([[0.4, 0.0]])
-    snapshots = [
-        (0, here, np.array([1.0])),
-        (4, np.concatenate([far, there]), np.array([0.3, 0.7])),
-        (9, far, np.array([1.0])),
-    ]
-    lives = lives_of(snapshots, same_m=1.0)
-    assert [life[:, 0].tolist() for life in lives] == [[0.0, 4.0], [4.0, 9.0]]  # 1.7 of weight in all, and 1.3
-    np.testing.assert_allclose(lives[0][:, 1:], [[0, 0, 1.0], [0.4, 0, 0.7]])
-    np.testing.assert_allclose(lives[1][:, 3], [0.3, 1.0])
-
-
-def test_of_two_components_near_the_same_place_the_closer_one_is_its_future():
-    snapshots = [
-        (0, np.array([[0.0, 0.0]]), np.ones(1)),
-        (1, np.array([[0.5, 0.0], [0.2, 0.0]]), np.array([0.6, 0.4])),
-    ]
-    lives = sorted(lives_of(snapshots, same_m=1.0), key=len)
-    assert [len(life) for life in lives] == [1, 2]
-    assert lives[1][1, 1] == 0.2
 
 
 def test_the_mixtures_that_are_kept_are_those_of_the_changed_views(run, learned):
