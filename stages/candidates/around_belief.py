@@ -40,7 +40,6 @@ class AroundBelief:
         candidates: Candidates
 
     def setup(self, ctx: Context) -> None:
-        """Forget the cells of an earlier map."""
         self._map: ReferenceGraph | None = None
         self._length = 0
 

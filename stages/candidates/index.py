@@ -39,7 +39,6 @@ class IndexedCandidates(AroundBelief, Stage):
     """
 
     def setup(self, ctx: Context) -> None:
-        """Forget the index of an earlier map."""
         super().setup(ctx)
         self._search: ExactSearch | InvertedFile | None = None
 
@@ -52,7 +51,6 @@ class IndexedCandidates(AroundBelief, Stage):
         near: Particles | None = None,
         length_scale: LengthScale | None = None,
     ) -> AroundBelief.Out:
-        """Select the references for one view."""
         if index is None or len(map) <= self.compare_all_up_to:
             return self.Out(candidates=Candidates())
         search, turned = self._ready(index, map), self._turned(features, map)

@@ -39,12 +39,10 @@ class BuildReferenceIndex(Stage):
         index: ReferenceIndex | None = None
 
     def setup(self, ctx: Context) -> None:
-        """Forget the index of an earlier map."""
         self._index: ReferenceIndex | None = None
         self._map: ReferenceGraph | None = None
 
     def step(self, ctx: Context, map: ReferenceGraph, state: BuildReferenceIndexState) -> Out:
-        """Give the map's index."""
         if len(map) < MIN_REFERENCES:
             return self.Out()
         if len(map) >= REBUILD_GROWTH * state.references:

@@ -39,7 +39,6 @@ class WordCandidates(AroundBelief, Stage):
         near: Particles | None = None,
         length_scale: LengthScale | None = None,
     ) -> Out:
-        """Select the references for one view."""
         if len(words) > len(map):
             raise BadInput(
                 f"candidates: words of {len(words)} references with a map of {len(map)}; "

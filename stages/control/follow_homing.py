@@ -87,7 +87,6 @@ class FollowHoming(Stage):
         stalled: DrivingStatus | None = None,
         wander: Command | None = None,
     ) -> Out:
-        """The command of this tick."""
         if progress is not None and progress.arrived:
             return self._stand("arrived", "")
         if vector is None:

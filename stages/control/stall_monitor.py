@@ -63,7 +63,6 @@ class StallMonitor(Stage):
         vector: HomingVector | None = None,
         progress: PathProgress | None = None,
     ) -> Out:
-        """Look at one tick."""
         elapsed, state.stamp = tick.stamp - state.stamp, tick.stamp
         if vector is None or (progress is not None and (progress.docking or progress.arrived)):
             return self.Out()

@@ -45,7 +45,6 @@ class WallAvoider(Stage):
         command: Command
 
     def step(self, ctx: Context, scan: Scan, state: WallAvoiderState) -> Out:
-        """The command for this ring of ranges."""
         present = np.minimum(scan.ranges, scan.farthest)
         ranges = np.minimum(present, state.ranges) if len(state.ranges) == len(present) else present
         state.ranges = present

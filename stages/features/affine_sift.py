@@ -22,7 +22,6 @@ class AffineSift(RotationReducedSift):
     """Its features turn by themselves."""
 
     def setup(self, ctx: Context) -> None:
-        """Make the detector upon SIFT's."""
         super().setup(ctx)
         self._affine = cv2.AffineFeature.create(self._sift)
 

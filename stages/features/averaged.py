@@ -21,7 +21,6 @@ class AveragedView(AveragedStrip, Stage):
     """Headings at which views are compared; must divide `columns`. 1: as they are."""
 
     def step(self, ctx: Context, panorama: Panorama) -> AveragedStrip.Out:
-        """Describe one panorama."""
         strip = self.strip(panorama)
         values = np.moveaxis(strip, 1, 0).ravel()
         turn = len(values) // self.headings

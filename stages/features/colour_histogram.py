@@ -113,7 +113,6 @@ class ColourHistogram(UnderGreyWorld, Stage):
             )
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Describe one panorama."""
         pixels = self.constant(panorama.pixels)
         histograms = colour_histograms(pixels, self.segments, self.space, self.bins, self.joint, self.ranges)
         return self.Out(features=SegmentHistograms(histograms))

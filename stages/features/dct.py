@@ -51,14 +51,12 @@ class CosineTransform(AveragedStrip, Stage):
             )
 
     def setup(self, ctx: Context) -> None:
-        """Compute the basis."""
         self._down, self._across = lowest_frequencies(self.rows, self.columns, self.coefficients, self.mean)
         self._vertical = cosine_basis(self.rows)[: self._down.max() + 1]
         waves = cosine_basis(self.columns)[: self._across.max() + 1]
         self._turned = turned_copies(waves, self.headings)
 
     def step(self, ctx: Context, panorama: Panorama) -> AveragedStrip.Out:
-        """Describe one panorama."""
         strip = self.strip(panorama)
         columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
         waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)

@@ -54,7 +54,6 @@ class SegmentSpectrum(Stage):
         view: Spectrum
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Describe one panorama."""
         strip = averaged_strip(panorama.pixels, BANDS, self.segments, self.channels, self.contrast)
         spectrum = spectrum_around(strip, FREQUENCIES, self.mean)
         return self.Out(view=Spectrum(packed(spectrum), len(spectrum), self.segments))

@@ -27,6 +27,5 @@ class GlobalColours(Stage):
         descriptor: GlobalDescriptor
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one image."""
         read = prepared_image(image, camera, self.max_pixels)
         return self.Out(descriptor=GlobalDescriptor(image_colours(read.pixels, read.seen)))

@@ -24,7 +24,6 @@ class GreyStrip(Stage):
         strip: Strip | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
-        """One panorama."""
         if isinstance(panorama, Windows):
             return self.Out()
         grey = cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2GRAY)

@@ -148,7 +148,6 @@ class HaarIntegral(UnderGreyWorld, Stage):
             raise ValueError("scales: at least one is needed; write scales: [1.0]")
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
-        """Describe one panorama or several windows."""
         errors: list[float] = []
         if isinstance(panorama, Windows):
             seen = [None] * len(panorama.pixels) if panorama.seen is None else list(panorama.seen)

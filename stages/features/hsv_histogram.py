@@ -118,7 +118,6 @@ class HsvHistogram(UnderGreyWorld, Stage):
         features: SegmentHistograms
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Describe one panorama."""
         histograms = hsv_histograms(
             self.constant(panorama.pixels),
             self.segments,

@@ -37,5 +37,4 @@ class MeanRgb(UnderGreyWorld, Stage):
         features: SegmentColours
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Describe one panorama."""
         return self.Out(features=SegmentColours(mean_colours(self.constant(panorama.pixels), self.segments)))

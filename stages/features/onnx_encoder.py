@@ -82,7 +82,6 @@ class OnnxEncoder(Stage):
         features: SegmentDescriptors
 
     def setup(self, ctx: Context) -> None:
-        """Load the network."""
         self._session = session = loaded(self.model)
         self._input, self._size, self._batch = self._read_input(session)
         names = [output.name for output in session.get_outputs()]
@@ -96,7 +95,6 @@ class OnnxEncoder(Stage):
         return network_digest(self.model)
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Describe one panorama."""
         images = encoder_input(panorama.pixels, self.segments, self._size, self.channels, self.mean, self.deviation)
         if self.layout == "nchw":
             images = np.ascontiguousarray(images.transpose(0, 3, 1, 2))

@@ -68,7 +68,6 @@ class OnnxKeypoints(Stage):
         features: LocalFeatures
 
     def setup(self, ctx: Context) -> None:
-        """Load the network."""
         self._session = session = loaded(self.model)
         self._input, self._grey, self._sides = self._read_input(session)
         self._outputs = self._read_outputs(session)
@@ -81,7 +80,6 @@ class OnnxKeypoints(Stage):
         return network_digest(self.model)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Find the points of one image."""
         mirror = camera if isinstance(image, Image) and camera is not None and camera.ring is not None else None
         read, seam = self._prepared(image if mirror is None else self._unwrapped(image.pixels, mirror), camera)
         points, scores, descriptors = self._found(read.pixels, seam)

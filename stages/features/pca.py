@@ -18,11 +18,9 @@ class PrincipalComponents(AveragedStrip, Stage):
     """
 
     def setup(self, ctx: Context) -> None:
-        """Forget the projection of an earlier run."""
         self._projection: Projection | None = None
 
     def step(self, ctx: Context, panorama: Panorama, projection: Projection) -> AveragedStrip.Out:
-        """Describe one panorama."""
         strip = self.strip(panorama)
         if projection is not self._projection:
             self._use(projection, strip.size)

@@ -62,7 +62,6 @@ class RotationReducedSift(Stage):
         )
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one image."""
         read = prepared_image(image, camera, self.max_pixels)
         pixels, seen, seam = read.pixels, read.seen, 0
         if read.circle:

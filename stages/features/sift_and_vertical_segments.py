@@ -18,12 +18,10 @@ class SiftAndVerticalSegments(RotationReducedSift):
     """
 
     def setup(self, ctx: Context) -> None:
-        """Make both detectors."""
         super().setup(ctx)
         self._columns = FindVerticalSegments(max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> RotationReducedSift.Out:
-        """Describe one image."""
         patches = super().step(ctx, image, camera).features
         columns = self._columns.step(ctx, image, camera).vertical_segments
         return self.Out(features=replace(patches, columns=columns))

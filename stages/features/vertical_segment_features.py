@@ -27,10 +27,8 @@ class VerticalSegmentFeatures(Stage):
         features: LocalFeatures
 
     def setup(self, ctx: Context) -> None:
-        """Make the detector."""
         self._columns = FindVerticalSegments(max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one image."""
         found = self._columns.step(ctx, image, camera).vertical_segments
         return self.Out(features=replace(none_found(), columns=found))

@@ -227,7 +227,6 @@ class FindVerticalSegments(Stage):
         vertical_segments: VerticalSegments
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one image."""
         read = prepared_image(image, camera, self.max_pixels)
         pixels, circle = self._upright(read)
         settings = BLUR_PX, MIN_GRADIENT, MIN_LENGTH_PX, MARGIN

@@ -22,7 +22,6 @@ class BestMatch(Stage):
         belief: SinglePose | None = None
 
     def step(self, ctx: Context, similarities: Similarities, map: ReferenceGraph) -> Out:
-        """Pick the best reference and heading."""
         if not similarities.values.size:
             return self.Out()
         row, column = divmod(int(np.argmax(similarities.values)), similarities.values.shape[1])

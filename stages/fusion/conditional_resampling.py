@@ -51,7 +51,6 @@ class ConditionalResampling(Stage):
         before: Particles | None = None,
         model: UncertainMotion | None = None,
     ) -> Out:
-        """Fuse prediction and hypothesis."""
         if hypothesis is None or not len(hypothesis):
             return self.Out(belief=particles)
         shares = hypothesis.weights / hypothesis.weights.sum()

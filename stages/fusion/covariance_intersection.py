@@ -176,7 +176,6 @@ class CovarianceIntersection(Stage):
         fixes: GaussianMixture | None = None,
         other: GaussianMixture | None = None,
     ) -> Out:
-        """Fuse all sources that are present."""
         belief = _positive(prediction)
         for source in (hypothesis, fixes, other):
             if source is not None:

@@ -71,7 +71,6 @@ class ImportanceResampling(Stage):
         belief: Particles
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
-        """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
         total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):

@@ -95,7 +95,6 @@ class LandmarkUpdate(Stage):
         restart: Reinitialise | None = None,
         track: Track | None = None,
     ) -> Out:
-        """Fuse belief and fix."""
         if motion is None or ctx.tick.first_of_log or restart is not None:
             last.poses, last.driven, last.elsewhere = np.empty((0, 3)), 0.0, 0.0
             if (ctx.tick.first_of_log or restart is not None) and not is_narrow(belief.poses, belief.weights, LOCAL[0]):

@@ -37,7 +37,6 @@ class ParticleClustering(Stage):
         state: GaussianMixture
 
     def step(self, ctx: Context, particles: Particles) -> Out:
-        """Cluster the particles."""
         floor = (MIN_SIGMA_M, MIN_SIGMA_M, math.radians(MIN_SIGMA_DEG))
         labels = clusters(particles.poses, CELL_M, math.radians(CELL_DEG))
         weights = np.bincount(labels, weights=particles.weights) / float(particles.weights.sum())

@@ -31,7 +31,6 @@ class PlaceBayes(Stage):
         distances: VisualDistances,
         map: TopologicalMap,
     ) -> Out:
-        """Fuse prediction and observation."""
         weights = prediction.probabilities * likelihood.values
         total = float(weights.sum())
         if not (math.isfinite(total) and total > 0.0):

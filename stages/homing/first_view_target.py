@@ -25,7 +25,6 @@ class FirstViewTarget(Stage):
         features: LocalFeatures | None = None
 
     def step(self, ctx: Context, state: FirstViewTargetState, tick: Tick, features: LocalFeatures) -> Out:
-        """The target of this tick."""
         if tick.first_of_log:
             state.views = (features,)
             return self.Out()

@@ -32,7 +32,6 @@ class TwoViewPose(Stage):
         view: RelativeView | None = None
 
     def step(self, ctx: Context, pairs: BearingPairs) -> Out:
-        """Solve one problem."""
         threshold = math.radians(MAX_ERROR_DEG)
         if self.solver == "generate_and_select":
             found = generate_and_select(pairs.first, pairs.second, threshold)

@@ -57,7 +57,6 @@ class WaypointImages(Stage):
         path: ImagePath | None = None,
         vector: HomingVector | None = None,
     ) -> Out:
-        """The target of this tick."""
         if path is None or not path.views:
             state.path = -1
             return self.Out()

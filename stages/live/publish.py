@@ -55,7 +55,6 @@ class Publisher:
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
 
     def setup(self, ctx: Context) -> None:
-        """Join the domain."""
         self._transport: Transport = connect(self.transport, self.domain)
 
     def _send(self, topic: str, msgtype: str, fields: Fields, latched: bool = False) -> None:
@@ -97,7 +96,6 @@ class Publish(Publisher, Stage):
     """Greatest turning speed that is commanded, rad/s."""
 
     def setup(self, ctx: Context) -> None:
-        """Join the domain."""
         super().setup(ctx)
         self._watchdog: Watchdog | None = None
         self._stamps: list[int] = []

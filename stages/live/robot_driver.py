@@ -100,7 +100,6 @@ class RobotDriver(Publisher, Stage):
         tick: Tick
 
     def setup(self, ctx: Context) -> None:
-        """Join the domain."""
         super().setup(ctx)
         self._started = self._worked = self._free = 0.0
         self._offset, self._noted = 0, (0.0, 0.0)

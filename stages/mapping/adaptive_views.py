@@ -90,7 +90,6 @@ class AdaptiveViews(Stage):
         map: ViewMixtures,
         waiting: PendingUpdates,
     ) -> Out:
-        """Apply the updates of this tick."""
         map.keep_threshold(threshold)
         before = map.ids
         start_over(updates, map, waiting)

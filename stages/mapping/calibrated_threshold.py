@@ -68,7 +68,6 @@ class CalibratedThreshold(Stage):
         state: CalibratedThresholdState,
         known: ViewMixtures | None = None,
     ) -> Out:
-        """Measure one view."""
         if state.threshold is None and known is not None and known.threshold is not None:
             state.threshold = known.threshold
             ctx.fact("novelty_threshold", round(state.threshold.distance, 4))

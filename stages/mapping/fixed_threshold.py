@@ -26,5 +26,4 @@ class FixedThreshold(Stage):
         motion: Motion | None = None,
         known: ViewMixtures | None = None,
     ) -> Out:
-        """Give the threshold."""
         return self.Out(threshold=NoveltyThreshold(self.distance))

@@ -19,5 +19,4 @@ class FlushPending(Stage):
         updates: MapUpdates | None = None
 
     def step(self, ctx: Context, ticks: Sequence[Tick], waiting: MapUpdates | None = None) -> Out:
-        """Give all of them."""
         return self.Out(updates=waiting)

@@ -22,5 +22,4 @@ class Frozen(Stage):
         updates: MapUpdates | None = None,
         threshold: NoveltyThreshold | None = None,
     ) -> Out:
-        """Pass the map on."""
         return self.Out(map=map)

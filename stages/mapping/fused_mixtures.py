@@ -70,7 +70,6 @@ class FusedMixtures(Stage):
         map: ViewMixtures,
         pending: FusedMixturesState,
     ) -> Out:
-        """Apply the updates of this tick."""
         map.keep_threshold(threshold)
         updates = MapUpdates(()) if updates is None else updates
         open_from = math.inf if updates.open_from is None else updates.open_from

@@ -44,7 +44,6 @@ class KeyframeHistory(Stage):
         kept: Sessions | None,
         known: ViewMixtures | None = None,
     ) -> Out:
-        """Keep one view."""
         if kept is None:
             earlier = None if known is None else known.sessions
             if earlier is None or earlier.views.shape[1:] != view.rows.shape:

@@ -71,7 +71,6 @@ class LearnPlaceWords(Stage):
         words: PlaceWords
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:
-        """The whole tour at once."""
         ctx.status("learning visual words")
         descriptors = [found.descriptors for found in views.features]
         made = vocabulary_and_words(descriptors, self.words)

@@ -50,7 +50,6 @@ class LoopClosure(Stage):
         hypotheses: LoopHypotheses
 
     def step(self, ctx: Context, views: ComparedViews) -> Out:
-        """The whole tour at once."""
         distances, owners = views.distances, views.owners
         cluster = place_clusters.complete_linkage(distances, self.place_size)
         subcluster = subclusters_of(cluster, views)

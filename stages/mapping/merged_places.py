@@ -42,7 +42,6 @@ class MergePlaces(Stage):
         hypotheses: LoopHypotheses
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:
-        """The whole tour at once."""
         if not self.min_spacing:
             return self.Out(hypotheses=hypotheses)
         accepted = hypotheses.pairs[hypotheses.accepted]

@@ -54,7 +54,6 @@ class LearnPrincipalComponents(Stage):
         projection: Projection
 
     def step(self, ctx: Context, views: Sequence[Coefficients]) -> Out:
-        """Learn from the whole tour."""
         rows, explained = principal_components(
             np.stack([view.values for view in views]), self.components, self.headings
         )

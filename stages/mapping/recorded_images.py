@@ -33,7 +33,6 @@ class EncodeImage(Stage):
         encoded: EncodedImage
 
     def step(self, ctx: Context, image: Image) -> Out:
-        """One tick."""
         _, png = cv2.imencode(".png", image.pixels, [cv2.IMWRITE_PNG_COMPRESSION, COMPRESSION])
         return self.Out(encoded=EncodedImage(png.tobytes()))
 
@@ -55,7 +54,6 @@ class CollectImages(Stage):
         odometry: Sequence[Pose | None],
         truth: Sequence[Pose | None],
     ) -> Out:
-        """The whole drive at once."""
         pngs = [each.png for each in encoded]
         if not pngs:
             return self.Out()

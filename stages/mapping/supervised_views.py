@@ -39,7 +39,6 @@ class SupervisedViews(Stage):
         truth: Sequence[Pose | None],
         projection: Projection | None = None,
     ) -> Out:
-        """Make the map of a whole tour."""
         map = ViewMixtures.empty()
         map.put(pose_source="truth")
         covariance = np.diag([SIGMA_M**2, SIGMA_M**2, math.radians(SIGMA_DEG) ** 2])

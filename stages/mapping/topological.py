@@ -56,7 +56,6 @@ class TopologicalMapping(Stage):
         known: TopologicalMap | None = None,
         rooms: Rooms | None = None,
     ) -> Out:
-        """The whole tour at once."""
         warn_of_few(ctx, len(views))
         place = hypotheses.place
         made = self._assembled(views, place, known)

@@ -64,7 +64,6 @@ class ViewComparison(Stage):
         truth: Sequence[Pose | None] = (),
         known: TopologicalMap | None = None,
     ) -> Out:
-        """The whole tour at once."""
         source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
         rows = self._chosen(ticks, features, descriptor)

@@ -32,7 +32,6 @@ class MatchFeatures(Stage):
         correspondences: Correspondences
 
     def step(self, ctx: Context, features: LocalFeatures, target: LocalFeatures) -> Out:
-        """Match two views."""
         options = ComparisonOptions(self.ratio, search=self.search, patch_distance=self.patch_distance)
         pairs = match_patches(features.patches(), target.patches(), options)
         first, second, distance = column_ends(features, target, options.segment_ratio)

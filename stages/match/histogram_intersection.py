@@ -29,7 +29,6 @@ class HistogramIntersection(ReferenceMatch, Stage):
         length_scale: LengthScale | None = None,
         last: LastView | None = None,
     ) -> ReferenceMatch.Out:
-        """Compare one view."""
         return super().step(ctx, features, map, candidates, words, length_scale, last)
 
     def compare(self, map: ReferenceGraph, features: SegmentFeatures, chosen: Ints | None) -> Floats:

@@ -31,7 +31,6 @@ class ViewNeighbours(Stage):
         neighbours: Neighbours
 
     def step(self, ctx: Context, view: WholeView, map: ViewMixtures, threshold: NoveltyThreshold | None = None) -> Out:
-        """Search the map."""
         map.check_kind(view)
         if not len(map):
             none = np.zeros(0)

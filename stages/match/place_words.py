@@ -26,7 +26,6 @@ class MatchPlaceWords(Stage):
         answers: RetrievedReferences | None = None
 
     def step(self, ctx: Context, features: LocalFeatures, map: TopologicalMap, words: PlaceWords | None = None) -> Out:
-        """Compare one view with all places."""
         if words is None:
             return self.Out()
         if len(words) != len(map):

@@ -42,12 +42,10 @@ class VisualDistance(Stage):
         distances: VisualDistances
 
     def setup(self, ctx: Context) -> None:
-        """No map yet."""
         self._map: TopologicalMap | None = None
         self._places = ManyViews([])
 
     def step(self, ctx: Context, features: LocalFeatures, descriptor: GlobalDescriptor, map: TopologicalMap) -> Out:
-        """Compare one view with all places."""
         if self._map is not map:
             self._places = ManyViews([view_features(map.views.features(int(view))) for view in map.places])
             self._map = map

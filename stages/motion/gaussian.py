@@ -22,7 +22,6 @@ class GaussianMotion(OdometryNoiseModel, Stage):
         model: UncertainMotion | None = None
 
     def step(self, ctx: Context, belief: GaussianMixture, motion: Motion | None) -> Out:
-        """Predict the belief."""
         if motion is None:
             return self.Out(belief=belief)
         model = self.model(motion)

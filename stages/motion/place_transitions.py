@@ -31,12 +31,10 @@ class PlaceTransitions(Stage):
         belief: PlaceBelief
 
     def setup(self, ctx: Context) -> None:
-        """No map yet."""
         self._map: TopologicalMap | None = None
         self._probabilities = np.zeros((0, 0))
 
     def step(self, ctx: Context, belief: PlaceBelief, map: TopologicalMap) -> Out:
-        """Spread a belief over the places that are near."""
         if self._map is not map:
             self._map = map
             self._probabilities = transitions(

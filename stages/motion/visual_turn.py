@@ -64,7 +64,6 @@ class VisualTurn(OdometryNoiseModel, Stage):
         motion: Motion | None = None
 
     def step(self, ctx: Context, panorama: Panorama, motion: Motion | None, before: VisualTurnState) -> Out:
-        """Correct one motion."""
         if not self.max_sigma_deg:
             return self.Out(motion=motion)
         grey = np.asarray(cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2GRAY), np.uint8)

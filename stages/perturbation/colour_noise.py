@@ -59,7 +59,6 @@ class ColourNoise(Stage):
         panorama: Panorama
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
-        """Cover one panorama."""
         if self.share == 0.0:
             return self.Out(panorama=panorama)
         tick = ctx.tick

@@ -22,7 +22,6 @@ class LostFeatures(Stage):
         features: LocalFeatures
 
     def step(self, ctx: Context, features: LocalFeatures) -> Out:
-        """Thin out one view's features."""
         if self.share == 0.0:
             return self.Out(features=features)
         kept = ctx.rng.random(len(features)) >= self.share

@@ -25,7 +25,6 @@ class LoseTracks(Stage):
         tracks: TrackedFeatures | None = None
 
     def step(self, ctx: Context, tracks: TrackedFeatures | None = None) -> Out:
-        """Thin out the tracks of one tick."""
         if tracks is None or self.share == 0.0:
             return self.Out(tracks=tracks)
         lost = ctx.rng.random(len(tracks.rows)) < self.share

@@ -56,7 +56,6 @@ class MovedView(Stage):
         panorama: Windows
 
     def step(self, ctx: Context, panorama: Windows) -> Out:
-        """Move the windows of one image."""
         pixels = panorama.pixels
         seen = np.ones(pixels.shape[:3], np.bool_) if panorama.seen is None else panorama.seen
         how = self.shift, math.radians(self.turn_deg), self.scale, self.shear, self.part

@@ -43,7 +43,6 @@ class NoisyOdometry(Stage):
             raise ValueError(f"there is no level {self.level}; the levels are 0 to {len(self.levels) - 1}")
 
     def step(self, ctx: Context, motion: Motion) -> Out:
-        """One increment."""
         increment = [[motion.x, motion.y, motion.turn]]
         row = add_odometry_noise(increment, self.levels[self.level], ctx.rng.normal(size=(1, 3)))[0]
         x, y, turn = (float(value) for value in row)

@@ -21,7 +21,6 @@ class AppearanceLengthScale(Stage):
         length_scale: LengthScale
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
-        """Measure one map."""
         # Two poses of a robot that turns are one, those of a camera beside its axis are not.
         seen_from = map.poses if map.landmarks is None else camera_poses(map.poses, map.landmarks.mount)
         metres = length_scale(seen_from, map.features, map.kind)

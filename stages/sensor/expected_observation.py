@@ -161,7 +161,6 @@ class ExpectedObservation(NearReferences):
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
     ) -> NearReferences.Out:
-        """Weight all particles."""
         if similarities.exponent is None and similarities.colour_scale is None:
             raise BadInput(
                 "sensor: expected_observation compares as the match does, and does not know how this one does; use "

@@ -207,7 +207,6 @@ class LineOfSight(Stage):
         metrics: Metrics
 
     def step(self, ctx: Context, map: ReferenceGraph, grid: OccupancyGrid, free: FreeSpace | None = None) -> Out:
-        """Compute all areas and their coverage."""
         if max(grid.cells.shape) > MAX_CELLS_PER_SIDE:
             raise BadInput(
                 f"grid: {grid.cells.shape} cells are more than {MAX_CELLS_PER_SIDE} a side; use a coarser resolution"

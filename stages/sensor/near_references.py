@@ -228,7 +228,6 @@ class NearReferences(Stage):
         field: SimilarityField | None = None
 
     def setup(self, ctx: Context) -> None:
-        """Forget the cells of an earlier map."""
         self._map: ReferenceGraph | None = None
         self._length = 0
 
@@ -242,7 +241,6 @@ class NearReferences(Stage):
         length_scale: LengthScale | None = None,
         calibration: SimilarityCalibration | None = None,
     ) -> Out:
-        """Weight all particles."""
 
         def expected(near: Shorts, rows: Ints, fade_m: float | None, floor: float) -> Array:
             return expected_similarity(particles.poses, map.poses, near, rows, similarities.values, fade_m, floor)

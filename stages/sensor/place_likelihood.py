@@ -40,7 +40,6 @@ class PlaceLikelihood(Stage):
     def step(
         self, ctx: Context, distances: VisualDistances, map: TopologicalMap, words: WordSimilarities | None = None
     ) -> Out:
-        """Weigh all places."""
         sigma = map.spread if self.sigma is None else self.sigma
         values = place_likelihoods(distances.distances, sigma, MIN_LIKELIHOOD, self.tail)
         if words is not None:

@@ -40,7 +40,6 @@ class SimilarityProposals(Stage):
         length_scale: LengthScale | None = None,
         track: Track | None = None,
     ) -> Out:
-        """Propose poses for one image."""
         if field is None or (track is not None and track.unbroken):
             return self.Out()
         unit = metres_of(length_scale)

@@ -36,7 +36,6 @@ class Superposition(Stage):
     def step(
         self, ctx: Context, neighbours: Neighbours | None, map: ViewMixtures, threshold: NoveltyThreshold | None = None
     ) -> Out:
-        """Superpose what is near."""
         if neighbours is None or not len(neighbours.rows):
             return self.Out()
         number = 1 if self.views == "nearest" else len(neighbours.rows)

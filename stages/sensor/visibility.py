@@ -62,7 +62,6 @@ class Visibility(Stage):
         field: SimilarityField | None = None
 
     def setup(self, ctx: Context) -> None:
-        """Forget the areas of an earlier map."""
         self._areas: VisibilityAreas | None = None
 
     def step(
@@ -76,7 +75,6 @@ class Visibility(Stage):
         length_scale: LengthScale | None = None,
         calibration: SimilarityCalibration | None = None,
     ) -> Out:
-        """Weight all particles."""
         values = similarities.values
         if not values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))

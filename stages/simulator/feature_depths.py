@@ -31,7 +31,6 @@ class FeatureDepths(Stage):
         depths: Depths | None = None
 
     def setup(self, ctx: Context) -> None:
-        """Build the world."""
         self._world = World(self.world, self.day) if self.log is None else None
 
     def step(
@@ -41,7 +40,6 @@ class FeatureDepths(Stage):
         features: LocalFeatures | None = None,
         vertical_segments: VerticalSegments | None = None,
     ) -> Out:
-        """Cast the rays of one image."""
         if self._world is None:
             return self.Out()
         patches = np.zeros((0, 3)) if features is None else features.bearings

@@ -37,7 +37,6 @@ class FloorPlanOfLog(Stage):
         return None if grid is None else grid_digest(grid)
 
     def step(self, ctx: Context) -> Out:
-        """Read or make the plan."""
         if self.log is None and self.world is not None:
             return self.Out(plan=plan_of(self.world, self.day if isinstance(self.day, int) else self.day[0]))
         grid = grid_beside(self.log)

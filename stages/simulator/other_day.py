@@ -31,10 +31,8 @@ class OtherDay(Stage):
         image: Image
 
     def setup(self, ctx: Context) -> None:
-        """Build the world of that day."""
         self._scene, self._camera = World(self.world, self.day).scene, RobotCamera(self.world, "other day", self.day)
 
     def step(self, ctx: Context, truth: Pose) -> Out:
-        """Render the image of one place."""
         pose = np.array([[truth.x, truth.y, truth.heading]])
         return self.Out(image=Image(self._camera.image(self._scene, pose, 0.0, key=int(ctx.rng.integers(2**62)))))

@@ -32,7 +32,6 @@ class WorldGrid(Stage):
         grid: OccupancyGrid | None = None
 
     def step(self, ctx: Context) -> Out:
-        """Rasterise the world."""
         if self.grid is not None or self.log is not None:
             return self.Out()
         world = World(self.world, 0)

@@ -39,5 +39,4 @@ class WorldRooms(Stage):
         rooms: Rooms | None = None
 
     def step(self, ctx: Context) -> Out:
-        """Read the rooms."""
         return self.Out(rooms=known_rooms(self.log, self.world))

@@ -82,7 +82,6 @@ class PushedSource(Source):
         """Inputs known at an image."""
 
     def setup(self, ctx: Context) -> None:
-        """Open the camera's file."""
         self._frame: PushedFrame | None = None
         self._opened: Camera | None = None
         self._whole: Camera | None = None

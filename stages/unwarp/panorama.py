@@ -34,7 +34,6 @@ class UnwarpPanorama(Stage):
         self._camera: Camera | None = None
 
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Remap one image."""
         if camera is not self._camera:
             self._build(camera)
         return self.Out(panorama=Panorama(self._table.remap(image.pixels), *self._edges))

@@ -62,7 +62,6 @@ class PerspectiveWindow(Stage):
         self._camera: Camera | None = None
 
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Cut the windows of one image."""
         if isinstance(camera, Perspective):
             return self.Out(panorama=self._of_perspective(image, camera))
         headings = wrap(2.0 * math.pi * np.arange(self.directions) / self.directions)

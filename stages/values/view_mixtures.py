@@ -119,7 +119,6 @@ class ViewMixtures(GrowableArrays, Value):
             self.put(**{name: getattr(self, name)[kept]})
 
     def step(self) -> None:
-        """Count one more view learned from."""
         self.put(steps=self.steps + 1)
 
     def forget_all(self) -> None:
