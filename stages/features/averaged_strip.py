@@ -14,7 +14,7 @@ from omninav.stages.values.views import Coefficients
 
 Real = TypeVar("Real", bound=np.floating[Any])
 Channels = Literal["brightness", "colour"]
-Contrast = Literal["none", "whole", "local"]
+Contrast = Literal["none", "local"]
 
 LOCAL_CONTRAST_SIGMA = 1.0 / 18.0
 """Standard deviation of the window of local contrast, as a share of the circle: 20 degrees
@@ -35,8 +35,8 @@ class AveragedStrip:
     channels: Channels = "brightness"
     """`brightness`, or `colour` (blue, green, red)."""
     contrast: Contrast = "local"
-    """`none`: grey levels, the papers' form; `whole`, `local`: standard deviations from the mean of the image or of
-    the surroundings (see `averaged_strip`)."""
+    """`none`: grey levels, the papers' form; `local`: standard deviations from the mean of the surroundings (see
+    `averaged_strip`)."""
     headings: Annotated[int, Bounds(ge=1)] = 36
     """Headings at which views are compared; must divide `columns`. 1: as they are, the papers' form."""
 
@@ -58,24 +58,18 @@ class AveragedStrip:
 def averaged_strip(pixels: Pixels, rows: int, columns: int, channels: Channels, contrast: Contrast = "none") -> Floats:
     """Average a panorama over equal parts: (rows, columns, 1 or 3) float32, columns as in the panorama.
 
-    `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. `contrast` none: grey levels, 0..255. whole:
-    minus the channel's mean, divided by its standard deviation, which removes exposure and brightness of the
-    lamps. local: the same with the mean and deviation of the surroundings, which also removes shadows and switched
-    lamps.
+    `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. `contrast` none: grey levels, 0..255. local:
+    minus the mean of the channel's surroundings, divided by their standard deviation, which removes exposure, shadows
+    and switched lamps.
     """
     seen = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY) if channels == "brightness" else pixels
     small = cv2.resize(seen.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
     strip = cast(Floats, small.reshape(rows, columns, -1))
-    match contrast:
-        case "none":
-            return strip
-        case "whole":
-            deviation = np.sqrt(strip.var(axis=(0, 1)) + NOISE_GREY_LEVELS**2)
-            return cast(Floats, (strip - strip.mean(axis=(0, 1))) / deviation)
-        case "local":
-            return local_contrast(
-                strip, LOCAL_CONTRAST_SIGMA * columns, LOCAL_CONTRAST_SIGMA * pixels.shape[1] * rows / pixels.shape[0]
-            )
+    if contrast == "none":
+        return strip
+    return local_contrast(
+        strip, LOCAL_CONTRAST_SIGMA * columns, LOCAL_CONTRAST_SIGMA * pixels.shape[1] * rows / pixels.shape[0]
+    )
 
 
 def local_contrast(strip: Floats, across: float, down: float) -> Floats:

@@ -14,13 +14,13 @@ from omninav.stages.values.image import Panorama, Pixels
 from .grey_world import UnderGreyWorld
 from .segment_edges import segment_edges
 
-ColourSpace = Literal["rgb", "lab", "ycrcb", "hsv"]
+ColourSpace = Literal["rgb", "lab", "hsv"]
 BinCount = Annotated[int, Bounds(ge=0, le=256)]
 Level = Annotated[int, Bounds(ge=0, le=255)]
 Ranges = tuple[tuple[Level, Level], tuple[Level, Level], tuple[Level, Level]]
 
-CONVERSIONS = {"lab": cv2.COLOR_BGR2Lab, "ycrcb": cv2.COLOR_BGR2YCrCb, "hsv": cv2.COLOR_BGR2HSV}
-LEVELS = {"rgb": (256, 256, 256), "lab": (256, 256, 256), "ycrcb": (256, 256, 256), "hsv": (180, 256, 256)}
+CONVERSIONS = {"lab": cv2.COLOR_BGR2Lab, "hsv": cv2.COLOR_BGR2HSV}
+LEVELS = {"rgb": (256, 256, 256), "lab": (256, 256, 256), "hsv": (180, 256, 256)}
 
 
 @compiled(nogil=True)
@@ -89,7 +89,7 @@ class ColourHistogram(UnderGreyWorld, Stage):
     segments: Annotated[int, Bounds(ge=1)] = 36
     """Equal parts of the panorama."""
     space: ColourSpace = "rgb"
-    """rgb, lab, ycrcb or hsv, as OpenCV converts 8-bit images."""
+    """rgb, lab or hsv, as OpenCV converts 8-bit images."""
     bins: tuple[BinCount, BinCount, BinCount] = (8, 8, 8)
     """Bins per channel; 0 leaves a channel out."""
     joint: bool = False

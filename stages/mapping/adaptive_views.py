@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
+from omninav.stages.geometry.appearance.view_similarity import similarity
 from omninav.stages.geometry.arrays import Array, Bools, Ints
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import floored, merged, moments, squared_distances
@@ -56,8 +56,6 @@ class AdaptiveViews(Stage):
     beta S p + (1 - beta S) w with p of all modes that fit.
     """
 
-    shape: Shape = "linear"
-    """Similarity over distance: linear, quadratic (1 - d^2/E^2), cosine, or step (1 up to the threshold)."""
     forgetting: Forgetting = "active"
     """`active`; `passive`, the model of Porta & Kroese that Table 1 compares with; or `none`."""
     beta: Annotated[float, Bounds(gt=MIN_WEIGHT / MIN_SIMILARITY, le=1)] = 0.1
@@ -122,7 +120,7 @@ class AdaptiveViews(Stage):
         if not matched.any():
             map.add_view(view.values, type(view).__name__)
             distances, matched = np.append(distances, 0.0), np.append(matched, True)
-        similarities = np.where(matched, similarity(distances, within, self.shape), 0.0)
+        similarities = np.where(matched, similarity(distances, within), 0.0)
         rows = np.flatnonzero(matched)
         turns = np.zeros(len(map))
         turns[rows] = view.turns(map.views[rows])

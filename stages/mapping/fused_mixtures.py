@@ -117,7 +117,7 @@ class FusedMixtures(Stage):
         distances = view.distances(map.views) if len(map) and threshold else np.empty(0)
         rows = np.flatnonzero(distances < threshold.distance) if threshold else np.empty(0, np.int64)
         if threshold and len(rows):
-            similarities, turns = similarity(distances[rows], threshold.distance, "linear"), view.turns(map.views[rows])
+            similarities, turns = similarity(distances[rows], threshold.distance), view.turns(map.views[rows])
         else:
             rows = np.array([map.add_view(view.values, type(view).__name__)])
             similarities, turns = np.ones(1), np.zeros(1)

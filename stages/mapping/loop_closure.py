@@ -36,7 +36,7 @@ class LoopClosure(Stage):
     min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
     """Share of the features that match, for two views to be similar: a wall that repeats itself matches exactly, but
     only on one side of the robot."""
-    similarity: Literal["ratio", "exponential", "gaussian"] = "gaussian"
+    similarity: Literal["ratio", "gaussian"] = "gaussian"
     """Function that turns a visual distance into a similarity, scaled by the root mean square distance within
     subclusters."""
     min_support: Annotated[float, Bounds(ge=0, le=1)] = 0.5

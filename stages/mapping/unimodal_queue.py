@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import field
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -45,11 +45,8 @@ class UnimodalQueue(Stage):
 
     length: Annotated[int, Bounds(ge=0)] = 20
     """Delay of an update (ticks)."""
-    unimodal: Literal["share", "single"] = "share"
-    """`share`: the components near the heaviest hold more than `min_share`; the update has their moments. `single`: the
-    state has one component."""
     min_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
-    """Share of the weight near the heaviest component."""
+    """Share of the weight near the heaviest component of a unimodal state; the update has the moments of that part."""
     max_sigma_deg: Annotated[float, Bounds(gt=0)] = 45.0
     """Largest standard deviation of a unimodal state's heading; an unknown heading has 104 degrees."""
     reconstruct: bool = True
@@ -97,8 +94,6 @@ class UnimodalQueue(Stage):
 
     def _single(self, state: GaussianMixture) -> GaussianMixture | None:
         # The state as one Gaussian, where it is unimodal.
-        if self.unimodal == "single" and len(state) > 1:
-            return None
         unimodal = unimodal_state(state, self.min_share, NEAR_BELOW)
         if unimodal is None:
             return None

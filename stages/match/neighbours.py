@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
+from omninav.stages.geometry.appearance.view_similarity import similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, NoveltyThreshold, WholeView
 
@@ -19,8 +19,6 @@ class ViewNeighbours(Stage):
     threshold or a map there are no neighbours. Raises BadInput where the map's views are of another kind.
     """
 
-    shape: Shape = "linear"
-    """Similarity over distance: linear, quadratic (1 - d²/E²), cosine, or step (1 up to the threshold)."""
     count: Annotated[int, Bounds(ge=0)] = 0
     """The nearest views to take, whatever the threshold (section 2 of the former): similarity then falls to 0 at the
     next view. 0: all views within the threshold."""
@@ -47,4 +45,4 @@ class ViewNeighbours(Stage):
             rows = rows[np.argsort(distances[rows], kind="stable")]
         near = distances[rows]
         turns = view.turns(map.views[rows]) if len(rows) else np.zeros(0)
-        return self.Out(neighbours=Neighbours(rows, near, similarity(near, within, self.shape), turns, nearest))
+        return self.Out(neighbours=Neighbours(rows, near, similarity(near, within), turns, nearest))

@@ -53,13 +53,11 @@ def combine(one: Array, other: Array) -> Array:
 def similarity_of(distance: npt.ArrayLike, spread: float, form: str = "ratio") -> Array:
     """A visual distance as a similarity in [0, 1], which may be a mass (erratum 28).
 
-    `ratio`: 1 / (1 + D / spread); `exponential`: exp(-D / spread); `gaussian`: exp(-D^2 / (2 spread^2)). The paper's
+    `ratio`: 1 / (1 + D / spread); `gaussian`: exp(-D^2 / (2 spread^2)). The paper's
     own, the inverse of D over a standard deviation, has no bound. An infinite distance is a similarity of 0.
     """
     scaled = np.asarray(distance, np.float64) / spread
     with np.errstate(over="ignore"):
-        if form == "exponential":
-            return np.exp(-scaled)
         if form == "gaussian":
             return np.exp(-0.5 * scaled * scaled)
         return 1.0 / (1.0 + scaled)

@@ -84,7 +84,7 @@ def test_views_of_which_too_few_features_match_are_not_similar() -> None:
     assert found.distances == pytest.approx([0.1] * 3)
 
 
-@pytest.mark.parametrize(("form", "similarity"), [("exponential", math.exp(-0.5)), ("gaussian", math.exp(-0.125))])
+@pytest.mark.parametrize(("form", "similarity"), [("ratio", 2.0 / 3.0), ("gaussian", math.exp(-0.125))])
 def test_distances_are_scaled_by_their_spread_within_subclusters(form: str, similarity: float) -> None:
     # Within the parts two views are 0.2 apart, so that a distance of 0.1 is half of the spread.
     looks = [0.0, 0.2, 9.0, 9.2, 0.3, 0.5]

@@ -103,8 +103,6 @@ def test_a_state_is_unimodal_by_the_share_near_its_heaviest_component():
     # The two as one: 0.4 of the way, with 0.6 * 0.4 * 0.2^2 more variance along it.
     np.testing.assert_allclose(update.state.means[0], place(0) + np.array([0.08, 0.0, 0.0]))
     np.testing.assert_allclose(update.state.covariances[0, 0, 0], 0.01 + 0.24 * 0.04)
-    single = UnimodalQueue(length=0, unimodal="single")
-    assert [len(given(single, each)) for each in (near, belief(0))] == [0, 1]
 
 
 def test_what_waits_is_said_and_each_waits_the_same():

@@ -66,7 +66,7 @@ def test_confidence_falls_from_one_to_nothing_at_the_reach() -> None:
 
 
 def test_similarities_lie_between_nothing_and_one() -> None:
-    falls = {"ratio": [1 / 2, 1 / 3], "exponential": np.exp([-1.0, -2.0]), "gaussian": np.exp([-0.5, -2.0])}
+    falls = {"ratio": [1 / 2, 1 / 3], "gaussian": np.exp([-0.5, -2.0])}
     for form, expected in falls.items():
         assert similarity_of([0.0, 0.5, 1.0, math.inf], 0.5, form) == pytest.approx([1.0, *expected, 0.0])
 
