@@ -35,8 +35,6 @@ class AroundBelief:
     """References of a map up to which all are compared."""
 
     class Out(Outputs):
-        """The references to compare with the view."""
-
         candidates: Candidates
 
     def setup(self, ctx: Context) -> None:

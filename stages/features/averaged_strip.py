@@ -41,8 +41,6 @@ class AveragedStrip:
     """Headings at which views are compared; must divide `columns`. 1: as they are, the papers' form."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         view: Coefficients
 
     def __post_init__(self) -> None:

@@ -99,8 +99,6 @@ class ColourHistogram(UnderGreyWorld, Stage):
     Lab's a and b are from 80 to 183."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         features: SegmentHistograms
 
     def __post_init__(self) -> None:

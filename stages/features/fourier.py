@@ -49,8 +49,6 @@ class SegmentSpectrum(Stage):
     """`none`: grey levels, as perhaps in the paper; `whole`, `local`: standard deviations (`averaged_strip`)."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         view: Spectrum
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

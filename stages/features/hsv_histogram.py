@@ -113,8 +113,6 @@ class HsvHistogram(UnderGreyWorld, Stage):
     """Brightness below which a pixel's hue does not count."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         features: SegmentHistograms
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

@@ -32,8 +32,6 @@ class MeanRgb(UnderGreyWorld, Stage):
     """Equal parts of the panorama."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         features: SegmentColours
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

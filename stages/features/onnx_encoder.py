@@ -77,8 +77,6 @@ class OnnxEncoder(Stage):
     """Name of the output that is the descriptor; null: the first."""
 
     class Out(Outputs):
-        """The description of the view."""
-
         features: SegmentDescriptors
 
     def setup(self, ctx: Context) -> None:

@@ -39,8 +39,6 @@ class ConditionalResampling(Stage):
     """Share of the particles that stays where belief and map disagree."""
 
     class Out(Outputs):
-        """The belief after the image."""
-
         belief: Particles
 
     def step(

@@ -66,8 +66,6 @@ class ImportanceResampling(Stage):
     """Share of the particles that are recovery particles."""
 
     class Out(Outputs):
-        """The belief after the image."""
-
         belief: Particles
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:

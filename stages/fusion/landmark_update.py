@@ -80,8 +80,6 @@ class LandmarkUpdate(Stage):
     """Probability at each image that the robot was carried elsewhere."""
 
     class Out(Outputs):
-        """The belief after the landmarks."""
-
         belief: Particles
 
     def step(

@@ -19,8 +19,6 @@ class PlaceBayes(Stage):
     """
 
     class Out(Outputs):
-        """The belief after the view."""
-
         belief: PlaceBelief
 
     def step(

@@ -27,8 +27,6 @@ class UniformRecovery(Stage):
     """Particles."""
 
     class Out(Outputs):
-        """The belief after the image."""
-
         belief: Particles
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:

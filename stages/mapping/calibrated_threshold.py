@@ -51,8 +51,6 @@ class CalibratedThreshold(Stage):
     """Share of the median distance."""
 
     class Out(Outputs):
-        """The threshold, once there is one."""
-
         threshold: NoveltyThreshold | None = None
 
     def __post_init__(self) -> None:

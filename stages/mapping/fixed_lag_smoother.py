@@ -64,8 +64,6 @@ class FixedLagSmoother(Stage):
     """Past views that are kept."""
 
     class Out(Outputs):
-        """Updates with corrected states."""
-
         corrections: MapUpdates
 
     def step(

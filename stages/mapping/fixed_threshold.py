@@ -15,8 +15,6 @@ class FixedThreshold(Stage):
     """Distance between views at which a view is new, in the views' unit."""
 
     class Out(Outputs):
-        """The threshold."""
-
         threshold: NoveltyThreshold
 
     def step(

@@ -10,8 +10,6 @@ class Frozen(Stage):
     """Passes the map on unchanged, for localisation only (`mapping=frozen map=FILE`)."""
 
     class Out(Outputs):
-        """The map."""
-
         map: ViewMixtures
         events: ViewEvent | None = None
 

@@ -8,8 +8,6 @@ class InitialViewMixtures(Stage):
     """Gives the map to begin with: a saved one (`map=FILE`), or an empty one."""
 
     class Out(Outputs):
-        """The map to learn on."""
-
         map: ViewMixtures
 
     def step(self, ctx: Context, known: ViewMixtures | None = None) -> Out:

@@ -66,8 +66,6 @@ class LearnPlaceWords(Stage):
     """Size of the vocabulary."""
 
     class Out(Outputs):
-        """The vocabulary, and the words of each view."""
-
         words: PlaceWords
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:

@@ -37,8 +37,6 @@ class MergePlaces(Stage):
     """Visual distance along the drive, of the medoids of two places that are not merged; 0: all stay as they are."""
 
     class Out(Outputs):
-        """The hypotheses, with the merged place of each view."""
-
         hypotheses: LoopHypotheses
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:

@@ -49,8 +49,6 @@ class LearnPrincipalComponents(Stage):
     the images as they are, as in the paper."""
 
     class Out(Outputs):
-        """The projection."""
-
         projection: Projection
 
     def step(self, ctx: Context, views: Sequence[Coefficients]) -> Out:

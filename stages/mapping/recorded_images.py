@@ -28,8 +28,6 @@ class EncodeImage(Stage):
     """Encodes each image as PNG, without loss."""
 
     class Out(Outputs):
-        """One image."""
-
         encoded: EncodedImage
 
     def step(self, ctx: Context, image: Image) -> Out:

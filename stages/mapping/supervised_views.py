@@ -28,8 +28,6 @@ class SupervisedViews(Stage):
     """
 
     class Out(Outputs):
-        """The map."""
-
         map: ViewMixtures
 
     def step(

@@ -27,8 +27,6 @@ class MatchFeatures(Stage):
     """Distance of patches' descriptors: `euclidean`, or `mahalanobis`, the paper's (section 3.4, equation 2)."""
 
     class Out(Outputs):
-        """The pairs; there may be none."""
-
         correspondences: Correspondences
 
     def step(self, ctx: Context, features: LocalFeatures, target: LocalFeatures) -> Out:

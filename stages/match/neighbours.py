@@ -24,8 +24,6 @@ class ViewNeighbours(Stage):
     next view. 0: all views within the threshold."""
 
     class Out(Outputs):
-        """The similar views."""
-
         neighbours: Neighbours
 
     def step(self, ctx: Context, view: WholeView, map: ViewMixtures, threshold: NoveltyThreshold | None = None) -> Out:

@@ -37,8 +37,6 @@ class VisualDistance(Stage):
     """Fewest matches of views that have something in common."""
 
     class Out(Outputs):
-        """Visual distance to each place."""
-
         distances: VisualDistances
 
     def setup(self, ctx: Context) -> None:

@@ -53,8 +53,6 @@ class WidenCovariance(Stage):
     """Confidence below which the covariance covers the whole map; 0: never."""
 
     class Out(Outputs):
-        """The estimate with the covariance that leaves the system."""
-
         estimate: PoseEstimate
 
     def step(

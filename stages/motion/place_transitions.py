@@ -26,8 +26,6 @@ class PlaceTransitions(Stage):
     """sigma; null: the standard deviation of dist over the map, as in the paper."""
 
     class Out(Outputs):
-        """Belief before the present view is looked at."""
-
         belief: PlaceBelief
 
     def setup(self, ctx: Context) -> None:

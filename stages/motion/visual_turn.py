@@ -59,8 +59,6 @@ class VisualTurn(OdometryNoiseModel, Stage):
     """Its largest one, beyond which odometry alone counts; 0: always."""
 
     class Out(Outputs):
-        """The corrected motion."""
-
         motion: Motion | None = None
 
     def step(self, ctx: Context, panorama: Panorama, motion: Motion | None, before: VisualTurnState) -> Out:

@@ -54,8 +54,6 @@ class ColourNoise(Stage):
     """Share of the image that is covered."""
 
     class Out(Outputs):
-        """The panorama, covered in part."""
-
         panorama: Panorama
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

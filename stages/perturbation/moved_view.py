@@ -51,8 +51,6 @@ class MovedView(Stage):
     """Share of the window's columns, from the left, that is seen."""
 
     class Out(Outputs):
-        """The windows as they are seen now."""
-
         panorama: Windows
 
     def step(self, ctx: Context, panorama: Windows) -> Out:

@@ -8,8 +8,6 @@ class NoPerturbation(Stage):
     """Passes the panorama on unchanged: the reference condition of an experiment."""
 
     class Out(Outputs):
-        """The same panorama."""
-
         panorama: Panorama
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:

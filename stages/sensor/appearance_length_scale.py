@@ -16,8 +16,6 @@ class AppearanceLengthScale(Stage):
     """
 
     class Out(Outputs):
-        """The length scale of the map's views."""
-
         length_scale: LengthScale
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:

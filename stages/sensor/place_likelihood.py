@@ -33,8 +33,6 @@ class PlaceLikelihood(Stage):
     """Log likelihood (nats) by which words of cosine 1 are better than of cosine 0; 0: words do not count."""
 
     class Out(Outputs):
-        """One value per place."""
-
         likelihood: Likelihood
 
     def step(

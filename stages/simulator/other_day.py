@@ -26,8 +26,6 @@ class OtherDay(Stage):
     """The other day."""
 
     class Out(Outputs):
-        """Image of the drive's camera."""
-
         image: Image
 
     def setup(self, ctx: Context) -> None:

@@ -25,8 +25,6 @@ class UnwarpPanorama(Stage):
     """Rows of the panorama (pixels)."""
 
     class Out(Outputs):
-        """The full circle."""
-
         panorama: Panorama
 
     def setup(self, ctx: Context) -> None:
