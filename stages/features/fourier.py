@@ -46,7 +46,7 @@ class SegmentSpectrum(Stage):
     channels: Channels = "colour"
     """`brightness`, or `colour` (blue, green, red)."""
     contrast: Contrast = "local"
-    """`none`: grey levels, as perhaps in the paper; `whole`, `local`: standard deviations (`averaged_strip`)."""
+    """`none`: grey levels, as perhaps in the paper; `local`: standard deviations (`averaged_strip`)."""
 
     class Out(Outputs):
         view: Spectrum
