@@ -517,8 +517,7 @@ def parted(watched: Watched, length_scale_m: float) -> str:
         return ""
     return (
         f"landmarks place {parted.sum()} of {len(parted)} images, some {PARTED_M} m apart, elsewhere than odometry "
-        "leads from one to the next: check that images are new, of this drive and in order, and odometry's unit and "
-        "wheels"
+        "leads from one to the next: check that images are new, of this drive and in order, and that odometry is right"
     )
 
 
@@ -544,11 +543,11 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "turned": turned,
     "misplacing": partial(late, min_metres=MISPLACED_M),
     "displaced": partial(moved, min_metres=DISPLACED_M),
+    "tracked": tracked,
     "parted": parted,
+    "foreign": foreign,
     "late": late,
     "moved": moved,
-    "tracked": tracked,
-    "foreign": foreign,
 }
 """In the order in which causes hide each other."""
 HARMLESS = frozenset(("leap", "late", "moved"))
