@@ -270,7 +270,8 @@ def _pursue(
             off -= 2 * math.pi * math.floor((off + math.pi) / (2 * math.pi))
             brake = math.sqrt(robot[3] * max(length - along - 0.6 * ARRIVAL_M, 0.0))
             speed = min(robot[1] * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
-            turning = 0.0 if remaining < 2 * ARRIVAL_M else 2.0 * off
+            passes = along < length - look_ahead and abs(off) >= 1.0  # it would stand for ever where it only comes past
+            turning = 0.0 if remaining < 2 * ARRIVAL_M and not passes else 2.0 * off
             _step(state, speed, turning, robot, room, NO_PEOPLE)
         poses[row] = state[:3]
     return len(poses), along, False

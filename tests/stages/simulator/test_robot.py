@@ -60,6 +60,13 @@ def test_every_drive_ends_where_its_way_does_however_sharp_its_turns() -> None:
         assert math.dist(driven.poses[-1, :2], line[-1]) < 0.15
 
 
+def test_a_robot_that_turns_round_where_its_way_will_end_drives_on() -> None:
+    """Close to the last point it turns no more, but only when it is about to arrive."""
+    driven = drive(((0.0, 0.0), (2.0, 0.0), (0.0, 0.0), (1.97, 0.0)), Robot(), rate=20.0)
+    assert driven.poses[200:, 0].min() < 0.5
+    assert driven.times[-1] < 25.0
+
+
 def test_a_line_that_was_cut_in_a_bend_ends_where_it_was_cut() -> None:
     """The robot is beside the line there, a hand's breadth from its end: it has arrived, and does not wait for ever."""
     for radius in (0.15, 0.3, 0.5):
