@@ -23,6 +23,7 @@ MAX_PEOPLE_PER_M2 = 1.0
 """Most people in a world, per square metre of its floor: closer together nobody walks."""
 MAX_BESIDE_M = 0.02
 """Metres by which a room or a door may be over an edge: plans are drawn to the centimetre."""
+Factor = Annotated[float, Bounds(ge=0, le=100)]
 OfHalls = Literal["wall", "concrete", "stripes", "floor", "ceiling", "lamp"]
 OfStores = Literal["wood", "mat", "counter", "door", "window", "poster", "carton", "goods"]
 OfRooms = Literal["plaster", "brick", "facade", "carpet", "parquet", "linoleum"]
@@ -92,7 +93,7 @@ class Lamp:
 
     centre: Point
     size: Extent = (1.2, 0.3)
-    light: tuple[float, float, float] = (0.96, 1.0, 1.0)
+    light: tuple[Factor, Factor, Factor] = (0.96, 1.0, 1.0)
     """Colour: blue, green, red; 1 is ordinary brightness."""
     z: float | None = None
     """Height above the floor; null: under the ceiling."""
@@ -106,7 +107,7 @@ class LampGrid:
 
     spacing: tuple[LampSpacing, LampSpacing] = (3.0, 3.0)
     size: Extent = (1.2, 0.3)
-    light: tuple[float, float, float] = (0.96, 1.0, 1.0)
+    light: tuple[Factor, Factor, Factor] = (0.96, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -221,13 +222,13 @@ class Route:
 class Day:
     """The state of a world on one day. The world's seed and the day decide which goods, doors or lamps change."""
 
-    people: Annotated[int, Bounds(ge=0)] = 0
+    people: Annotated[int, Bounds(ge=0, le=1000)] = 0
     """Walkers in the whole world."""
     rearranged: Share = 0.0
     """Share of the shelves' compartments that hold other goods."""
     furniture: Spread = 0.0
     """Standard deviation (m) of the shift of furniture."""
-    light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    light: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
     """Factors of all light: blue, green, red."""
     lamps_off: Share | tuple[str, ...] = 0.0
     """Share of the lamps that are off, or the names of lamps or rooms."""
@@ -353,7 +354,7 @@ class Timing:
 
     images: Positive = 2.0
     """Hz."""
-    odometry: Positive = 20.0
+    odometry: Annotated[float, Bounds(ge=1, le=1000)] = 20.0
     """Hz, of odometry and ground truth."""
 
 
@@ -396,7 +397,7 @@ class WorldConfig:
     """
 
     name: str = "empty"
-    seed: int = 1
+    seed: Annotated[int, Bounds(ge=0)] = 1
     """Seed of goods, textures, the jitter of each day's path and all noise."""
     draw: Annotated[int, Bounds(ge=0)] = 0
     """Which world is drawn: 0 and 7 to 17 are for development, the others for tests. Each has another seed; in draws
@@ -436,7 +437,10 @@ class WorldConfig:
     ramps: Ramps = Ramps()
 
     def __post_init__(self) -> None:
-        """Raise ValueError for rooms and doors out of place, crowds, and names of lamps that are none."""
+        """Raise ValueError for rooms and doors out of place, rooms of one name, crowds, and names that are none."""
+        named = [room.name for room in self.rooms]
+        if twice := sorted({name for name in named if named.count(name) > 1}):
+            raise ValueError(f"rooms: two or more are named {', '.join(twice)}; give each a name of its own")
         floor = f"{self.size[0]:g} x {self.size[1]:g} m (size)"
         names = {room.name for room in self.rooms} | {lamp.name for lamp in self.lamps}
         for number, room in enumerate(self.rooms):

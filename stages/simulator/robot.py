@@ -15,7 +15,7 @@ from .config import Kidnapping, Robot
 from .obstacles import Obstacles, gather, nearest
 
 STEP_S = 0.01
-"""Seconds of one step of the simulation."""
+"""Seconds of one step of the simulation, or about as many: a command lasts a whole number of steps."""
 ARRIVAL_M = 0.05
 """Metres from the last waypoint at which a drive ends."""
 CONTACT_RELEASE_M = 0.02
@@ -70,25 +70,33 @@ def steer(
     A robot that would get closer to an obstacle or a person than its radius does not: it slides along, or is held
     and each new contact is counted. It can always turn, and always back away.
     """
-    _steer(state, speed, turning, robot, round(seconds / STEP_S), room, people)
+    _steer(state, speed, turning, robot, *_divided(seconds), room, people)
+
+
+def _divided(seconds: float) -> tuple[int, float]:
+    """The number of steps into which a time is divided, and their seconds."""
+    steps = max(1, round(seconds / STEP_S))
+    return steps, seconds / steps
 
 
 @compiled(error_model="numpy")
 def _steer(
-    state: Array, speed: float, turning: float, robot: Array, steps: int, room: Obstacles, people: Array
+    state: Array, speed: float, turning: float, robot: Array, steps: int, step_s: float, room: Obstacles, people: Array
 ) -> None:
     for _ in range(steps):
-        _step(state, speed, turning, robot, room, people)
+        _step(state, speed, turning, robot, step_s, room, people)
 
 
 @compiled(error_model="numpy")
-def _step(state: Array, speed: float, turning: float, robot: Array, room: Obstacles, people: Array) -> None:
+def _step(
+    state: Array, speed: float, turning: float, robot: Array, step_s: float, room: Obstacles, people: Array
+) -> None:
     wanted = _within(speed, robot[1])
-    state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP_S)
-    state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * STEP_S)
-    middle = state[HEADING] + 0.5 * state[TURNING] * STEP_S
-    dx, dy = state[SPEED] * math.cos(middle) * STEP_S, state[SPEED] * math.sin(middle) * STEP_S
-    turned = state[HEADING] + state[TURNING] * STEP_S
+    state[SPEED] += _within(wanted - state[SPEED], robot[3] * step_s)
+    state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * step_s)
+    middle = state[HEADING] + 0.5 * state[TURNING] * step_s
+    dx, dy = state[SPEED] * math.cos(middle) * step_s, state[SPEED] * math.sin(middle) * step_s
+    turned = state[HEADING] + state[TURNING] * step_s
     state[HEADING] = turned - 2 * math.pi * math.floor((turned + math.pi) / (2 * math.pi))
     if robot[0] > 0.0 and (dx != 0.0 or dy != 0.0):
         dx, dy = _kept_off(state, dx, dy, robot, room, people)
@@ -147,7 +155,7 @@ def drive(
     bounds = limits(robot)
     if room is None:
         bounds[0], room = 0.0, gather(np.empty((0, 6)), (1.0, 1.0), 0.0)
-    every = round(1.0 / (rate * STEP_S))
+    every, step_s = _divided(1.0 / rate)
     capacity = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
     poses = np.empty((capacity, 3))
     poses[0] = state[:3]
@@ -157,7 +165,7 @@ def drive(
     for kidnapping in [*sorted(kidnappings, key=lambda kidnapping: kidnapping.at), None]:
         until = capacity if kidnapping is None else min(capacity, round(kidnapping.at * rate) + 1)
         filled, along, arrived = _pursue(
-            points, ends, along, state, bounds, robot.look_ahead, every, room, poses[done:until]
+            points, ends, along, state, bounds, robot.look_ahead, every, step_s, room, poses[done:until]
         )
         done += filled
         if arrived or kidnapping is None:
@@ -235,6 +243,7 @@ def _pursue(
     robot: Array,
     look_ahead: float,
     every: int,
+    step_s: float,
     room: Obstacles,
     poses: Array,
 ) -> tuple[int, float, bool]:
@@ -242,7 +251,7 @@ def _pursue(
     length = ends[-1]
     goal_x, goal_y = points[-1, 0], points[-1, 1]
     max_stalled_steps = math.ceil(
-        (2 * math.pi / robot[2] + robot[2] / robot[4]) / STEP_S
+        (2 * math.pi / robot[2] + robot[2] / robot[4]) / step_s
     )  # as long as it takes to turn once
     stalled_steps = 0
     for row in range(len(poses)):
@@ -272,6 +281,6 @@ def _pursue(
             speed = min(robot[1] * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
             passes = along < length - look_ahead and abs(off) >= 1.0  # it would stand for ever where it only comes past
             turning = 0.0 if remaining < 2 * ARRIVAL_M and not passes else 2.0 * off
-            _step(state, speed, turning, robot, room, NO_PEOPLE)
+            _step(state, speed, turning, robot, step_s, room, NO_PEOPLE)
         poses[row] = state[:3]
     return len(poses), along, False

@@ -83,7 +83,7 @@ class ClosedLoop(Source):
     never."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     """Longest drive, s."""
-    rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
+    rate_hz: Annotated[float, Bounds(ge=1, le=1000)] = 5.0
     """Ticks a second."""
     rest_s: Annotated[float, Bounds(ge=0)] = 1.0
     """Time that it continues once the planned route, or a path without one, has ended: it has arrived, or given up."""

@@ -7,8 +7,9 @@ import pytest
 
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.simulator.config import OdometryNoise, Robot
+from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import Bias, draw_bias, odometry
-from omninav.stages.simulator.robot import drive
+from omninav.stages.simulator.robot import at_rest, drive, limits, steer
 
 CORNER = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0))
 EXACT = OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -32,6 +33,16 @@ def test_limits_of_speed_turning_and_acceleration_hold() -> None:
     assert speed.max() <= robot.speed * 1.001
     assert np.abs(motion[:, 2]).max() <= robot.turn_speed * 1.001
     assert np.abs(np.diff(speed)).max() * 20.0 <= robot.acceleration * 1.05
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 66.0, 150.0, 1000.0])
+def test_a_drive_takes_as_long_at_any_rate(rate: float) -> None:
+    driven = drive(CORNER, Robot(), rate)
+    assert driven.times[-1] == pytest.approx(drive(CORNER, Robot(), rate=20.0).times[-1], abs=max(0.1, 1.1 / rate))
+    state = at_rest((0.0, 0.0, 0.0))
+    for _ in range(round(4 * rate)):
+        steer(state, 0.45, 0.0, limits(Robot()), 1.0 / rate, gather(np.empty((0, 6)), (90.0, 90.0), 0.0))
+    assert state[0] == pytest.approx(4 * 0.45 - 0.2, abs=0.01)
 
 
 def test_wheels_do_not_slip_sideways() -> None:

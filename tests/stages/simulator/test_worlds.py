@@ -282,10 +282,15 @@ def test_a_random_route_returns_to_aisles_where_there_are_few() -> None:
     assert distances_along(far.true_poses)[-1] > 200.0
 
 
-def test_sizes_of_zero_and_lamps_without_number_are_refused() -> None:
+def test_worlds_that_cannot_be_are_refused() -> None:
     for given, said in (
         ({"size": [0, 5]}, "size[0]: 0"),
         ({"lamp_grid": {"spacing": [3, 0.001]}}, "spacing[1]: 0.001"),
+        ({"seed": -5}, "world.seed: -5 is out of bounds, expected int >= 0"),
+        ({"timing": {"odometry": 2000}}, "timing.odometry: 2000.0 is out of bounds, expected float >= 1 and <= 1000"),
+        ({"days": [{"people": 100000}]}, "people: 100000"),
+        ({"days": [{"light": [-1, 1, 1]}]}, "light[0]: -1"),
+        ({"rooms": 2 * [{"name": "den", "corner": [0, 0], "size": [3, 3]}]}, "world: rooms: two or more are named den"),
     ):
         problems = convert(given, WorldConfig, "world")[1]
         assert any(said in str(problem) for problem in problems)
