@@ -32,6 +32,7 @@ class Recording(Losses, ABC):
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
     `details`: the first case of each kind in words. `unmeasured_s`: (N,) seconds of the way to each frame about which
     no odometry is believed, or None where there are none. `assumed`: what nothing in it states and was assumed.
+    `warnings`: what one must know of it to judge results.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Recording(Losses, ABC):
     unmeasured_s: Array | None = None
     truth: Array | None = None
     assumed: Sequence[str] = ()
+    warnings: Sequence[str] = ()
 
     @abstractmethod
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:

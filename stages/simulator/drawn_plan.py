@@ -11,6 +11,9 @@ from .config import WorldConfig
 from .drawn_office import drawn_office
 from .drawn_store import drawn_store
 
+ONE_PLAN = "this world has one plan, which world.plan=drawn does not change; leave that out"
+"""Warning of a world that has nothing to draw."""
+
 
 def laid_out(world: WorldConfig) -> WorldConfig:
     """A world with the floor plan that `world.plan` asks for, listed in full.

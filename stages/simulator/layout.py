@@ -44,7 +44,7 @@ def expand(config: WorldConfig, day: int = 0) -> Layout:
     for room in config.rooms:
         lamps += _room_lamps(room)
         if room.walls:
-            blocks += walls(config, room, cuts) + roof(room) + doors(config, room, today, day)
+            blocks += walls(config, room, cuts) + roof(room) + doors(config, room, day)
             wall_panels += windows(room)
         fittings = furnish(config, room, cuts, today, day)
         blocks += fittings.blocks

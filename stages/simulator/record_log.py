@@ -63,6 +63,10 @@ def record_log(
     if collisions:
         print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
     for drive in drives:
+        for sentence in drive.warnings:
+            ctx.warn(sentence)
+        if drive.left_out:
+            print(f"{path}: day {drive.day} leaves out what cannot be reached: {', '.join(drive.left_out)}")
         late = drive.kidnappings[len(drive.kidnapped) :]
         if late:
             ends = f"after {(drive.times[-1] - drive.times[0]) / 1e9:.1f} s, the robot is not carried at"

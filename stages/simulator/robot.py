@@ -34,7 +34,8 @@ class SimulatedDrive:
     """A drive: `times` (N,) s, `poses` (N, 3), and the poses to which the wheels had rolled, `rolled_to` (N, 3).
 
     The last two differ only where the robot was lifted. `collisions`: how often it came into contact. `kidnappings`:
-    those that took place before the end of the drive, each with its row.
+    those that took place before the end of the drive, each with its row. `driven_m` and `planned_m`: metres that were
+    driven, and that the line has but for what was skipped by being carried. `arrived`: whether it came to its end.
     """
 
     times: Array
@@ -42,6 +43,9 @@ class SimulatedDrive:
     rolled_to: Array
     collisions: int
     kidnappings: tuple[tuple[int, Kidnapping], ...]
+    driven_m: float
+    planned_m: float
+    arrived: bool
 
 
 def at_rest(pose: npt.ArrayLike) -> Array:
@@ -161,7 +165,7 @@ def drive(
     poses[0] = state[:3]
     rolled_to: dict[int, Array] = {}
     kidnapped: list[tuple[int, Kidnapping]] = []
-    done, along = 1, 0.0
+    done, along, planned_m = 1, 0.0, length
     for kidnapping in [*sorted(kidnappings, key=lambda kidnapping: kidnapping.at), None]:
         until = capacity if kidnapping is None else min(capacity, round(kidnapping.at * rate) + 1)
         filled, along, arrived = _pursue(
@@ -175,12 +179,17 @@ def drive(
         teleport(state, kidnapping)
         poses[done - 1] = state[:3]
         if kidnapping.to is not None:
+            planned_m += along
             along = _nearest_along(points, ends, state[:2], along)
+            planned_m -= along
     poses = poses[:done]
     before = poses.copy()
     for number, pose in rolled_to.items():
         before[number] = pose
-    return SimulatedDrive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(kidnapped))
+    times, driven_m = np.arange(done) / rate, float(state[DISTANCE])
+    return SimulatedDrive(
+        times, poses, before, int(state[COLLISIONS]), tuple(kidnapped), driven_m, planned_m, bool(arrived)
+    )
 
 
 def around(state: Array, seconds: npt.ArrayLike) -> Array:

@@ -176,7 +176,13 @@ def roof(room: Room) -> list[Block]:
     ]
 
 
-def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]:
+def is_open(config: WorldConfig, room: Room, k: int, day: int) -> bool:
+    """Tells whether door `k` of a room is open on a day."""
+    drawn = stream(config.draw_seed, "door", room.name, k, "day", day).uniform()
+    return not room.doors[k].leaf or bool(drawn < config.day(day).doors)
+
+
+def doors(config: WorldConfig, room: Room, day: int) -> list[Block]:
     """The leaves of a room's doors: across the opening where closed, swung into the room where open."""
     leaves = []
     for k, door in enumerate(room.doors):
@@ -184,10 +190,10 @@ def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]
             continue
         wall = wall_of(room, door.side)
         along, across = wall.low + door.at, wall.inside(INNER_WALL_M / 2)
-        is_open = bool(stream(config.draw_seed, "door", room.name, k, "day", number).uniform() < day.doors)
-        if is_open:
+        opened = is_open(config, room, k, day)
+        if opened:
             along, across = along - door.width / 2, across + wall.inward * (door.width / 2 + INNER_WALL_M / 2)
-        yaw = 0.0 if wall.along_x != is_open else math.pi / 2
+        yaw = 0.0 if wall.along_x != opened else math.pi / 2
         centre, size, look = wall.on_map(along, across), (door.width, 0.05), f"{room.name} door"
         leaves.append(Block(centre, size, DOOR_HEIGHT_M, "door", "wood", yaw=yaw, look=look, kind="door"))
     return leaves

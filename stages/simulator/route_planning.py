@@ -13,8 +13,9 @@ import numpy.typing as npt
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import distances_along, path_length
 
-from .config import Point, Route
+from .config import Point, Route, WorldConfig
 from .layout import Aisle
+from .rooms import is_open
 from .streams import stream
 from .world import World
 
@@ -69,6 +70,17 @@ def plan(world: World, route: Route) -> Array:
     if not legs:
         raise UnreachableRoute(f"world '{world.config.name}': the route has only one point that can be reached")
     return _cut(space.smooth(np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])), route.length)
+
+
+def left_out(world: World, route: Route) -> list[str]:
+    """Rooms and points of a route that cannot be reached on the world's day."""
+    rooms = [room for room in world.config.rooms if route.kind == "rooms" and room.name in (route.through or room.name)]
+    points = (*route.lead_in, *route.waypoints) if world.config.day(world.day).doors < 1.0 else ()
+    if not rooms and not points:
+        return []
+    space = _free_space(world)
+    closed = [room.name for room in rooms if space.roomiest_place(room.corner, room.size) is None]
+    return [*closed, *(_named(world.config, point) for point in dict.fromkeys(points) if not space.has(point))]
 
 
 def jittered(world: World, line: Array, spread: float, rng: np.random.Generator) -> Array:
@@ -266,9 +278,14 @@ class _FreeSpace:
                 free += low
                 nearest = free[np.argmin(((free - (row, column)) ** 2).sum(axis=1))]
                 return int(nearest[0] * columns + nearest[1])
-        raise UnreachableRoute(
-            f"world '{self._world.config.name}': no room for the robot near ({x:g}, {y:g}) on this day"
-        )
+        name, day = self._world.config.name, self._world.day
+        if self._free[low[0] : row + reach + 1, low[1] : column + reach + 1].any():
+            shut = ", ".join(_closed_doors(self._world))
+            raise UnreachableRoute(
+                f"world '{name}': {_named(self._world.config, (x, y))} is closed off from the largest free part of the "
+                f"floor on day {day} ({f'closed doors: {shut}' if shut else 'no door leads there'})"
+            )
+        raise UnreachableRoute(f"world '{name}': no room for the robot near ({x:g}, {y:g}) on day {day}")
 
     def _middle(self, cells: npt.NDArray[np.int_]) -> Array:
         rows, columns = np.divmod(cells, self._free.shape[1])
@@ -278,13 +295,19 @@ class _FreeSpace:
     def reachable(self, goals: Iterator[Point]) -> Iterator[Point]:
         """Goals without those behind doors that are closed today."""
         for goal in goals:
-            try:
+            if self._world.config.day(self._world.day).doors == 1.0:
                 self._cell(goal)
-            except UnreachableRoute:
-                if self._world.config.day(self._world.day).doors == 1.0:
-                    raise
+            elif not self.has(goal):
                 continue
             yield goal
+
+    def has(self, point: Point) -> bool:
+        """Tells whether the robot can get near a point."""
+        try:
+            self._cell(point)
+        except UnreachableRoute:
+            return False
+        return True
 
     def between(self, start: Array, end: Array) -> Array:
         """Points (N, 2) of a path between two points, straight where nothing is near."""
@@ -367,6 +390,26 @@ class _FreeSpace:
         )
         row, column = roomy[int(rng.integers(len(roomy)))]
         return float((column + 0.5) * self._step), float((row + 0.5) * self._step)
+
+
+def _named(config: WorldConfig, point: Point) -> str:
+    """A point, and the smallest room that it is in."""
+    around = [
+        (room.size[0] * room.size[1], room.name)
+        for room in config.rooms
+        if all(low <= at <= low + size for at, low, size in zip(point, room.corner, room.size, strict=True))
+    ]
+    return f"({point[0]:g}, {point[1]:g})" + (f" in {min(around)[1]}" if around else "")
+
+
+def _closed_doors(world: World) -> list[str]:
+    """Names of the rooms that have a closed door on the world's day."""
+    config = world.config
+    return [
+        room.name
+        for room in config.rooms
+        if not all(is_open(config, room, k, world.day) for k in range(len(room.doors)))
+    ]
 
 
 # Lines

@@ -23,7 +23,7 @@ from . import route_planning
 from .bodies import box_array
 from .cameras import shutter_times
 from .config import Day, Kidnapping, WorldConfig
-from .drawn_plan import laid_out
+from .drawn_plan import ONE_PLAN, laid_out
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
 from .people import Person, RobotTrack
@@ -40,6 +40,8 @@ FIRST_IMAGE_S = 0.52
 """Seconds from the start of a drive to its first image, so that odometry begins before it."""
 JITTER_SHARES = (1.0, 0.5, 0.25, 0.0)
 """Shares of the path's jitter that are tried one after the other, until the robot touches nothing."""
+LEAST_SHARE_DRIVEN = 0.8
+"""Share of its planned path below which a drive is warned of: bends are cut by less."""
 IMAGE_LATENCY_NS = 42_000_000
 """Nanoseconds from an image's stamp to its arrival."""
 
@@ -91,6 +93,12 @@ class SimulatedRecording(Recording):
             )
         driven = self._without_contact(way)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
+        self.warnings = [f"{self.name}: {ONE_PLAN}"] if world.plan == "drawn" else []
+        if not driven.arrived or driven.driven_m < LEAST_SHARE_DRIVEN * driven.planned_m:
+            self.warnings.append(
+                f"{self.name}: the robot drove {driven.driven_m:.0f} m, its path has {driven.planned_m:.0f} m; see on "
+                "the floor plan where it was held up, and try another route, world.robot.radius or look_ahead"
+            )
         bias = draw_bias(world.odometry, stream(world.draw_seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
@@ -182,6 +190,11 @@ class SimulatedRecording(Recording):
     @cached_property
     def _room(self) -> Obstacles:
         return gather(box_array(self._world.obstacles), self.world.size, reach(self.world.robot))
+
+    @cached_property
+    def left_out(self) -> list[str]:
+        """Rooms and points of the route that cannot be reached on its day."""
+        return route_planning.left_out(self._world, self.world.routes[self.route])
 
     @cached_property
     def _key(self) -> int:

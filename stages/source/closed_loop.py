@@ -14,6 +14,7 @@ from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
+from omninav.stages.simulator.drawn_plan import ONE_PLAN
 from omninav.stages.simulator.drawn_starts import drawn_pose, drawn_way_back
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
@@ -112,6 +113,8 @@ class ClosedLoop(Source):
         if self.start is None and self.route in self.world.routes and self.world.routes[self.route].kidnappings:
             ctx.warn(f"The kidnappings of the route '{self.route}' are for logs of it; here kidnappings=… states them.")
         world = World(self.world, self.day)
+        if world.config.plan == "drawn":
+            ctx.warn(f"{world.config.label}: {ONE_PLAN}")
         self._world, self._scene = world, world.scene
         self._room = gather(box_array(world.obstacles), world.config.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)

@@ -80,7 +80,8 @@ class Playback(Source, ABC):
         ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
         for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
             ctx.warn(f"assumed: {sentence}")
-        for sentence in dict.fromkeys([*self._doubts, *pauses(self._parts)]):
+        known = [sentence for recording in self._opened for sentence in recording.warnings]
+        for sentence in dict.fromkeys([*known, *self._doubts, *pauses(self._parts)]):
             ctx.warn(sentence)
         if sentence := self._few_used():
             ctx.warn(sentence)

@@ -15,7 +15,18 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_rays
-from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
+from omninav.stages.simulator.config import (
+    Day,
+    Delivery,
+    Door,
+    Kidnapping,
+    OdometryNoise,
+    Room,
+    Route,
+    Sensor,
+    WorldConfig,
+    mirror,
+)
 from omninav.stages.simulator.record_log import metres, record_log
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record
@@ -245,6 +256,27 @@ def test_a_kidnapping_after_the_end_of_the_drive_is_told(tmp_path: Path):
     said = Context("simulate")
     record_log(tmp_path / "out.mcap", EXACT, "there", 1, (*KIDNAPPED, Kidnapping(at=600.0, turn=1.0)), said)
     assert [warning.rpartition(", ")[2] for warning in said.warnings] == ["the robot is not carried at 600 s"]
+
+
+def test_rooms_and_points_behind_closed_doors_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    den = Room("den", (0.0, 0.0), (3.0, 3.0), (Door("north", 1.5),))
+    routes = {"all": Route(((4.0, 1.0), (1.5, 2.0), (6.0, 1.0)), "rooms")}
+    world = WorldConfig(rooms=(den,), routes=routes, camera=SMALL, days=(Day(doors=0.0),))
+    record_log(tmp_path / "out.mcap", world, "all", 0, (), Context("simulate"))
+    assert "out.mcap: day 0 leaves out what cannot be reached: den, (1.5, 2) in den\n" in capsys.readouterr().out
+
+
+def test_a_drive_that_skips_most_of_its_route_and_a_plan_that_is_not_drawn_are_told(tmp_path: Path):
+    lap = Route(((2.0, 1.0), (9.0, 1.0), (9.0, 2.0), (2.0, 2.0)), "laps", laps=3)
+    skips = replace(EXACT, plan="drawn", routes={"lap": lap}, robot=replace(EXACT.robot, look_ahead=12.0))
+    source, simulate = Context("source"), Context("simulate")
+    SimulatedSource(world=skips, route="lap", day=0).setup(source)
+    record_log(tmp_path / "out.mcap", skips, "lap", 0, (), simulate)
+    assert simulate.warnings == source.warnings
+    one_plan, short = simulate.warnings
+    assert "one plan" in one_plan
+    assert "the robot drove " in short
+    assert SimulatedRecording(EXACT, "there", 0, KIDNAPPED).warnings == []
 
 
 def test_a_log_that_was_not_simulated_is_not_written_over(tmp_path: Path):

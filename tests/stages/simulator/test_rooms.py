@@ -41,13 +41,13 @@ def test_walls_stand_within_the_rectangle_of_the_room():
 
 
 def test_a_closed_door_fills_its_opening_and_an_open_one_leaves_it():
-    (closed,) = doors(WORLD, KITCHEN, Day(doors=0.0), 0)
+    (closed,) = doors(replace(WORLD, days=(Day(doors=0.0),)), KITCHEN, 0)
     assert extent(closed)[::2] == pytest.approx((3.0, 4.0))
-    (opened,) = doors(WORLD, KITCHEN, Day(doors=1.0), 0)
+    (opened,) = doors(WORLD, KITCHEN, 0)
     _, low_y, high_x, high_y = extent(opened)
     assert high_x < 3.1  # at the hinge
     assert (low_y > 3.0, high_y - low_y) == (True, pytest.approx(1.0))  # swung into the room
-    assert doors(WORLD, replace(KITCHEN, doors=(Door("south", 1.5, leaf=False),)), Day(), 0) == []
+    assert doors(WORLD, replace(KITCHEN, doors=(Door("south", 1.5, leaf=False),)), 0) == []
 
 
 def test_windows_are_on_their_side_and_beside_its_doors():

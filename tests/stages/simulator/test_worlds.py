@@ -272,6 +272,16 @@ def test_a_place_without_room_is_refused_with_its_coordinates() -> None:
         route_planning.plan(World(walled, 0), Route(((8.0, 1.0), (3.5, 8.0))))
 
 
+def test_a_place_that_is_closed_off_is_refused_with_its_room_and_the_closed_doors() -> None:
+    """The den is the larger part of this floor, so the passage is what is closed off."""
+    passage = Room("passage", (7.0, 0.0), (2.5, 9.0), walls=False)
+    den = dataclasses.replace(ROOM, corner=(0.0, 0.0), size=(7.0, 9.0))
+    config = WorldConfig(size=(9.5, 9.0), rooms=(den, passage), days=(Day(doors=0.0),))
+    said = r"\(8.8, 1\) in passage is closed off from .* on day 0 \(closed doors: den\)"
+    with pytest.raises(route_planning.UnreachableRoute, match=said):
+        route_planning.plan(World(config), Route(((8.8, 1.0),), "rooms"))
+
+
 # Lay-outs
 
 
