@@ -164,7 +164,7 @@ class InputConflicts(Stage):
             lately = judge(Watched(recent.rows[-LATE_IMAGES:]), length_scale_m, ("misplacing", "late"))
             kind, sentence = lately if lately[0] else (kind, sentence)
         recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
-        others = set(recent.standing) - HARMLESS - {"parted", kind}
+        others = set(recent.standing) - {"leap", "parted", kind} - (frozenset() if kind in HARMLESS else HARMLESS)
         if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
             self._say(ctx, recent, kind, sentence)
         recent.suspected = kind
@@ -277,8 +277,9 @@ MIN_BLIND, BLIND_CORRELATION = 16, 0.15
 """Images that have less in common than this with the ones before show nothing, or noise."""
 SURE_CORRELATION, SURE_TURN = 0.4, math.radians(3.0)
 """Turns are seen where images correlate so much, and above what parallax looks like (rad)."""
-MIN_SEEN_TURN = math.pi / 2.0
-"""Least turning of the images, to either side, before turns are judged (rad)."""
+MIN_SEEN_TURN, MIN_LATE_TURN = math.pi / 2.0, math.pi
+"""Least turning of the images, to either side, before turns are judged, and their delay (rad): at 95 degrees one was
+found where there is none."""
 STILL_M, STILL_RAD = 1e-3, 1e-3
 """Odometry that stays below these over all images stands still (m, rad)."""
 NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
@@ -398,7 +399,7 @@ def turned(watched: Watched, length_scale_m: float) -> str:
 def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> str:
     """Images that show turns when odometry does not measure them; the robot drives at least this far (m)."""
     seen = watched.sure_turns
-    if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_SEEN_TURN or watched.radians == 0.0:
+    if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_LATE_TURN or watched.radians == 0.0:
         return ""
     fit = watched.turn_fit
     if fit.sign < 0 or fit.explained < EXPLAINED or fit.explained - fit.as_is < DELAY_GAIN:

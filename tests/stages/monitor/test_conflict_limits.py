@@ -228,11 +228,11 @@ def test_odometry_that_turns_wildly_and_not_with_the_images_is_in_another_unit(t
         assert "odometry turns by 744 degrees over 59 images, the images by 115 degrees, and not together" in found
 
 
-def swaying(delay_s: float, gain: float = 1.0) -> Watched:
+def swaying(delay_s: float, gain: float = 1.0, size: float = 1.0) -> Watched:
     """A robot that drives 0.4 m/s and turns to and fro; images show its turns so much later, odometry `gain` times."""
 
     def headings(times: Array) -> Array:
-        return np.asarray(2.0 * np.sin(times / 3.0) + np.sin(times / 1.7))
+        return np.asarray(size * (2.0 * np.sin(times / 3.0) + np.sin(times / 1.7)))
 
     times = 0.5 * np.arange(64)
     rows = np.full((64, COLUMNS), np.nan)
@@ -255,6 +255,11 @@ def test_late_images_are_said_with_their_delay_and_mislead_where_the_robot_is_el
         assert f"{abs(delay_s)} s {side} odometry measures them, in which the robot drives {driven:.2f} m" in sentence
         assert late(images, SCALE_M, driven - 0.01)
         assert not late(images, SCALE_M, driven + 0.01)
+
+
+@pytest.mark.parametrize(("size", "said"), [(0.2, False), (0.22, True)])  # 164 and 187 degrees
+def test_a_delay_is_said_once_the_images_have_turned_by_half_a_turn(size: float, said: bool) -> None:
+    assert bool(late(swaying(0.5, size=size), SCALE_M)) == said
 
 
 def test_reversed_turns_are_said_and_are_no_delay() -> None:
