@@ -1,5 +1,6 @@
 import re
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +10,8 @@ from omninav.pipeline.graph.signature import Port, Signature
 from omninav.pipeline.graph.stage import Stage
 from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.report.mermaid import mermaid
+
+DRAWN = Path(__file__).with_name("drawn_graph.svg")
 
 
 def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> Graph:
@@ -100,6 +103,25 @@ def test_readers_of_ground_truth_are_red_and_hovering_shows_class_summary_and_pa
     assert "class n_score,n_start truth" in mermaid(loop())
 
 
+def everything() -> Graph:
+    """The loop with what few graphs have: a late reader of ground truth, two lanes, and cards in several columns."""
+    made = loop()
+    made.wires.extend(
+        [Wire("see", "late", "source", "truth", delay=2), Wire("see", "last", "move", "belief", hold=True)]
+    )
+    for number in range(8):
+        read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
+        made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", Stage(), read, {}, "after")
+        ports = ["ticks", "beliefs"][: 1 + (number == 2)]
+        made.wires.extend(Wire(f"view_{number}", port, "source", "tick", collect=True) for port in ports)
+    return made
+
+
+def test_a_graph_is_drawn_as_was_found_good_by_eye():
+    """Look at a new drawing before it takes the old one's place: `python tests/pipeline/report/test_graph_svg.py`."""
+    assert svg(everything()).splitlines() == DRAWN.read_text("utf-8").splitlines()
+
+
 def test_a_graph_is_always_drawn_alike_and_fetches_nothing():
     assert svg(loop()) == svg(loop())
     assert re.findall(r"https?://[^\"\s<]+", svg(loop())) == ["http://www.w3.org/2000/svg"]
@@ -129,3 +151,7 @@ def test_mermaid_names_nodes_wires_bands_and_delays():
     assert 'n_source == "truth" ==> n_score' in text
     assert 'subgraph after_band["after the last tick"]' in text
     assert text.count("subgraph") == text.count("\n  end\n")
+
+
+if __name__ == "__main__":
+    DRAWN.write_text(svg(everything()), "utf-8")

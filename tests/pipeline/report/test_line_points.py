@@ -11,6 +11,12 @@ def test_a_short_line_loses_what_no_eye_tells_apart():
     assert drawn_points(line).tolist() == [[0.0, 0.0], [9.0, 0.0], [9.05, 0.0]]
 
 
+def test_a_line_that_comes_back_is_drawn_all_the_way():
+    line = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 0.0], [0.0, 0.0], [9.0, 0.0]])
+    assert drawn_points(line).tolist() == line[[0, 1, 2, 4]].tolist()
+    assert drawn_points(line[2:4]).tolist() == line[2:4].tolist()
+
+
 def test_of_a_stretch_its_ends_its_peaks_and_its_first_gap_are_kept_where_a_line_is_too_long():
     zigzag = np.column_stack([np.arange(8.0 * STRETCHES), np.tile([0.0, 9.0], 4 * STRETCHES)])
     assert len(drawn_points(zigzag[: 4 * STRETCHES])) == 4 * STRETCHES

@@ -2,7 +2,7 @@ import pytest
 from sample_metrics import measured
 
 from omninav.pipeline import Metrics, MetricSpec
-from omninav.pipeline.report.metrics import digits, metric_values, title, unit
+from omninav.pipeline.report.metrics import best_of, digits, metric_values, title, unit
 
 
 @pytest.mark.parametrize(
@@ -17,6 +17,13 @@ from omninav.pipeline.report.metrics import digits, metric_values, title, unit
         (0.00012, "0.00012"),
         (3.3e-14, "0"),
         (-2e-9, "0"),
+        (1e-6, "0.0000010"),
+        (0.0005, "0.001"),
+        (1.0, "1.00"),
+        (-10.0, "-10.0"),
+        (100.0, "100"),
+        (9999, "9999"),
+        (-10_000, "-10\u2009000"),
     ],
 )
 def test_numbers_have_the_digits_they_carry(number, text):
@@ -64,3 +71,18 @@ def test_described_entries_come_first_in_their_order():
 
 def test_what_a_figure_was_measured_with_is_no_result():
     assert list(metric_values(Metrics({"a": 1, "radius_m": 2.0}, {"radius_m": MetricSpec(setting=True)}))) == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("better", "values", "best"),
+    [
+        ("lower", (0.5, 0.1, 0.1), {1, 2}),
+        ("higher", (0.5, 0.1, None), {0}),
+        ("lower", (0.5, 0.5), set()),
+        ("lower", (0.5, "never"), set()),
+        (None, (0.5, 0.1), set()),
+    ],
+)
+def test_the_best_of_several_runs_are_those_with_its_best_number(better, values, best):
+    runs = [metric_values(Metrics({"error_m": value}, {"error_m": MetricSpec(better=better)})) for value in values]
+    assert (best_of("error_m", runs), best_of("error_m", [{}, *runs])) == (best, {number + 1 for number in best})

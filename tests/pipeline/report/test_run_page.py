@@ -147,6 +147,23 @@ def test_a_chart_stands_in_the_page_in_the_colours_of_the_page(tmp_path):
     assert "--blue: #5fb4e6" in page
 
 
+@pytest.mark.parametrize(
+    ("kinds", "places"),
+    [
+        ("c", ["alone"]),
+        ("cc", ["half", "half"]),
+        ("ccc", ["half", "half", "alone"]),
+        ("cpcc", ["alone", "", "half", "half"]),
+        ("pcccp", ["", "half", "half", "alone", ""]),
+    ],
+)
+def test_charts_that_follow_each_other_stand_in_pairs(tmp_path, kinds: str, places: list[str]):
+    drawn = {"c": chart().svg(), "p": b"\x89PNG"}
+    plots = [Plot(f"plot_{n}", "", "", drawn[kind], order=n) for n, kind in enumerate(kinds)]
+    page = report(tmp_path, plots=plots)
+    assert re.findall(r'<figure id="plot_\d"(?: class="([^"]*)")?>', page) == places
+
+
 def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
     frame = ("<circle/>", (("seen", b"JPEG"),), (("error", "1 m"),))
     slides = tuple(Slide(f"frame {n} </script>", *frame) for n in (0, 1))
