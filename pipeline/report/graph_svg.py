@@ -40,10 +40,10 @@ class _Painter:
 
     def paint(self) -> str:
         bands = self._columns()
-        low, high = self._vertical()
+        high = self._lowered()
         lanes = list(dict.fromkeys(w.origin for w in self.delayed))
         floor = high + LANE * len(lanes) + (10 if lanes else 0)
-        bottom = max(floor, low + 60) + 12
+        bottom = max(floor, TOP + 64) + 12
         left, right = 12.0, max((end for _, end in bands.values()), default=12.0)
         for lifetime, (start, end) in bands.items():
             self._band(lifetime, start, TOP - 32, end, bottom)
@@ -99,13 +99,13 @@ class _Painter:
             previous = lifetime
         return bands
 
-    def _vertical(self) -> tuple[float, float]:
-        """Shift everything to begin at the top; returns the upper and lower edge of what flows."""
+    def _lowered(self) -> float:
+        """Shift everything to begin at the top; returns the lower edge of what flows."""
         items = [item for layer in self.layers for item in layer]
         top = min((item.y for item in items), default=0.0)
         for item in items:
             item.y += TOP + 4 - top
-        return TOP + 4, max((item.y + item.height for item in items), default=TOP + 4)
+        return max((item.y + item.height for item in items), default=TOP)
 
     def _cards(self, left: float, right: float, top: float) -> tuple[float, float]:
         """Cards of the "after" stages side by side below the loop, each in the shortest column: right, bottom."""

@@ -137,8 +137,14 @@ def test_chains_of_boxes_are_drawn_without_crossings():
     assert placed["f"][1] < placed["e"][1]
 
 
-def test_an_empty_graph_can_be_drawn():
-    ET.fromstring(svg(Graph({}, [])))
+def test_an_empty_graph_can_be_drawn_and_a_small_one_has_room_for_its_legend():
+    for made, top in (
+        (Graph({}, []), 156),
+        (graph({"a": ("tick", "")}, []), 156),
+        (graph({"a": ("after", "")}, []), 132),
+    ):
+        drawn = ET.fromstring(svg(made))
+        assert (drawn.get("width"), drawn.get("height")) == ("430", f"{top}"), made
     assert mermaid(Graph({}, [])) == "flowchart LR\n"
 
 
