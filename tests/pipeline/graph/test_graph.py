@@ -44,6 +44,26 @@ def test_lifetimes_and_who_reads_a_port_follow_from_the_wires():
     assert [sorted(graph.readers_of(f"{node}.number")) for node in ("start", "source")] == [["scale", "sum"], ["sum"]]
 
 
+def test_a_graph_knows_its_outputs_and_what_leads_to_them():
+    artifacts = {"map": toys.Surveyed, "none": None}
+    wires = {
+        **LOOP_WIRES,
+        "all": {"numbers": {"from": "sum.number", "collect": True}},
+        "scale": {"number": "sum.number"},
+    }
+    graph = build(graph_of_toys({**LOOP, "all": "Collected", "scale": "Scale"}, wires), artifacts)
+    part = graph.leading_to(["sum.number", "artifacts.map"])
+    assert (set(part.nodes), [wire.to_node for wire in part.wires]) == ({"source", "start", "sum"}, ["sum", "sum"])
+    assert set(graph.leading_to(["start.number"]).nodes) == {"start"}
+    ports = [graph.port(origin) for origin in ("artifacts.map", "artifacts.none", "sum.no", "no.number", "sum.number")]
+    assert [port and port.type for port in ports] == [toys.Surveyed, None, None, None, toys.Number]
+    assert [graph.is_truth(o) for o in ("artifacts.map", "sum.number", "no.number")] == [True, False, False]
+    assert [graph.is_marked(o, "bulky") for o in ("source.big", "source.number", "no.big")] == [True, False, False]
+    assert graph.reported(graph.nodes) == {"all.metrics"}
+    assert (graph.source and graph.source.name, built({"c": "Constant"}).source) == ("source", None)
+    assert [node.name for node in graph.of_lifetime("tick")] == ["source", "sum", "scale"]
+
+
 def test_all_problems_are_said_at_once():
     found = problems(
         {"source": "Count", "scale": {"_target_": "Scale", "facter": 2, "mode": "plane"}, "sum": "Add"},
@@ -108,6 +128,16 @@ WRONG: dict[str, tuple[dict, dict, list[str]]] = {
         {"s": {"number": "strat.number"}},
         ["did you mean 'start.number'?"],
     ),
+    "an unknown node that an input can do without": (
+        {"c": "Constant", "sum": "Add"},
+        {"sum": {"number": "c.number", "other": "wheels.number"}},
+        ["no node 'wheels'\n    type '~wires.sum.other' if it can do without; outputs of type Number: c.number, sum"],
+    ),
+    "an unknown node like one that is there, of which an input can do without": (
+        {"start": "Constant", "sum": "Add"},
+        {"sum": {"number": "start.number", "other": "strat.number"}},
+        ["no node 'strat'\n    did you mean 'start.number'? outputs of type Number: start.number, sum.number"],
+    ),
     "a needed wire from a node that was left out": (
         {"first": "Scale", "second": "Scale"},
         {"first": {"number": {"from": "nowhere.number", "optional": True}}, "second": {"number": "first.number"}},
@@ -131,6 +161,14 @@ WRONG: dict[str, tuple[dict, dict, list[str]]] = {
             "outputs of type Number: scale.number, source.number, sum.number",
         ],
     ),
+    "a missing input that several fit": (
+        {"c": "Constant", "d": "Constant", "s": "Scale"},
+        {},
+        ["Scale needs Number on 'number', and nothing is wired to it\n    type +wires.s.number=c.number (or d.number)"],
+    ),
+    "a negative delay": (SCALED, {"s": {"number": {**delayed("c"), "delay": -1}}}, [".delay: -1, expected a whole"]),
+    "a delay of yes": (SCALED, {"s": {"number": {**delayed("c"), "delay": True}}}, [".delay: True, expected a whole"]),
+    "an origin of three parts": (SCALED, {"s": {"number": "c.number.value"}}, ["is not of the form node.port"]),
     "a loop without a delay": (
         {"a": "Add", "b": "Add", "c": "Constant"},
         {"a": {"number": "c.number", "other": "b.number"}, "b": {"number": "a.number"}},

@@ -5,10 +5,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 
+import toys
 from omninav.pipeline import Bounds
-from omninav.pipeline.graph.ports import convert
+from omninav.pipeline.graph.ports import compatible, convert, type_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +36,18 @@ class Drawn:
         (2, Annotated[int, Bounds(ge=2)] | None, 2),
         (False, bool | str, False),
         (True, Literal["auto", True], True),
-        ({"kind": "drawn", "speeds": [1, 2]}, Fixed | Drawn, Drawn("drawn", (1.0, 2.0))),
+        ({"kind": "drawn", "speeds": [1, 2]}, str | Fixed | Drawn, Drawn("drawn", (1.0, 2.0))),
+        ({"kind": "drawn", "speeds": [1, 2]}, dict[str, Any] | int, {"kind": "drawn", "speeds": [1, 2]}),
+        (Drawn("drawn", (1.0, 2.0)), Fixed | Drawn, Drawn("drawn", (1.0, 2.0))),
+        ([1, 2.5], list[float], [1.0, 2.5]),
+        (2, Annotated[int, Bounds(ge=2, le=2)], 2),
+        (1, Annotated[int, Bounds(ge=2)], "p: 1 is out of bounds, expected int >= 2"),
+        (2.0, Annotated[float, Bounds(gt=1, lt=2)], "p: 2.0 is out of bounds, expected float > 1 and < 2"),
+        ("x", Annotated[int, Bounds(ge=2)], "p: 'x' (str), expected int >= 2"),
+        ({"speeds": "x"}, Drawn, "p.speeds: 'x' (str), expected [float, float]\np.kind: missing, expected 'drawn'"),
+        ({"sped": 1, "kind": "fixed"}, Fixed, "p.sped: Fixed has no parameter 'sped'"),
+        (-1e999, float, "p: -inf (float), expected float"),
+        ({}, list[int], "p: a mapping (dict), expected list of int"),
         (True, int, "p: True (bool), expected int"),
         (None, int | str, "p: None (NoneType), expected int | str"),
         (float("inf"), float, "p: inf (float), expected float"),
@@ -52,6 +66,56 @@ def test_a_value_passes_as_what_it_can_only_mean_or_says_what_was_expected(value
     assert (given, type(given)) == (found, type(found))
 
 
-def test_a_word_is_like_one_of_the_choices_of_a_union() -> None:
-    ((problem,),) = [convert("atuo", int | Literal["auto", "none"], "p")[1]]
-    assert problem.hint == "did you mean 'auto'?"
+@pytest.mark.parametrize(
+    ("value", "kind", "hint"),
+    [
+        ("atuo", int | Literal["auto", "none"], "did you mean 'auto'?"),
+        ("none of them", int | Literal["auto"], ""),
+        ("atuo", Literal["auto", "none"], "did you mean 'auto'? choices: auto, none"),
+        ({"kind": "drwan"}, Fixed | Drawn, "did you mean 'drawn'? choices: drawn, fixed"),
+        ({"kind": "fixed", "sped": 1.0}, Fixed, "did you mean 'p.speed'? parameters: kind, speed"),
+        ({}, Drawn, "type p.kind=…"),
+        ([1], tuple[int, int], "give 2 values"),
+        (float("nan"), float, "write a finite number"),
+    ],
+)
+def test_a_value_that_does_not_pass_says_what_to_type(value: Any, kind: Any, hint: str) -> None:
+    assert convert(value, kind, "p")[1][0].hint == hint
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        (toys.Number, "Number"),
+        (None | int, "null | int"),
+        (Annotated[int, Bounds(ge=1, lt=9.5)], "int >= 1 and < 9.5"),
+        (Literal["sqrt", 1], "'sqrt' | 1"),
+        (npt.NDArray[np.float64], "an array of float64"),
+        (npt.NDArray[Any], "an array of anything"),
+        (tuple[int, str], "[int, str]"),
+        (tuple[int, ...], "list of int"),
+        (Sequence[toys.Word], "list of Word"),
+        (dict[str, Any], "mapping"),
+        (Mapping[str, float], "mapping to float"),
+    ],
+)
+def test_types_are_named_as_people_write_them(kind: Any, name: str) -> None:
+    assert type_name(kind) == name
+
+
+@pytest.mark.parametrize(
+    ("given", "expected", "fits"),
+    [
+        (toys.Whole, toys.Number, True),
+        (toys.Number, toys.Whole, False),
+        (toys.Whole | toys.Word, toys.Number, False),
+        (toys.Whole | toys.Word, toys.Word | toys.Number, True),
+        (Any, toys.Number, True),
+        (toys.Number, Any, True),
+        (list[int], list[int], True),
+        (list, list[int], False),
+        (list[int], list, False),
+    ],
+)
+def test_a_wire_takes_a_value_where_all_that_it_may_be_fits(given: Any, expected: Any, fits: bool) -> None:
+    assert compatible(given, expected) is fits

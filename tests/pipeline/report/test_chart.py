@@ -10,8 +10,8 @@ from omninav.pipeline.report.chart import WIDTH, Chart, Layer, Scale, broken, st
 
 NAN = np.nan
 HOLED = np.array([[0.0, 0.0], [1.0, 1.0], [NAN, 5.0], [3.0, 3.0], [4.0, 4.0]])
-AROUND = np.array([[2.5, 1.5], [1.5, 2.5]])
-"""Covariance of standard deviations 2 along the diagonal and 1 across it."""
+AROUND = np.array([[3.25, 0.75 * 3**0.5], [0.75 * 3**0.5, 1.75]])
+"""Covariance of standard deviations 2 at 30 degrees from x and 1 across."""
 
 
 def marks(of: Layer) -> list[dict[str, str]]:
@@ -37,7 +37,7 @@ def marks(of: Layer) -> list[dict[str, str]]:
         ("text", (HOLED[1], "hall"), {"": "text", "x": "15.0", "y": "86.0", "text-anchor": "start"}),
         ("dart", (np.array([1, 1, 0.0]), "ink", 10), {"points": "22.5,90.0 2.0,84.0 5.5,90.0 2.0,96.0"}),
         ("dart", (np.array([1, 1, np.pi / 2]), "ink", 10), {"points": "10.0,77.5 4.0,98.0 10.0,94.5 16.0,98.0"}),
-        ("ellipses", (HOLED[1:2], AROUND[None], np.ones(1), "ink"), {"rx": "40.0", "ry": "20.0", "rotate": 135}),
+        ("ellipses", (HOLED[1:2], AROUND[None], np.ones(1), "ink"), {"rx": "40.0", "ry": "20.0", "rotate": 150}),
         ("ellipses", (HOLED[1:2], AROUND[None] * 0, np.ones(1), "ink"), {"rx": "0.8", "ry": "0.8", "opacity": "1"}),
         ("raster", (b"png", (1, 3, 2, 6)), {"x": "10.0", "y": "40.0", "width": "20.0", "height": "40.0"}),
         ("upright", (3.0, "ink"), {"": "path", "d": "M30.0 100.0V0.0"}),
