@@ -224,6 +224,12 @@ class Say(Stage):
         ctx.fact("said", word.text)
 
 
+class Caption(Stage):
+    """Takes a word and something big."""
+
+    def step(self, ctx: Context, word: Word, big: Big) -> None: ...
+
+
 class Spell(Stage):
     """A number as a word."""
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, MessageIndex, Schema
 
+from omninav.pipeline.graph.problems import counted
+
 from .chunks import MAGIC, RECORD_HEAD, Allowance, Place, parse, records_in, unpack
 from .message import BadMessage, Location, LogError, Losses, Message, Record
 from .message_types import has_header, header_stamp, standard_types, types_of
@@ -54,7 +56,6 @@ class LogReader(Losses):
         self._channels: dict[int, Channel] = {}
         self._chunks: list[tuple[Place, bool]] = []
         self._unpacked: OrderedDict[int, bytes] = OrderedDict()
-        self._in_memory = 0
         self._stores: dict[str, Typestore] = {}
         self._known_channels: dict[int, tuple[str, bool]] = {}
         self._types: dict[str, str] = {}
@@ -174,9 +175,10 @@ class LogReader(Losses):
                     break
                 unbroken = unbroken and follows
                 record = os.pread(file.fileno(), place.length, place.start)
-                checksum = zlib.crc32(record, checksum) if self._summary.checksum else 0
+                if self._summary.checksum:
+                    checksum = zlib.crc32(record, checksum)
                 content = record[RECORD_HEAD.size :]
-                if opcode == Opcode.CHUNK or (opcode == 0 and record[:1] == bytes([Opcode.CHUNK])):
+                if record[:1] == bytes([Opcode.CHUNK]):  # whole, or cut off
                     seen.add(place)
                     yield from self._chunk(content, place, topics, whole=opcode > 0)
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -202,7 +204,7 @@ class LogReader(Losses):
         if missing:
             named = sorted((self._topic_of(number), count, expected[number]) for number, count in missing.items())
             said = ", ".join(f"{count} of {of} on {topic:.80}" for topic, count, of in named[:3])
-            more = f" and of {len(named) - 3} more topics" if len(named) > 3 else ""
+            more = f" and of {counted(len(named) - 3, 'more topic')}" if len(named) > 3 else ""
             self.drop("missing_message", f"{self.path}: messages are missing: {said}{more}", sum(missing.values()))
         if self._summary.damage:
             kind = "bad_summary" if ended and not self._summary.damage.startswith("it ends") else "cut_file"

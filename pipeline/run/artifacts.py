@@ -89,10 +89,10 @@ def obtain(
             reason = "found: the same graph over the same log had made it before"
         else:
             own, every = Cache(run.memory / "artifacts"), list(_make(execution, [artifact, *together]))
-            kept: list[tuple[Path, Value]] = []
+            kept: tuple[Path, Value] | None = None
             with cache.unless_full():
-                kept.append(_into(cache, seed, every))
-            file, value = kept[0] if kept else _into(own, seed, every)
+                kept = _into(cache, seed, every)
+            file, value = kept or _into(own, seed, every)
             reason = "made: code, parameters or log are new to the cache"
         _copy(file, target)
     made = {"variant": artifact.variant, "output": artifact.origin, "sha256": artifact_digest(target), "reason": reason}

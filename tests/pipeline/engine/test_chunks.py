@@ -1,6 +1,8 @@
 """Arrays in the front of an artifact file: read and checked where they are needed."""
 
+import io
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -143,6 +145,28 @@ def test_a_file_that_is_cut_off_while_it_is_used_is_named(file: Path) -> None:
         rows[0]
     with pytest.raises(BadInput, match=r"tall\.omap: chunk \d of the array 'rows' .* is damaged"):
         rows[-1]
+
+
+@pytest.mark.parametrize(
+    ("shape", "bytes_", "said"),
+    [
+        ((3, 2), 48, None),
+        ((), 8, None),
+        ((0, 2), 0, None),
+        ((1 << 24, 0), 0, None),
+        (((1 << 24) + 1, 0), 0, "an array of nothing has 16777217 rows"),
+        ((3, 2), 47, "not as long as it states"),
+        ((3, 2), 49, "not as long as it states"),
+        ((-3, -2), 48, "not as long as it states"),
+    ],
+)
+def test_the_head_of_an_array_states_as_many_bytes_as_there_are(shape: Any, bytes_: int, said: str | None) -> None:
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    length = head.tell() + bytes_
+    head.seek(0)
+    with nullcontext() if said is None else pytest.raises(chunks.Unfit, match=said):
+        assert chunks.parse_npy_head(head, length) == (shape, np.float64)
 
 
 def test_numpy_opens_a_file_and_its_arrays_lie_where_they_can_be_mapped(file: Path) -> None:

@@ -17,6 +17,9 @@ from omninav.pipeline.report.plot_style import plot
 
 LONG = "Error of the direction up to 6 m away, median, not found is 180 (degrees)"
 
+LOOKS = [("o", "#0072B2"), ("s", "#D55E00")]
+"""Marker and colour of the first curves of a plot."""
+
 
 def drawn(methods: int, levels: tuple[float, ...] = (1.0,), **page: object) -> list[np.ndarray]:
     """Images (colour, BGR) of the plots of an experiment with long names; method n's curve lies at levels[n].
@@ -89,6 +92,7 @@ def test_lines_lie_along_a_factor(canvases: list[Any]) -> None:
         [[1.0, 10.0], [2.0, 40.0]],
         [[1.0, 90.0], [2.0, 160.0]],
     ]
+    assert [(each.lines[0].get_marker(), each.lines[0].get_color()) for each in axes.containers] == LOOKS
     assert [[end[1] for end in bar] for bar in axes.collections[0].get_segments()] == [[9.0, 11.0], [39.0, 41.0]]
 
 
@@ -97,6 +101,7 @@ def test_of_many_rows_each_has_its_points_and_far_figures_are_in_powers_of_ten(c
     (axes,), size = canvases[0][0].axes, canvases[0][1]
     found = [each.lines[0].get_xydata()[[0, 8]].tolist() for each in axes.containers]
     assert np.allclose(found, [[[10.0, 0.05], [2890.0, -7.95]], [[40.0, -0.05], [3240.0, -8.05]]])
+    assert [(each.lines[0].get_marker(), each.lines[0].get_color()) for each in axes.containers] == LOOKS
     assert (axes.get_xlim()[0], axes.get_xscale(), size) == (5.0, "log", (8.0, pytest.approx(1.3 + 0.28 * 9)))
 
 

@@ -326,7 +326,18 @@ def test_a_target_that_is_no_stage_is_refused_and_never_called(target: str):
 
 
 def test_a_node_can_be_taken_out():
-    assert list(build({"nodes": {"c": {"_target_": "toys.Constant"}, "d": None}, "wires": {}}).nodes) == ["c"]
+    assert list(build({"nodes": {"d": None, "c": {"_target_": "toys.Constant"}}, "wires": {}}).nodes) == ["c"]
+
+
+def test_a_stage_that_nothing_feeds_or_reads_is_said_to_have_no_place():
+    lost, missing = problems({"caption": "Caption", "s": "Scale"})
+    assert str(lost) == (
+        "nodes.caption: Caption has no place in this graph: nothing feeds it, and nothing reads it\n"
+        "    leave caption=… out"
+    )
+    assert missing.where == "wires.s.number"
+    wired = problems({"source": "Count", "caption": "Caption"}, {"caption": {"big": "source.big"}})
+    assert [problem.where for problem in wired] == ["wires.caption.word"]
 
 
 def test_what_a_swap_leaves_over_says_what_to_type():

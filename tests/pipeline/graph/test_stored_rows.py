@@ -42,8 +42,8 @@ def test_an_index_reads_its_rows_once_and_in_order(monkeypatch: pytest.MonkeyPat
         read.clear()
     for wrong, said in (
         ([0, 9], "no row 9, of 9"),
+        (9, "no row 9, of 9"),
         ([-10, 8], "no row -10"),
-        (9, "no row 9"),
         (-10, "no row -10, of 9"),
         ([True], "a mask of"),
     ):

@@ -15,9 +15,10 @@ import pytest
 
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.jobs import perform, worker_pool
-from omninav.pipeline.jobs.executors import BUILT_IN, ExecutorSettings, executor_of, read_executor
+from omninav.pipeline.jobs.executors import BUILT_IN, ExecutorSettings, cores, executor_of, read_executor
 from omninav.pipeline.jobs.job import Job
-from omninav.pipeline.jobs.worker_pool import WorkerPool
+from omninav.pipeline.jobs.job_progress import Heartbeat, JobProgress
+from omninav.pipeline.jobs.worker_pool import WorkerPool, _Mailbox
 
 TESTS = str(Path(__file__).resolve().parents[2])
 
@@ -84,10 +85,14 @@ def test_jobs_end_soon_after_whoever_started_them(tmp_path: Path, how: signal.Si
     wait_for(lambda: not lives(job_process))
 
 
-def test_a_job_ends_whose_client_gives_no_sign_of_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(perform, "LEASE_S", 1.0)
+@pytest.mark.parametrize(("held", "lease_s"), [("token", 1.0), ("another's", 60.0), (None, 60.0)])
+def test_a_job_ends_whose_client_gives_no_sign_of_life_or_has_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: str | None, lease_s: float
+):
+    monkeypatch.setattr(perform, "LEASE_S", lease_s)
     lease = tmp_path / ".client"
-    lease.write_text("token")
+    if held is not None:
+        lease.write_text(held)
     endless = job("take", tmp_path, megabytes=1, seconds=60, mark=str(tmp_path / "mark"))
     ended = perform.perform(endless.text(0, lease, "token", None))
     assert ended["error"] == "stopped, because the process that started it has ended"
@@ -163,12 +168,73 @@ def test_what_crosses_to_a_cluster_is_text(tmp_path: Path):
     [
         ("slrum", r"executor: there is no executor 'slrum'\n +did you mean 'slurm'"),
         ({"name": "local", "workers": 0}, "executor.workers: 0, expected a whole number >= 1"),
+        ({"workers": 100_001}, "executor.workers: 100001, expected a whole number >= 1"),
+        ({"workers": True}, "executor.workers: True, expected a whole number >= 1"),
+        ({"workers": 2.0}, "executor.workers: 2.0, expected a whole number >= 1"),
         ({"name": "local", "memory": "4"}, "executor.memory: '4', expected a size with its unit"),
     ],
 )
 def test_settings_of_an_engine_that_make_no_sense_are_refused(given: object, message: str):
     with pytest.raises(ProblemsFound, match=message):
         read_executor(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "workers", "memory", "options"),
+    [
+        (None, None, None, {}),
+        ({"name": "slurm", "workers": 100_000, "memory": "4GB", "queue": "long"}, 100_000, 4e9, {"queue": "long"}),
+        ({"workers": 1, "memory": "1.5 MiB"}, 1, 1.5e6, {}),
+        ({"memory": "20k"}, None, 2e4, {}),
+        ({"memory": "1TB"}, None, 1e12, {}),
+    ],
+)
+def test_settings_of_an_executor_are_numbers(given: object, workers: int, memory: float, options: dict):
+    read = read_executor(given)
+    assert (read.workers, read.memory, read.options) == (workers, memory, options)
+    assert (read.name == "slurm") is bool(options)
+
+
+def test_as_many_jobs_run_as_this_process_has_processors(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0: {0, 2, 3}}[process])
+    assert (cores(), executor_of(ExecutorSettings())._max_workers) == (3, 3)
+    assert executor_of(ExecutorSettings(workers=2))._max_workers == 2
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for counted, used in ((4, 4), (None, 1)):
+        monkeypatch.setattr(os, "cpu_count", lambda counted=counted: counted)
+        assert cores() == used
+
+
+def test_messages_are_read_line_by_line_as_they_are_written(tmp_path: Path):
+    one, got = job("count", tmp_path), []
+    mailbox = _Mailbox(lambda job, message: got.append(message))
+    for part, expected in (("", []), ('1\n{"a"', [1]), (": 2}", [1]), ("\n3\n", [1, {"a": 2}, 3])):
+        with one.messages.open("a") as file:
+            file.write(part)
+        mailbox.read([one])
+        assert got == expected
+
+
+def test_the_frames_of_jobs_are_added_up():
+    progress, sent = JobProgress(4), []
+    assert (progress.done, progress.total, progress.ended) == (0, None, 0)
+    progress.on_message("a", {"frames": 30, "of": 100})
+    progress.on_message("a", {"note": "no frames"})
+    progress.on_message("b", {"frames": 1, "of": 51})
+    assert (progress.done, progress.total) == (31, 151 + 2 * 76)  # silent ones count as the mean of the others
+    progress.end("a")
+    progress.end("b", well=False)
+    assert (progress.done, progress.total, progress.ended) == (101, 101 + 2 * 50, 2)
+    progress.on_message("c", {"frames": 5})
+    assert progress.total is None
+    for silent in ("c", "d"):
+        progress.end(silent)
+    assert (progress.done, progress.total, progress.ended) == (106, 106, 4)
+    heart = Heartbeat(sent.append)
+    for done in range(1, 53):
+        heart.update("map", done, 52)
+    assert [message["frames"] for message in sent] == [1, 25, 50, 52]
+    assert sent[0]["of"] == 52
 
 
 def test_what_is_no_executor_is_named(monkeypatch: pytest.MonkeyPatch):

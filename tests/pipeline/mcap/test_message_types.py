@@ -11,6 +11,7 @@ def test_a_stamp_is_read_in_the_byte_order_that_the_message_states() -> None:
     little, big = struct.pack("<iI", 5, 7), struct.pack(">iI", 5, 7)
     for head, stamp, cdr in ((b"\0\1\0\0", little, True), (b"\0\0\0\0", big, True), (b"\0\0\0\1", little, False)):
         assert header_stamp(head + stamp, cdr) == 5_000_000_007
+        assert header_stamp(head + stamp) == 5_000_000_007 or not cdr
         assert header_stamp((head + stamp)[:-1], cdr) is None
 
 
@@ -32,6 +33,7 @@ def test_fields_that_are_left_out_are_empty_and_bytes_are_numbers() -> None:
         ("Part[50] a", 1 + 50 * 2),
         ("string[99] a", 1 + 99),
         ("string[100] a", 1 + 100),
+        ("Part[] a\nPart[<=60] b\nfloat64[200] c\nPart[47] d", 1 + 2 + 2 + 1 + 47 * 2),
         ("Part[] a\nPart[<=60] b\nfloat64[200] c\nPart[47] d\nint8 e", 1 + 2 + 2 + 1 + 47 * 2 + 1),
     ],
 )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from memory_peak import memory_peak
 
 from omninav.pipeline.mcap.chunks import MAGIC, Allowance, unpack
@@ -131,12 +131,22 @@ def test_topics_types_and_attachments_are_listed(path: Path) -> None:
 def test_bytes_are_fetched_again_from_where_the_scan_found_them(
     path: Path, monkeypatch: pytest.MonkeyPatch, in_memory: int
 ) -> None:
+    unpacked: list[int] = []
     monkeypatch.setattr("omninav.pipeline.mcap.reader._BYTES_IN_MEMORY", in_memory)
+    monkeypatch.setattr(
+        "omninav.pipeline.mcap.reader.unpack", lambda *given, **more: unpacked.append(1) or unpack(*given, **more)
+    )
     reader = LogReader(path)
     found = [(record.location, bytes(record.data)) for record in reader.scan(["/blob"])]
-    assert len(found) == COUNT
-    for location, data in random.Random(0).sample(found, COUNT):
+    chunks = len(chunk_places(path))
+    assert (len(found), len(unpacked)) == (COUNT, chunks)
+    unpacked.clear()
+    fetched = random.Random(0).sample(found, COUNT)
+    for location, data in fetched:
         assert reader.fetch(location) == data
+    turns = 1 + sum(one.chunk != other.chunk for (one, _), (other, _) in itertools.pairwise(fetched))
+    least, most = {0: (turns, turns), 5000: (chunks // 2, turns - 1), 32_000_000: (0, 0)}[in_memory]
+    assert least <= len(unpacked) <= most
 
 
 def test_a_cut_file_gives_every_whole_message_before_the_cut(path: Path, whole: list) -> None:
@@ -296,6 +306,42 @@ def test_a_chunk_that_was_taken_out_is_missed_by_topic(path: Path, whole: list) 
     assert reader.dropped["missing_message"] == lost
     assert "of 60 on /blob" in reader.details["missing_message"]
     assert "of 60 on /pose" in reader.details["missing_message"]
+
+
+@pytest.mark.parametrize(("topics", "said"), [(3, "3"), (4, "3 and of 1 more topic"), (5, "3 and of 2 more topics")])
+def test_messages_of_three_topics_that_are_missing_are_named_and_the_others_counted(
+    tmp_path: Path, topics: int, said: str
+) -> None:
+    with written_log(tmp_path / "log.mcap", 1 << 24) as log:
+        for number in range(topics):
+            log.write(f"/{number}", "std_msgs/msg/String", number, {"data": "lost"})
+    reader = write_records(tmp_path / "log.mcap", [r for r in records_of(tmp_path / "log.mcap") if r[0] != 0x06])
+    assert list(reader.scan()) == []
+    assert reader.dropped["missing_message"] == topics
+    named = ", ".join(f"1 of 1 on channel {number}" for number in ("1", "2", said))
+    assert reader.details["missing_message"].endswith(f" missing: {named}")
+
+
+def test_a_file_without_a_summary_is_read_whole(tmp_path: Path) -> None:
+    texts = [encode_message("std_msgs/msg/String", {"data": f"{number}"}) for number in range(9)]
+    without = dict.fromkeys(("repeat_channels", "repeat_schemas", "use_statistics", "use_summary_offsets"), False)
+    without["index_types"] = IndexType.NONE
+    reader = LogReader(foreign(tmp_path / "log.mcap", "std_msgs/msg/String", b"string data\n", texts, **without))
+    assert [bytes(record.data) for record in reader.scan()] == texts
+    assert (reader.topics, reader.dropped) == ({"/topic": "std_msgs/msg/String"}, {})
+
+
+@pytest.mark.parametrize(("behind", "wrong"), [(0, False), (1, True), (2**62, True), (-301, True), (-300, False)])
+def test_a_summary_that_is_nowhere_or_too_long_is_not_read(
+    path: Path, whole: list, monkeypatch: pytest.MonkeyPatch, behind: int, wrong: bool
+) -> None:
+    monkeypatch.setattr("omninav.pipeline.mcap.summary.MAX_BYTES", 300)
+    *records, end = records_of(path)
+    start = path.stat().st_size - 37 + behind  # the end record's first byte, and so on
+    reader = write_records(path, [*records, end[:9] + struct.pack("<Q", start) + end[17:25] + bytes(4)])
+    assert (reader._summary.damage == "its end names a place where no summary is") is wrong
+    monkeypatch.undo()
+    assert keys(reader) == whole
 
 
 def test_chunks_in_each_others_place_lose_nothing_and_are_noticed(path: Path, whole: list) -> None:

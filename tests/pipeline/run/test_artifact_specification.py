@@ -13,6 +13,7 @@ from omninav.pipeline.files import digest_file, write_whole
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run import artifacts
 from omninav.pipeline.run.artifact_specification import read_specifications, without_plotted
+from omninav.pipeline.run.execution import _dropped_before
 from omninav.pipeline.run.prepared_run import prepare_run
 from omninav.pipeline.run.run_folder import RunFolder
 from toys import graph_of_toys
@@ -170,6 +171,31 @@ def test_what_an_artifact_lacks_is_named_with_what_to_type(tmp_path: Path) -> No
     ):
         said = said_of(config)
         assert [each for each in words if each not in said] == [], said
+
+
+def test_a_file_that_several_inputs_cannot_take_is_one_problem(tmp_path: Path) -> None:
+    write_artifact(tmp_path / "word.omap", toys.Word("far"))
+    config, words = of_file(tmp_path / "word.omap"), []
+    for readers in (1, 2, 3):
+        nodes = {f"reader{number}": "Scale" for number in range(readers)}
+        wires = {name: {"number": "artifacts.map"} for name in nodes}
+        words.append(said_of({**config, **graph_of_toys({"source": "Count", **nodes}, wires)}))
+    assert "wires.reader0.number: artifacts.map is of type Word, reader0.number (Scale) expects Number" in words[0]
+    for said, inputs in zip(words[1:], (2, 3), strict=True):
+        assert f"map: {tmp_path}/word.omap holds Word, which {inputs} inputs of this variant cannot take" in said
+        assert said.startswith("1 problem:"), said
+
+
+def test_what_was_dropped_as_maps_were_made_is_told_once() -> None:
+    blank, dark = ({kind: {"count": 2, "first": "frame 1"}} for kind in ("blank", "dark"))
+    made = {
+        "map": {"dropped": blank},
+        "album": {"dropped": blank | dark},
+        "known": {"file": "known.omap", "dropped": blank},
+        "other": {"dropped": {"blank": {"count": 3, "first": "frame 1"}}},
+        "whole": {},
+    }
+    assert list(_dropped_before(made)) == ["blank (map)", "dark (album)", "blank (other)"]
 
 
 @pytest.mark.parametrize(
