@@ -39,7 +39,6 @@ class Drawn:
         ({"kind": "drawn", "speeds": [1, 2]}, str | Fixed | Drawn, Drawn("drawn", (1.0, 2.0))),
         ({"kind": "drawn", "speeds": [1, 2]}, dict[str, Any] | int, {"kind": "drawn", "speeds": [1, 2]}),
         (Drawn("drawn", (1.0, 2.0)), Fixed | Drawn, Drawn("drawn", (1.0, 2.0))),
-        ([1, 2.5], list[float], [1.0, 2.5]),
         (2, Annotated[int, Bounds(ge=2, le=2)], 2),
         (1, Annotated[int, Bounds(ge=2)], "p: 1 is out of bounds, expected int >= 2"),
         (2.0, Annotated[float, Bounds(gt=1, lt=2)], "p: 2.0 is out of bounds, expected float > 1 and < 2"),
@@ -70,8 +69,6 @@ def test_a_value_passes_as_what_it_can_only_mean_or_says_what_was_expected(value
     ("value", "kind", "hint"),
     [
         ("atuo", int | Literal["auto", "none"], "did you mean 'auto'?"),
-        ("none of them", int | Literal["auto"], ""),
-        ("atuo", Literal["auto", "none"], "did you mean 'auto'? choices: auto, none"),
         ({"kind": "drwan"}, Fixed | Drawn, "did you mean 'drawn'? choices: drawn, fixed"),
         ({"kind": "fixed", "sped": 1.0}, Fixed, "did you mean 'p.speed'? parameters: kind, speed"),
         ({}, Drawn, "type p.kind=…"),
@@ -83,39 +80,11 @@ def test_a_value_that_does_not_pass_says_what_to_type(value: Any, kind: Any, hin
     assert convert(value, kind, "p")[1][0].hint == hint
 
 
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    [
-        (toys.Number, "Number"),
-        (None | int, "null | int"),
-        (Annotated[int, Bounds(ge=1, lt=9.5)], "int >= 1 and < 9.5"),
-        (Literal["sqrt", 1], "'sqrt' | 1"),
-        (npt.NDArray[np.float64], "an array of float64"),
-        (npt.NDArray[Any], "an array of anything"),
-        (tuple[int, str], "[int, str]"),
-        (tuple[int, ...], "list of int"),
-        (Sequence[toys.Word], "list of Word"),
-        (dict[str, Any], "mapping"),
-        (Mapping[str, float], "mapping to float"),
-    ],
-)
-def test_types_are_named_as_people_write_them(kind: Any, name: str) -> None:
-    assert type_name(kind) == name
-
-
-@pytest.mark.parametrize(
-    ("given", "expected", "fits"),
-    [
-        (toys.Whole, toys.Number, True),
-        (toys.Number, toys.Whole, False),
-        (toys.Whole | toys.Word, toys.Number, False),
-        (toys.Whole | toys.Word, toys.Word | toys.Number, True),
-        (Any, toys.Number, True),
-        (toys.Number, Any, True),
-        (list[int], list[int], True),
-        (list, list[int], False),
-        (list[int], list, False),
-    ],
-)
-def test_a_wire_takes_a_value_where_all_that_it_may_be_fits(given: Any, expected: Any, fits: bool) -> None:
-    assert compatible(given, expected) is fits
+def test_a_wire_takes_a_value_where_all_that_it_may_be_fits() -> None:
+    word_or_whole = toys.Word | toys.Whole
+    fitting = [(toys.Whole, toys.Number), (word_or_whole, toys.Number | toys.Word), (Any, toys.Word), (toys.Word, Any)]
+    unfit = [(toys.Number, toys.Whole), (word_or_whole, toys.Number), (list, list[int]), (list[int], list)]
+    assert [compatible(*pair) for pair in (*fitting, (list[int], list[int]), *unfit)] == [True] * 5 + [False] * 4
+    kinds = (toys.Number, None | int, npt.NDArray[np.float64], npt.NDArray[Any], Mapping[str, float], dict[str, Any])
+    names = "Number, null | int, an array of float64, an array of anything, mapping to float, mapping"
+    assert ", ".join(map(type_name, kinds)) == names

@@ -8,15 +8,12 @@ import pytest
 import toys
 from omninav.pipeline import Context
 from omninav.pipeline.engine.code_version import module_version
+from omninav.pipeline.graph import registry
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.registry import (
     UnknownStage,
-    built_in_stage,
     entries,
     is_listed,
-    is_role,
-    of_role,
-    offered,
     only_listed,
     plugins,
     refuse_untyped,
@@ -149,48 +146,32 @@ def test_an_entry_that_is_not_understood_says_what_to_write_and_a_missing_file_i
         resolve("nothing.py:Twice")
 
 
-def test_a_stage_of_omninav_is_found_by_role_and_file_where_the_file_holds_one():
-    found = built_in_stage("match", "l2")
-    assert found is not None
+def test_stages_of_a_role_are_those_of_its_files_and_those_that_others_offer(monkeypatch: pytest.MonkeyPatch):
+    found = registry.built_in_stage("match", "l2")
     assert (found.name, found.role, found.origin) == ("match.l2", "match", "built in")
-    assert resolve(found.target).__doc__.startswith(found.summary)
-    assert found in [*of_role("match")]
-    assert [built_in_stage(*name.split(".")) for name in ("match.reference_match", "match.none", "none.l2")] == [
-        None
-    ] * 3
-    assert [is_role(name) for name in ("match", "none", "no/role")] == [True, False, False]
+    assert found in [*registry.of_role("match")]
+    others = ("match.reference_match", "match.none", "none.l2")
+    assert not any(registry.built_in_stage(*name.split(".")) for name in others)
+    assert [registry.is_role(name) for name in ("match", "none", "no/role")] == [True, False, False]
+    monkeypatch.setenv("OMNINAV_STAGES", "match.scale=toys:Scale,values.whole=toys:Whole")
+    offered = [(each.name, each.summary) for role in ("values", "match") for each in registry.offered(role)]
+    assert offered == [("values.whole", "A Number of a narrower kind."), ("match.scale", "A number times a factor.")]
 
 
-def test_others_stages_of_a_role_are_listed_with_what_they_are(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("OMNINAV_STAGES", "match.scale=toys:Scale,values.whole=toys:Whole,sum.add=toys:Add")
-    assert [(e.name, e.summary, e.problem) for e in offered("match")] == [
-        ("match.scale", "A number times a factor.", "")
-    ]
-    assert [(e.name, e.summary) for e in offered("values")] == [("values.whole", "A Number of a narrower kind.")]
-
-
-def test_code_and_programs_that_a_folder_names_are_run_only_where_they_are_listed_or_typed(
-    stage_file: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_what_a_folder_names_is_run_where_it_is_listed_or_typed(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
     target = f"{stage_file}:Twice"
-    refuse_untyped("./record.sh")  # of one's own configuration
     with only_listed(["notes.txt", "./record.sh"]):
         refuse_untyped("./record.sh")
-        for wrong, again in (
-            (lambda: refuse_untyped("rm -r"), "'rm -r'$"),
-            (lambda: resolve(target), f"{stage_file}$"),
-        ):
+        for wrong, again in ((lambda: refuse_untyped("rm -r"), "'rm -r'$"), (lambda: resolve(target), stage_file)):
             with pytest.raises(BadInput, match=f"is not run unasked; if you trust it, .*FOLDER {again}"):
                 wrong()
-        assert [is_listed(name) for name in ("omninav.stages.match.l2.L2", "omninav.stages.x y.Z", target)] == [1, 0, 0]
         monkeypatch.setenv("OMNINAV_STAGES", f"match.twice={target}")
-        assert [is_listed(name) for name in (target, "match.twice", "match.thrice")] == [True, True, False]
+        listed = (target, "match.twice", "omninav.stages.match.l2.L2", "match.thrice", "omninav.stages.x y.Z")
+        assert [*map(is_listed, listed)] == [True] * 3 + [False] * 2
         assert resolve(target).__name__ == "Twice"
     monkeypatch.delenv("OMNINAV_STAGES")
-    for typed in (target, str(stage_file)):
-        with only_listed([typed]):
-            assert resolve(target).__name__ == "Twice"
-    for setting in ("seed=3", "+nodes.x.gain=1", "~x/y="):
-        with pytest.raises(BadInput, match="a run that was started keeps its settings"), only_listed([setting]):
-            pass
-    assert resolve(target).__name__ == "Twice"
+    with only_listed([str(stage_file)]):
+        assert resolve(target).__name__ == "Twice"
+    with pytest.raises(BadInput, match="a run that was started keeps its settings"), only_listed(["+nodes.x.gain=1"]):
+        pass
+    refuse_untyped("rm -r")  # of one's own configuration

@@ -108,9 +108,8 @@ def test_readers_of_ground_truth_are_red_and_hovering_shows_class_summary_and_pa
 def everything() -> Graph:
     """The loop with what few graphs have: a late reader of ground truth, two lanes, and cards in several columns."""
     made = loop()
-    made.wires.extend(
-        [Wire("see", "late", "source", "truth", delay=2), Wire("see", "last", "move", "belief", hold=True)]
-    )
+    made.wires.append(Wire("see", "late", "source", "truth", delay=2))
+    made.wires.append(Wire("see", "last", "move", "belief", hold=True))
     for number in range(8):
         read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
         made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", Stage(), read, {}, "after")
@@ -140,11 +139,8 @@ def test_chains_of_boxes_are_drawn_without_crossings():
 
 
 def test_an_empty_graph_can_be_drawn_and_a_small_one_has_room_for_its_legend():
-    for made, top in (
-        (Graph({}, []), 156),
-        (graph({"a": ("tick", "")}, []), 156),
-        (graph({"a": ("after", "")}, []), 132),
-    ):
+    one = [graph({"a": (lifetime, "")}, []) for lifetime in ("tick", "after")]
+    for made, top in zip((Graph({}, []), *one), (156, 156, 132), strict=True):
         drawn = ET.fromstring(svg(made))
         assert (drawn.get("width"), drawn.get("height")) == ("430", f"{top}"), made
     assert mermaid(Graph({}, [])) == "flowchart LR\n"

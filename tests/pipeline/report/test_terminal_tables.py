@@ -1,6 +1,8 @@
 import io
 
 from rich.console import Console
+from rich.control import Control
+from rich.text import Text
 from sample_metrics import compared, measured, sweep_row
 
 from omninav.pipeline import Metrics, MetricSpec
@@ -12,6 +14,7 @@ from omninav.pipeline.report.terminal_tables import (
     results_table,
     sweep_table,
 )
+from omninav.pipeline.report.terminal_text import PlainTexts, plain
 
 
 def printed(table) -> str:
@@ -112,3 +115,11 @@ def test_runs_with_long_names_stand_under_letters_that_are_explained():
 
 def test_settings_that_one_run_does_not_have_differ_too():
     assert differing_settings([{"a": 1, "b": {"c": 2}}, {"a": 1}]) == [("b.c", ["2", "–"])]
+
+
+def test_control_characters_of_a_text_are_shown_and_never_sent():
+    assert plain("a\x1b[2J\x00\x7f\x9f\tb\nÄ\xa0") == "a\\x1b[2J\\x00\\x7f\\x9f\tb\nÄ\xa0"
+    console = Console(file=io.StringIO(), force_terminal=True, color_system="standard")
+    console.print(PlainTexts(Text("evil\x9b2J", "bold")))
+    console.print(PlainTexts(Control.home()), end="")  # what the program itself sends stays
+    assert console.file.getvalue() == "\x1b[1mevil\\x9b2J\x1b[0m\n\x1b[H"
