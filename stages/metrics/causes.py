@@ -210,6 +210,8 @@ def unlike_map(part: Part) -> Verdict | None:
     never = part.state == "searching" and part.last + 1 == len(part.log) and not part.at_estimate > MAX_AT_ESTIMATE
     if part.log.agrees.mean() > MAX_AGREEING or part.landmarks_agree > FOUND_ELSEWHERE or not (said or never):
         return None
+    if part.median("position_error_m") <= 2.0 * part.log.gate:  # by ground truth it was in the map
+        return None
     words = (
         f"no image fits a place of the map: the best match leads those elsewhere by {part.median('match_lead'):.2f} "
         f"standard deviations (median), and {100 * part.at_estimate:.0f} % are at the estimate"

@@ -89,6 +89,9 @@ def test_before_the_first_sure_estimate_the_robot_is_searched_for():
     assert found(confidence=1.0 * sure) == [(0, 3, "searching", "first images")]
     never = {"confidence": np.zeros(N), "landmarks_away_m": np.full(N, np.nan), "match_lead": np.full(N, 0.1)}
     assert found(**never, match_away_m=np.full(N, 9.0)) == [(0, N - 1, "searching", "another place")]
+    for error, cause in ((9.0, "another place"), (0.9, "places that look alike")):  # metres by ground truth, in the map
+        of_truth = never | {"position_error_m": np.full(N, error)}
+        assert found(**of_truth, match_away_m=np.full(N, 9.0)) == [(0, N - 1, "searching", cause)]
     assert found(**never) == [(0, N - 1, "searching", "places that look alike")]  # most matches lie at the estimate
     assert in_short(Log(drive(**never))) == "Never sure in 60 images."
 
