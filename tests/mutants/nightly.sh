@@ -29,7 +29,7 @@ for folder in "$@"; do
     cosmic-ray init "$settings" "$session"
     cr-filter-operators "$session" "$settings" > /dev/null
     cosmic-ray baseline "$settings" || { echo "$folder: $tests fails without any slip"; exit 1; }
-    timeout "${MINUTES:-10}m" cosmic-ray exec "$settings" "$session" || [ $? = 124 ]
+    timeout -s KILL "${MINUTES:-10}m" cosmic-ray exec "$settings" "$session" || [ $? = 137 ]  # with what it tests
     git checkout --quiet .  # the slip at which the time was over
 done
 python tests/mutants/rates.py "$kept"
