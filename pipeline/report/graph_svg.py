@@ -111,9 +111,9 @@ class _Painter:
         """Cards of the "after" stages side by side below the loop, each in the shortest column: right, bottom."""
         width = max(box.width for box in self.after)
         right = max(right, left + 28 + width)
-        room = right - left - 14
-        columns = min(len(self.after), max(1, int(room // (width + 14))))
-        width = room / columns - 14 if columns < len(self.after) else width
+        span = right - left - 14
+        columns = min(len(self.after), max(1, int(span // (width + 14))))
+        width = span / columns - 14 if columns < len(self.after) else width
         ends = [top + TITLE] * columns
         for box in self.after:
             column = ends.index(min(ends))

@@ -511,7 +511,7 @@ def parted(watched: Watched, length_scale_m: float) -> str:
     if len(apart) <= MIN_PARTED:
         return ""
     measured, seen = (between(each[apart[:-1]], each[apart[1:]])[:, :2] @ (1.0, 1j) for each in (odometry, exact))
-    turn = np.angle(np.vdot(measured, seen))  # of a camera that looks aside, which others tell
+    turn = np.angle(np.exp(1j * (np.angle(seen) - np.angle(measured))).sum())  # a camera looks aside, as others tell
     off = np.abs(seen - measured * np.exp(1j * turn * (abs(turn) < MAX_ASIDE)))
     parted = off > PARTED * np.maximum(np.diff(path[apart]), PARTED_M)
     if parted.sum() < MIN_PARTED:

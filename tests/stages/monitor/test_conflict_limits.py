@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.monitor.input_conflicts import (
     COLUMNS,
     WINDOW,
@@ -141,6 +142,16 @@ def placed(
 
 
 FORWARD = 0.21 * np.arange(40.0)
+
+
+@pytest.mark.parametrize("carried", [(30.0, 40.0, 1.0), (-3.0, 4.0, -2.0)])
+def test_exact_estimates_of_a_robot_that_was_carried_off_once_go_on_with_odometry(
+    carried: tuple[float, float, float],
+) -> None:
+    rows = rows_of(40, step=0.21)
+    rows[:, 11:] = rows[:, 1:4]
+    rows[30:, 11:] = compose(np.array(carried), rows[30:, 11:])
+    assert parted(Watched(rows), SCALE_M) == ""
 
 
 @pytest.mark.parametrize(
