@@ -305,7 +305,7 @@ def drawn_points(pixels: Array) -> Array:
     What moves by less than a third of a pixel is left out. Of a line that is still too long, each stretch keeps its
     ends, its highest and its lowest point, and one interruption.
     """
-    if len(pixels) <= 2:
+    if not len(pixels):
         return pixels
     fine = np.round(np.nan_to_num(pixels, nan=-1e6) * 3)
     moved = np.append(True, (fine[1:] != fine[:-1]).any(axis=1))

@@ -56,6 +56,10 @@ def test_a_value_that_holds_what_it_states_is_sound():
     assert violation(stated()) is None
     assert violation(stated(part=None, spot=None, shares=np.zeros(0))) is None
     assert violation(stated(shares=np.array([0.25, 0.75 + 0.9e-4]))) is None
+    assert violation(stated(points=np.full((3, 2), -MAX_MAGNITUDE), free=np.full(3, np.inf))) is None
+    assert violation(stated(points=np.full((3, 2), MAX_MAGNITUDE))) is None
+    small_and_large = np.eye(2) * np.array([1e-9, 1.0, 1e9])[:, None, None]
+    assert violation(stated(spread=small_and_large, pairs=np.zeros((3, 2), np.int64))) is None
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,14 @@
 """Graphs: what is accepted, and everything that is said about what is not."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import toys
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.graph.problems import Problem, ProblemsFound
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound
+from omninav.pipeline.graph.pushed import push
 from toys import graph_of_toys
 
 
@@ -323,6 +326,20 @@ def test_a_target_that_is_no_stage_is_refused_and_never_called(target: str):
 
 def test_a_node_can_be_taken_out():
     assert list(build({"nodes": {"d": None, "c": {"_target_": "toys.Constant"}}, "wires": {}}).nodes) == ["c"]
+
+
+def test_a_frame_is_pushed_whole_or_refused_with_what_the_source_takes():
+    taken = []
+    source = SimpleNamespace(push=lambda image, stamp=0: taken.append((image, stamp)))
+    push(source, {"image": 1})
+    push(source, {"image": 2, "stamp": 3})
+    assert taken == [(1, 0), (2, 3)]
+    for frame, said in (
+        ({"imgae": 1}, "no imgae=…; did you mean 'image'"),
+        ({}, "image=… is missing; it takes image, s"),
+    ):
+        with pytest.raises(BadInput, match=said):
+            push(source, frame)
 
 
 def test_a_stage_that_nothing_feeds_or_reads_is_said_to_have_no_place():

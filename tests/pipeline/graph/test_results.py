@@ -4,7 +4,7 @@ import math
 import numpy as np
 
 from omninav.pipeline import Metrics, MetricSpec
-from omninav.pipeline.graph.results import merged
+from omninav.pipeline.graph.results import by_path, merged
 
 
 def test_metrics_of_several_stages_are_merged_group_by_group():
@@ -16,6 +16,7 @@ def test_metrics_of_several_stages_are_merged_group_by_group():
     assert both.headlines == ("group.a", "c")
     assert both.details == ("group",)
     assert one.values == {"group": {"a": 1, "b": 1}}
+    assert [*by_path({"a": {"b": 1, "c": {}}, "d": 2})] == [("a.b", 1), ("a.c", {}), ("d", 2)]
 
 
 def test_numbers_of_numpy_are_merged_as_json_holds_them():

@@ -61,7 +61,7 @@ class Nameless(Stage):
 
 
 class WithoutContext(Stage):
-    def step(self, number: toys.Number) -> None: ...
+    def step(self, number: toys.Number, other: toys.Number) -> None: ...
 
 
 class UntypedParameter(Stage):

@@ -32,8 +32,9 @@ def test_what_is_written_is_read_back(value: object) -> None:
 
 
 def test_aliases_and_merges_are_followed_and_dates_stay_texts() -> None:
-    text = "a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: [*a, 2001-99-99]\nd: 0x1F"
+    text = "a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: [*a, 2001-99-99]\nd: 0x1F\ne: 9223372036854775807"
     expected = {"a": {"x": 1, "y": 2}, "b": {"x": 1, "y": 3}, "c": [{"x": 1, "y": 2}, "2001-99-99"], "d": 31}
+    expected["e"] = 2**63 - 1
     assert parse_yaml(text, "file") == expected
     assert parse_yaml("", "file") is None
 
@@ -43,6 +44,7 @@ def test_aliases_and_merges_are_followed_and_dates_stay_texts() -> None:
     [
         ("a: 1\nb: " + "9" * 5000, "file, line 2: a number of 5000 characters, expected at most 100"),
         ("a: 99999999999999999999", "file, line 1: the whole number '99999999999999999999' is too large"),
+        ("a: 9223372036854775808", "file, line 1: the whole number '9223372036854775808' is too large"),
         ("a: !!timestamp x", "file, line 1: the tag 'tag:yaml.org,2002:timestamp'; write the value without a tag"),
         ("a: !!python/object/apply:os.system [x]", "file, line 1: the tag 'tag:yaml.org,2002:python/object/apply:os"),
         ("a: !!pairs [a: 1]", "file, line 1: the tag"),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from omninav.pipeline import Outputs, Stage, State, Value
+from omninav.pipeline import Outputs, Stage, State, Tick, Value
 from omninav.pipeline.graph.tool import Tool
 from toys import Ledger
 
@@ -35,3 +35,4 @@ def test_each_is_only_itself_and_values_are_not_changed_but_those_that_say_so(ba
     with pytest.raises(dataclasses.FrozenInstanceError) if base in (Value, Outputs) else nullcontext():
         one.size = 3
     Ledger([]).entries = [1.0]
+    assert repr(Tick(3, 4)) == "Tick(index=3, stamp=4, log=0, frame=0, first_of_log=False)"

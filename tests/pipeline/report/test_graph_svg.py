@@ -110,6 +110,8 @@ def everything() -> Graph:
     made = loop()
     made.wires.append(Wire("see", "late", "source", "truth", delay=2))
     made.wires.append(Wire("see", "last", "move", "belief", hold=True))
+    made.nodes["bias"] = Node("bias", "x.Bias", Stage(), made.nodes["move"].signature, {}, "tick")
+    made.wires.append(Wire("fuse", "bias", "bias", "belief"))  # it stands just before its reader
     for number in range(8):
         read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
         made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", Stage(), read, {}, "after")

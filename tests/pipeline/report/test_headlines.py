@@ -16,6 +16,7 @@ def test_headlines_stand_first_and_the_speed_last():
         ("Converged", "after 12 frames"),
         ("Speed", "24.7 frames/s"),
     ]
+    assert not any(row.off for row in headline_rows(measured(), {"ticks_per_second": 24.71}))
     assert shown(measured(), {"ticks_per_second": 100.2, "cached": ["features"]})[-1] == (
         "Speed, features from the cache",
         "100 frames/s",

@@ -14,7 +14,8 @@ def test_a_short_line_loses_what_no_eye_tells_apart():
 def test_a_line_that_comes_back_is_drawn_all_the_way():
     line = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 0.0], [0.0, 0.0], [9.0, 0.0]])
     assert drawn_points(line).tolist() == line[[0, 1, 2, 4]].tolist()
-    assert drawn_points(line[2:4]).tolist() == line[2:4].tolist()
+    for few in (line[:0], line[:1], line[2:4]):
+        assert drawn_points(few).tolist() == few.tolist()
 
 
 def test_of_a_stretch_its_ends_its_peaks_and_its_first_gap_are_kept_where_a_line_is_too_long():

@@ -90,6 +90,7 @@ def test_a_page_has_results_with_units_skipped_data_notes_and_the_command(tmp_pa
         "omninav resume 'runs/a run'",
         "match every tick 300 1.23 2.50 31.0",
         "212 frames per second",
+        "libraries numpy 2.0",
         "name: <x>",
     ):
         assert words in said
