@@ -102,7 +102,7 @@ class Context:
     def rng(self) -> np.random.Generator:
         """The node's own generator. Touching it marks the run as one whose results depend on the seed."""
         self.used_rng = True
-        return self.rng_unmarked()
+        return self.rng_unmarked() if self._rng is None else self._rng
 
     def count(self, kind: str, number: int = 1, detail: str = "") -> None:
         """Count something dropped or odd; the first `detail` of a kind is kept."""

@@ -59,6 +59,7 @@ def _struct(store: "Typestore", msgtype: str, message: Any, at: int) -> tuple[np
             names.append(name)
             formats.append(dtype)
             starts.append(start)
+    begin = max(begin, 0)
     offsets = [start - begin for start in starts]
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": at - begin}), begin, at
 
