@@ -56,6 +56,7 @@ class LogReader(Losses):
         self._channels: dict[int, Channel] = {}
         self._chunks: list[tuple[Place, bool]] = []
         self._unpacked: OrderedDict[int, bytes] = OrderedDict()
+        self._in_memory = 0
         self._stores: dict[str, Typestore] = {}
         self._known_channels: dict[int, tuple[str, bool]] = {}
         self._types: dict[str, str] = {}
