@@ -174,6 +174,8 @@ def test_a_context_keeps_what_a_stage_notes_and_draws_from_its_own_generator():
         ctx.fact("noise", number)
         ctx.fact("pace", number, of_run=True)
     ctx.count("blank")
+    other.read = frozenset({"pose"})
+    assert [ctx.is_read("views"), other.is_read("views"), other.is_read("pose")] == [True, False, True]
     other.restore(ctx.generator_state(), ctx.notes())
     assert (other.counts, other.details, other.warnings) == ({"blank": 7}, {"blank": "frame 1"}, ["It is dark."])
     assert (other.facts, ctx.run_facts, other.run_facts, other.used_rng) == ({"noise": 3}, {"pace": 3}, {}, True)
