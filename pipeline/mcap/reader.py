@@ -172,7 +172,10 @@ class LogReader(Losses):
             ):
                 if opcode == Opcode.DATA_END:
                     if self._summary.damage:  # bytes that are missing moved it away from where the file's end states
-                        expected = Counter(read_summary(file, self._size, place.end).counts) or expected
+                        moved = read_summary(file, self._size, place.end)
+                        expected = Counter(moved.counts) or expected
+                        for described, content in moved.descriptions:  # of topics without any message
+                            self._learn(described, content)
                     break
                 unbroken = unbroken and follows
                 record = os.pread(file.fileno(), place.length, place.start)

@@ -304,7 +304,7 @@ def test_a_chunk_that_was_taken_out_is_missed_by_topic(path: Path, whole: list) 
     assert "of 60 on /pose" in reader.details["missing_message"]
 
 
-@pytest.mark.parametrize(("topics", "said"), [(3, "3"), (4, "3 and of 1 more topic"), (5, "3 and of 2 more topics")])
+@pytest.mark.parametrize(("topics", "said"), [(3, "/2"), (4, "/2 and of 1 more topic"), (5, "/2 and of 2 more topics")])
 def test_messages_of_three_topics_that_are_missing_are_named_and_the_others_counted(
     tmp_path: Path, topics: int, said: str
 ) -> None:
@@ -314,7 +314,7 @@ def test_messages_of_three_topics_that_are_missing_are_named_and_the_others_coun
     reader = write_records(tmp_path / "log.mcap", [r for r in records_of(tmp_path / "log.mcap") if r[0] != 0x06])
     assert list(reader.scan()) == []
     assert reader.dropped["missing_message"] == topics
-    named = ", ".join(f"1 of 1 on channel {number}" for number in ("1", "2", said))
+    named = ", ".join(f"1 of 1 on {topic}" for topic in ("/0", "/1", said))
     assert reader.details["missing_message"].endswith(f" missing: {named}")
 
 
