@@ -45,9 +45,9 @@ SIGMA_FLOOR = (0.0003, 0.0003, math.radians(0.003))
 """Standard deviations below which no pose is taken to be known (m, m, rad)."""
 SURE = 0.95
 """Probability of a pose from which on it tells how much stamps jitter."""
-SAID_JITTER_S, SAID_PROBABILITY = 0.025, 0.8
+SAID_JITTER_S, SAID_PROBABILITY = 0.025, 0.95
 """Standard deviation of stamps (s) and its probability from which on the run reports it: in sound drives up to 0.018 is
-found, since odometry is interpolated, or 0.025 with a probability of 0.24."""
+found, since odometry is interpolated, or 0.028 with a probability of 0.8 for some images."""
 MAX_MOTIONS = 5.0
 """Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
