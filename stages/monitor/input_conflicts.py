@@ -12,7 +12,7 @@ from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.geometry.plane.mount import found_mount
-from omninav.stages.geometry.plane.se2 import between, compose, path_length, wrap, wrap_angle
+from omninav.stages.geometry.plane.se2 import between, compose, distances_along, path_length, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import Reinitialise
@@ -44,12 +44,13 @@ class Watched:
     is not wrapped, and the path that it drove (`metres`) and turned, to either side (`radians`); best `matches` (N, 3)
     in the map (NaN without one), and whether each is `at_estimate` (N,) (NaN without one). Against the image before:
     `correlation` (N,), whether it is the `same` (N,), and `sure_turns` (N - 1,) seen (rad), NaN in images unlike it.
-    `exact` (N, 3): estimates, NaN where they are not exact to `EXACT_M`."""
+    `exact` (N, 3): estimates, NaN where they are not exact to `EXACT_M`, and which are: `is_exact` (N,)."""
 
     def __init__(self, rows: Array) -> None:
         self.times, self.odometry, self.matches = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
         self.at_estimate, turns, self.correlation, self.same = rows[:, 7:11].T
         self.exact = rows[:, 11:]
+        self.is_exact = np.isfinite(self.exact).all(axis=1)
         self.sure_turns = np.where(self.correlation[1:] > SURE_CORRELATION, turns[1:], np.nan)
         self.metres, self.radians = driven(self.odometry)
 
@@ -60,6 +61,12 @@ class Watched:
         return self.odometry[known], self.matches[known]
 
     @cached_property
+    def turning(self) -> float:
+        """Turning that is seen in the images, to either side (rad)."""
+        seen = self.sure_turns
+        return float(np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum())
+
+    @cached_property
     def turn_fit(self) -> TurnFit:
         """Fit of the turns seen in images to those of odometry."""
         return turn_fit(self.times, self.odometry[:, 2], self.sure_turns)
@@ -68,7 +75,7 @@ class Watched:
     def mount(self) -> Array | None:
         """Pose (3,) of the camera against where the map has it, by the last exact estimates and odometry, where both
         halves of these show the same; else None."""
-        rows = np.flatnonzero(np.isfinite(self.exact).all(axis=1))[-2 * MOUNT_IMAGES :]
+        rows = np.flatnonzero(self.is_exact)[-2 * MOUNT_IMAGES :]
         halves = rows[:-MOUNT_IMAGES], rows[-MOUNT_IMAGES:]
         first, mount = (found_mount(self.exact[half], self.odometry[half]) for half in halves)
         if first is None or mount is None or np.abs((mount - first) / (MOVED_M, MOVED_M, MOVED_RAD)).max() > 1.0:
@@ -164,7 +171,8 @@ class InputConflicts(Stage):
             lately = judge(Watched(recent.rows[-LATE_IMAGES:]), length_scale_m, ("misplacing", "late"))
             kind, sentence = lately if lately[0] else (kind, sentence)
         recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
-        others = set(recent.standing) - {"leap", "parted", kind} - (frozenset() if kind in HARMLESS else HARMLESS)
+        others = set(recent.standing) - {"leap", "inconsistent", kind}
+        others -= HARMLESS if kind not in HARMLESS else set()
         if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
             self._say(ctx, recent, kind, sentence)
         recent.suspected = kind
@@ -298,12 +306,12 @@ MISPLACED_M = 0.5
 EXACT_M, MOUNT_IMAGES = 0.05, 22
 """Largest standard deviation of an estimate's position (m), and how many of the last of these, as well as how many
 before them, must tell where the camera is."""
-PATH_M, PARTED_M, PARTED = 6.0, 0.5, 0.4
-"""Path over which the last exact estimates are compared with odometry, about how far apart (m), and from which share of
-that distance on they part: in sound drives it is 0.03."""
-MIN_PARTED, MAX_ASIDE = 3, math.radians(120.0)
-"""Least number of these that part, since a robot that is carried off parts once; and up to which turn of all of them
-the camera looks aside (rad): beyond, images may come in reversed order."""
+COMPARED_M, STEP_M, MAX_OFF = 6.0, 0.5, 0.4
+"""Path over which exact estimates are compared with odometry, in steps of about so many metres, and by which share of a
+step they may be off: in sound drives it is 0.03."""
+MIN_INCONSISTENT, MAX_CAMERA_TURN = 3, math.radians(120.0)
+"""Smallest number of steps that are off, since a robot that is carried away once has one; and largest turn (rad) of all
+of them that is laid to the camera's yaw: reversed images look like a larger one."""
 MOVED_M, MOVED_RAD = 0.1, math.radians(8.0)
 """A camera that is this far (m) or turned this much (rad) from where the map has it was moved: in seven sound drives
 0.03 m and 5.6 degrees are found at most, since odometry's errors bend long steps."""
@@ -360,9 +368,7 @@ def blind(watched: Watched, length_scale_m: float) -> str:
 
 def turned(watched: Watched, length_scale_m: float) -> str:
     """Turns that are seen against turns that are measured."""
-    seen = watched.sure_turns
-    sure = np.abs(clipped(seen[np.abs(seen) > SURE_TURN]))
-    turning, number = float(sure.sum()), len(watched.times) - 1
+    seen, turning, number = watched.sure_turns, watched.turning, len(watched.times) - 1
     if turning < MIN_SEEN_TURN:
         return ""
     over = f"over {number} images"
@@ -398,8 +404,7 @@ def turned(watched: Watched, length_scale_m: float) -> str:
 
 def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> str:
     """Images that show turns when odometry does not measure them; the robot drives at least this far (m)."""
-    seen = watched.sure_turns
-    if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_LATE_TURN or watched.radians == 0.0:
+    if watched.turning < MIN_LATE_TURN or watched.radians == 0.0:
         return ""
     fit = watched.turn_fit
     if fit.sign < 0 or fit.explained < EXPLAINED or fit.explained - fit.as_is < DELAY_GAIN:
@@ -410,8 +415,8 @@ def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> st
     return (
         f"the images show turns {abs(fit.delay_s):.1f} s {'after' if fit.delay_s > 0 else 'before'} odometry measures "
         f"them, in which the robot drives {driven:.2f} m (this explains {100 * fit.explained:.0f} % of their turning "
-        f"over {len(seen)} images, no delay {100 * max(fit.as_is, 0.0):.0f} %): check that both are stamped by one "
-        "clock, images when they are taken, or set `delay:` in camera.yaml"
+        f"over {len(watched.sure_turns)} images, no delay {100 * max(fit.as_is, 0.0):.0f} %): check that both are "
+        "stamped by one clock, images when they are taken, or set `delay:` in camera.yaml"
     )
 
 
@@ -501,23 +506,22 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     return ""
 
 
-def parted(watched: Watched, length_scale_m: float) -> str:
+def inconsistent(watched: Watched, length_scale_m: float) -> str:
     """Exact estimates that do not move as odometry does."""
-    known = np.isfinite(watched.exact).all(axis=1)
-    odometry, exact = watched.odometry[known], watched.exact[known]
-    path = np.append(0.0, np.hypot(*np.diff(odometry[:, :2], axis=0).T).cumsum())
-    apart = np.unique(np.floor((path - path[-1] + PATH_M) / PARTED_M), return_index=True)[1]
-    apart = apart[path[apart] >= path[-1] - PATH_M]
-    if len(apart) <= MIN_PARTED:
+    odometry, exact = watched.odometry[watched.is_exact], watched.exact[watched.is_exact]
+    along = distances_along(odometry)
+    ends = np.unique(np.floor((along - along[-1] + COMPARED_M) / STEP_M), return_index=True)[1]
+    ends = ends[along[ends] >= along[-1] - COMPARED_M]
+    if len(ends) <= MIN_INCONSISTENT:
         return ""
-    measured, seen = (between(each[apart[:-1]], each[apart[1:]])[:, :2] @ (1.0, 1j) for each in (odometry, exact))
-    turn = np.angle(np.exp(1j * (np.angle(seen) - np.angle(measured))).sum())  # a camera looks aside, as others tell
-    off = np.abs(seen - measured * np.exp(1j * turn * (abs(turn) < MAX_ASIDE)))
-    parted = off > PARTED * np.maximum(np.diff(path[apart]), PARTED_M)
-    if parted.sum() < MIN_PARTED:
+    measured, seen = (between(each[ends[:-1]], each[ends[1:]])[:, :2] @ (1.0, 1j) for each in (odometry, exact))
+    turn = np.angle(np.exp(1j * (np.angle(seen) - np.angle(measured))).sum())  # of a camera, which others report
+    off = np.abs(seen - measured * np.exp(1j * turn * (abs(turn) < MAX_CAMERA_TURN)))
+    wrong = off > MAX_OFF * np.maximum(np.diff(along[ends]), STEP_M)
+    if wrong.sum() < MIN_INCONSISTENT:
         return ""
     return (
-        f"landmarks place {parted.sum()} of {len(parted)} images, some {PARTED_M} m apart, elsewhere than odometry "
+        f"landmarks place {wrong.sum()} of {len(wrong)} images, some {STEP_M} m apart, elsewhere than odometry "
         "leads from one to the next: check that images are new, of this drive and in order, and that odometry is right"
     )
 
@@ -526,7 +530,7 @@ def foreign(watched: Watched, length_scale_m: float) -> str:
     """Images of another place than the map's."""
     odometry, matches = watched.placed
     believed = watched.at_estimate[np.isfinite(watched.at_estimate)]
-    if len(believed) < WINDOW or np.isfinite(watched.exact).all(axis=1).mean() > ELSEWHERE:
+    if len(believed) < WINDOW or watched.is_exact.mean() > ELSEWHERE:
         return ""  # in other light landmarks find the places that colours do not
     there, fit = float(believed.mean()), agreement(odometry, matches, length_scale_m)
     if fit.pairs < WINDOW or fit.share > SCATTERED or there > ELSEWHERE:
@@ -545,7 +549,7 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "misplacing": partial(late, min_metres=MISPLACED_M),
     "displaced": partial(moved, min_metres=DISPLACED_M),
     "tracked": tracked,
-    "parted": parted,
+    "inconsistent": inconsistent,
     "foreign": foreign,
     "late": late,
     "moved": moved,

@@ -20,11 +20,11 @@ from omninav.stages.monitor.input_conflicts import (
     compare_strips,
     foreign,
     frozen,
+    inconsistent,
     judge,
     late,
     leap,
     lies_at,
-    parted,
     pose_now,
     remember,
     tracked,
@@ -151,7 +151,7 @@ def test_exact_estimates_of_a_robot_that_was_carried_off_once_go_on_with_odometr
     rows = rows_of(40, step=0.21)
     rows[:, 11:] = rows[:, 1:4]
     rows[30:, 11:] = compose(np.array(carried), rows[30:, 11:])
-    assert parted(Watched(rows), SCALE_M) == ""
+    assert inconsistent(Watched(rows), SCALE_M) == ""
 
 
 @pytest.mark.parametrize(
@@ -168,11 +168,13 @@ def test_exact_estimates_of_a_robot_that_was_carried_off_once_go_on_with_odometr
         (np.where(np.arange(40) < 33, np.nan, -FORWARD), "landmarks place 3 of 3 images"),
     ],
 )
-def test_exact_estimates_part_from_odometry_where_images_are_of_another_time(seen: Array, said: str) -> None:
+def test_exact_estimates_are_inconsistent_with_odometry_where_images_are_of_another_time(
+    seen: Array, said: str
+) -> None:
     rows = rows_of(40, step=0.21)
     rows[:, 11:] = np.column_stack([seen, seen * 0.0, seen * 0.0])
-    assert parted(Watched(rows), SCALE_M)[: len(said) or None] == said
-    assert judge(Watched(rows), SCALE_M)[0] == ("parted" if said else "")
+    assert inconsistent(Watched(rows), SCALE_M)[: len(said) or None] == said
+    assert judge(Watched(rows), SCALE_M)[0] == ("inconsistent" if said else "")
 
 
 @pytest.mark.parametrize(
