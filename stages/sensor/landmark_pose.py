@@ -136,14 +136,14 @@ class LandmarkPose(Stage):
                 jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)
             variance = jitter.variance()
             if variance > 0.0:
-                self._say_jitter(ctx, state, math.sqrt(variance), jitter.probability())
+                self._say_jitter(ctx, state, math.sqrt(variance))
                 along = turned(np.broadcast_to(moved, poses.shape), poses[:, 2] - 0.5 * moved[2])
                 motions = min(variance / seconds**2, MAX_MOTIONS**2)
                 covariances = covariances + motions * along[:, :, None] * along[:, None, :]
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
-    def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float, probability: float) -> None:
-        if sigma < SAID_JITTER_S or probability < SAID_PROBABILITY or state.told:
+    def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
+        if sigma < SAID_JITTER_S or state.told or state.jitter.probability() < SAID_PROBABILITY:
             return
         state.told = True
         ctx.warn(

@@ -87,7 +87,8 @@ class StampJitter(Value):
 
     def variance(self) -> float:
         """Expected variance of a stamp's error, s²; 0 as long as it is not `SHOWN`."""
-        return float(self._shares() @ np.square(JITTERS_S)) if self.probability() > SHOWN else 0.0
+        shares = self._shares()
+        return float(shares @ np.square(JITTERS_S)) if shares[0] < 1.0 - SHOWN else 0.0
 
     def probability(self) -> float:
         """Probability that stamps jitter."""

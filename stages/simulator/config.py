@@ -442,7 +442,7 @@ class WorldConfig:
         if twice := sorted({name for name in named if named.count(name) > 1}):
             raise ValueError(f"rooms: two or more are named {', '.join(twice)}; give each a name of its own")
         floor = f"{self.size[0]:g} x {self.size[1]:g} m (size)"
-        names = {room.name for room in self.rooms} | {lamp.name for lamp in self.lamps}
+        names = {*named} | {lamp.name for lamp in self.lamps}
         for number, room in enumerate(self.rooms):
             where, (x, y), (width, depth) = f"rooms.{number} ('{room.name:.40}')", room.corner, room.size
             over = max(-x, -y, x + width - self.size[0], y + depth - self.size[1])

@@ -179,9 +179,8 @@ def drive(
         teleport(state, kidnapping)
         poses[done - 1] = state[:3]
         if kidnapping.to is not None:
-            planned_m += along
-            along = _nearest_along(points, ends, state[:2], along)
-            planned_m -= along
+            left, along = along, _nearest_along(points, ends, state[:2], along)
+            planned_m -= along - left
     poses = poses[:done]
     before = poses.copy()
     for number, pose in rolled_to.items():
@@ -279,7 +278,8 @@ def _pursue(
             ):  # it circles round the point that it steers for, and so has been there
                 along, stalled_steps = min(along + look_ahead, length), 0
             remaining = math.hypot(goal_x - state[X], goal_y - state[Y])
-            if along >= length - look_ahead:
+            arrives = along >= length - look_ahead  # else the line only comes past its end
+            if arrives:
                 halts = along >= length - 0.6 * ARRIVAL_M or (remaining < 2 * ARRIVAL_M and state[TURNING] == 0.0)
                 if (remaining < ARRIVAL_M and state[SPEED] < 0.05) or (halts and state[SPEED] == 0.0):
                     return row, along, True
@@ -288,8 +288,7 @@ def _pursue(
             off -= 2 * math.pi * math.floor((off + math.pi) / (2 * math.pi))
             brake = math.sqrt(robot[3] * max(length - along - 0.6 * ARRIVAL_M, 0.0))
             speed = min(robot[1] * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
-            passes = along < length - look_ahead and abs(off) >= 1.0  # it would stand for ever where it only comes past
-            turning = 0.0 if remaining < 2 * ARRIVAL_M and not passes else 2.0 * off
+            turning = 0.0 if remaining < 2 * ARRIVAL_M and (arrives or abs(off) < 1.0) else 2.0 * off
             _step(state, speed, turning, robot, step_s, room, NO_PEOPLE)
         poses[row] = state[:3]
     return len(poses), along, False

@@ -40,8 +40,8 @@ FIRST_IMAGE_S = 0.52
 """Seconds from the start of a drive to its first image, so that odometry begins before it."""
 JITTER_SHARES = (1.0, 0.5, 0.25, 0.0)
 """Shares of the path's jitter that are tried one after the other, until the robot touches nothing."""
-LEAST_SHARE_DRIVEN = 0.8
-"""Share of its planned path below which a drive is warned of: bends are cut by less."""
+MIN_DRIVEN = 0.8
+"""Smallest share of its planned path that a robot drives without a warning: cut corners cost less."""
 IMAGE_LATENCY_NS = 42_000_000
 """Nanoseconds from an image's stamp to its arrival."""
 
@@ -94,7 +94,7 @@ class SimulatedRecording(Recording):
         driven = self._without_contact(way)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
         self.warnings = [f"{self.name}: {ONE_PLAN}"] if world.plan == "drawn" else []
-        if not driven.arrived or driven.driven_m < LEAST_SHARE_DRIVEN * driven.planned_m:
+        if not driven.arrived or driven.driven_m < MIN_DRIVEN * driven.planned_m:
             self.warnings.append(
                 f"{self.name}: the robot drove {driven.driven_m:.0f} m, its path has {driven.planned_m:.0f} m; see on "
                 "the floor plan where it was held up, and try another route, world.robot.radius or look_ahead"
