@@ -198,7 +198,8 @@ class Stage:
 
         The default takes the files that parameters of type `Path` name.
         """
-        given = (getattr(self, field.name) for field in dataclasses.fields(self))  # type: ignore[arg-type]
+        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]  # Stage makes it a dataclass
+        given = (getattr(self, name) for name in names)
         files = [path for value in given if isinstance(value, Path) and (path := user_path(value)).is_file()]
         return digest_text(*map(digest_file, files)) if files else None
 

@@ -129,7 +129,9 @@ def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: p
         assert said in lines[-1], lines
         assert len(lines) == 1
     assert main(["map", "join", "a.omap", "drift.omap", "same_frame=true"]) == 0
-    assert read_artifact(tmp_path / "joined.omap").pose_source == "estimate"  # type: ignore[attr-defined]
+    joined = read_artifact(tmp_path / "joined.omap")
+    assert isinstance(joined, ReferenceGraph)
+    assert joined.pose_source == "estimate"
 
 
 @pytest.mark.parametrize(

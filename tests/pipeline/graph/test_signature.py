@@ -11,6 +11,8 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.parameters import BadStage
 from omninav.pipeline.graph.signature import signature
 
+ZERO = toys.Number(0.0)
+
 
 class Widened(toys.Scale):
     """A number times a factor, and then some."""
@@ -152,7 +154,7 @@ def test_inputs_are_read_with_what_may_be_missing_and_what_is_collected():
             memory: Memory,
             all: Annotated[Sequence[toys.Number], "as they came"],
             gaps: Sequence[toys.Number | None],
-            unset: toys.Number = toys.Number(0.0),  # noqa: B008
+            unset: toys.Number = ZERO,
         ) -> None: ...
 
     read = signature(Taking)
