@@ -1,7 +1,7 @@
 """Finds the pose of an image by the landmarks that it shows."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import field, replace
 from typing import Annotated
 
@@ -19,11 +19,13 @@ from omninav.stages.geometry.plane.se2 import compose, turned
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
+from omninav.stages.values.length_scale import LengthScale, metres_of
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.visual_words import VisualWords
 
+from .landmarks_shown import LandmarksShown, landmarks_to_expect
 from .stamp_jitter import StampJitter
 
 WORD_REFERENCES = (10, 80)
@@ -58,9 +60,11 @@ WITHOUT_LANDMARKS = (
 
 
 class LandmarkPoseState(State):
-    """Stamp of the last image (ns), and likelihoods of how much stamps jitter; `told`: whether the run reported it."""
+    """Stamp of the last image (ns), landmarks that the drive shows, and likelihoods of how much stamps jitter; `told`:
+    whether the run reported it."""
 
     stamp: int = 0
+    shown: LandmarksShown = field(default_factory=LandmarksShown)
     jitter: StampJitter = field(default_factory=StampJitter.unknown)
     told: bool = False
 
@@ -73,7 +77,8 @@ class LandmarkPose(Stage):
     references are looked at, and the likelier round counts. Features are matched with the landmarks that
     candidates see; the absolute pose with most inliers is refined on a floor. What is left over is searched for a rival
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
-    sectors of the view its inliers are in. An image with too few inliers gives no pose, and so does a map without
+    sectors of the view its inliers are in, and the less sure, the fewer they are than references near it see: furniture
+    that looks alike shows a tenth. An image with too few inliers gives no pose, and so does a map without
     landmarks. Where the tour showed that images are stamped late, the pose is moved on by the robot's motion over that
     time; where stamps jitter, its covariance allows for the motion over their standard deviation. Raises BadInput for
     features of another kind than the map's.
@@ -97,11 +102,12 @@ class LandmarkPose(Stage):
         near: Particles | None = None,
         camera: Camera | None = None,
         motion: Motion | None = None,
+        length_scale: LengthScale | None = None,
     ) -> Out:
         """Find the pose of the robot that took one image; `motion`: since the last one."""
         seconds, state.stamp = (ctx.tick.stamp - state.stamp) / 1e9, ctx.tick.stamp
         if ctx.tick.first_of_log:
-            state.jitter, state.told = StampJitter.unknown(), False
+            state.jitter, state.told, state.shown = StampJitter.unknown(), False, LandmarksShown()
         jitter, state.jitter = state.jitter, state.jitter.interrupted()
         landmarks = map.landmarks
         if landmarks is None:
@@ -113,17 +119,26 @@ class LandmarkPose(Stage):
                 f"landmarks: the map's have descriptors of {landmarks.descriptors.shape[1]} numbers, the image's have "
                 f"{features.descriptors.shape[1]}; use the features the map was learned with, or learn it again"
             )
+        mount = np.zeros(3) if camera is None else landmarks.mounted(camera.mount, camera.placed)
+
+        def expected(camera_poses: Array) -> Array:
+            return landmarks_to_expect(landmarks, map.poses, robot_poses(camera_poses, mount), metres_of(length_scale))
+
         descriptors = root_descriptors(features.descriptors)
         best: LandmarkFix | None = None
         for candidates in self._candidates(features, landmarks.words, map, near):
-            fix = self._fix(descriptors, features.bearings, landmarks, landmarks.seen_by(candidates))
+            rows = landmarks.seen_by(candidates)
+            fix = self._fix(descriptors, features.bearings, landmarks, rows, state.shown, expected)
             if fix is not None and (best is None or fix.probabilities[0] > best.probabilities[0]):
                 best = fix
             if best is not None and best.probabilities[0] > 0.5:
                 break
-        if best is None or camera is None:
+        if best is None:
+            return self.Out()
+        state.shown = state.shown.seen(best.inliers[:1], expected(best.poses[:1]), float(best.probabilities[0]))
+        if camera is None:
             return self.Out(fix=best)
-        mount, late = landmarks.mounted(camera.mount, camera.placed), landmarks.late_by(camera.delay)
+        late = landmarks.late_by(camera.delay)
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
         if motion is None or seconds <= 0.0:
@@ -151,7 +166,15 @@ class LandmarkPose(Stage):
             "time stamps jitter, or odometry comes too seldom; stamp images when they are taken"
         )
 
-    def _fix(self, descriptors: Floats, bearings: Array, landmarks: Landmarks, rows: Ints) -> LandmarkFix | None:
+    def _fix(
+        self,
+        descriptors: Floats,
+        bearings: Array,
+        landmarks: Landmarks,
+        rows: Ints,
+        shown: LandmarksShown,
+        expected: Callable[[Array], Array],
+    ) -> LandmarkFix | None:
         theirs = restored_descriptors(landmarks.descriptors[rows])
         points = landmarks.points[rows].astype(np.float64)
         pairs = matched(descriptors, theirs, points)
@@ -161,14 +184,16 @@ class LandmarkPose(Stage):
         if not found:
             return None
         sectors = np.array([sectors_of(bearings[each.inliers]) for each in found])
-        order = np.argsort(-sectors, kind="stable")
-        found, sectors = [found[row] for row in order], sectors[order]
         inliers = np.array([int(each.inliers.sum()) for each in found], np.int64)
+        poses = np.array([each.pose for each in found])
+        log_odds = log_odds_of(sectors) + shown.log_odds(inliers, expected(poses))
+        order = np.argsort(-log_odds, kind="stable")
+        found = [found[row] for row in order]
         return LandmarkFix(
-            np.array([each.pose for each in found]),
+            poses[order],
             np.array([covariance_of(each, landmarks.sigma_rad, landmarks.variance_factor) for each in found]),
-            inliers,
-            probabilities_of(sectors),
+            inliers[order],
+            probabilities_of(log_odds[order]),
             len(points),
             bearings.astype(np.float32),
             agreeing(found),
@@ -210,10 +235,13 @@ def sectors_of(bearings: Array) -> int:
     return len(distinct(np.floor(np.arctan2(bearings[:, 1], bearings[:, 0]) / SECTOR).astype(np.int64)))
 
 
-def probabilities_of(sectors: Ints) -> Array:
-    """Probabilities (K,) that each of rival poses is right, whose landmarks are in that many sectors of the view (K,).
+def log_odds_of(sectors: Ints) -> Array:
+    """Log odds (K,) that a pose is right whose landmarks are in that many sectors of the view (K,), even at
+    `EVEN_SECTORS`."""
+    return np.asarray(np.minimum(ODDS_PER_SECTOR * (sectors - EVEN_SECTORS), MAX_LOG_ODDS))
 
-    The odds grow by `ODDS_PER_SECTOR` (nats) with each sector, and are even at `EVEN_SECTORS`.
-    """
-    odds = np.exp(np.minimum(ODDS_PER_SECTOR * (sectors - EVEN_SECTORS), MAX_LOG_ODDS))
+
+def probabilities_of(log_odds: Array) -> Array:
+    """Probabilities (K,) that each of rival poses is right, of their log odds (K,) against all of them being wrong."""
+    odds = np.exp(log_odds)
     return np.asarray(odds / (1.0 + odds.sum()))

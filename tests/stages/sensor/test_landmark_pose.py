@@ -18,13 +18,16 @@ from omninav.stages.sensor.landmark_pose import (
     LandmarkPose,
     LandmarkPoseState,
     covariance_of,
+    log_odds_of,
     probabilities_of,
     sectors_of,
 )
+from omninav.stages.sensor.landmarks_shown import LandmarksShown
 from omninav.stages.sensor.stamp_jitter import StampJitter
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.image import Image
 from omninav.stages.values.landmarks import LandmarkFix
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedMotion, Motion
@@ -193,8 +196,20 @@ def test_a_pose_is_the_likelier_the_more_sectors_of_the_view_its_landmarks_lie_i
     azimuths = np.radians([1.0, 14.0, 16.0, -1.0, 164.0, 166.0])
     assert sectors_of(np.column_stack([np.cos(azimuths), np.sin(azimuths), 0 * azimuths])) == 5
     odds = np.exp([0.375, -0.375])  # 0.75 nats each sector, even at 7.5
-    assert probabilities_of(np.array([8, 7])) == pytest.approx(odds / (1.0 + odds.sum()))
-    assert probabilities_of(np.array([24])) == pytest.approx(1.0 / (1.0 + np.exp(-8.0)))
+    assert probabilities_of(log_odds_of(np.array([8, 7]))) == pytest.approx(odds / (1.0 + odds.sum()))
+    assert probabilities_of(log_odds_of(np.array([24]))) == pytest.approx(1.0 / (1.0 + np.exp(-8.0)))
+
+
+def test_a_pose_is_doubted_whose_place_shows_more_landmarks_unless_the_drive_never_shows_them() -> None:
+    whole, map = seen_from(room(), FIRST), mapped_room()
+    part = whole.chosen(np.arange(0, len(whole), 22))
+    states = LandmarkPoseState(), LandmarkPoseState(shown=LandmarksShown(math.log(0.02)))
+    lit, dark = (LandmarkPose().step(Context("landmark_pose"), state, part, map).fix for state in states)
+    assert lit.inliers[0] == dark.inliers[0] < 0.1 * len(map.landmarks)
+    assert lit.probabilities[0] < dark.probabilities[0] - 0.05
+    assert states[0].shown.log_share < math.log(0.4)
+    far = LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), part, map, length_scale=LengthScale(0.01))
+    assert far.fix.probabilities[0] == pytest.approx(dark.probabilities[0])  # so far from references none are expected
 
 
 @pytest.mark.parametrize(("sigma", "larger"), [(0.01, 0.02), (0.03, 0.03)])
