@@ -327,6 +327,9 @@ CHANGING = 0.97
 """Images of a robot that drives correlate less with the ones before."""
 MISSCALED_OCTAVES, MISTURNED = 0.4, math.radians(20.0)
 """A relation of tracks is a wrong one beyond these."""
+MAX_ACROSS = 0.6
+"""Largest share of the pairs on which a relation rests that lie across one step: a robot that stands, is carried off
+and stands again has all of them there, one that drives a third."""
 LATE_IMAGES = 48
 """Last images in which a delay is looked for where all of them show nothing."""
 NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
@@ -468,7 +471,7 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     """The track of best matches against odometry's."""
     odometry, matches = watched.placed
     fit = track_fit(odometry, matches, TRACK_SCALES * length_scale_m)
-    if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE:
+    if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE or fit.across > MAX_ACROSS:
         return ""
     agree = f"{100 * fit.share:.0f} % of {fit.pairs} pairs of images agree, as it is {100 * fit.as_is:.0f} %"
     if fit.mirrored and (fit.share - fit.as_is < GAIN or not turns_fit(watched)):

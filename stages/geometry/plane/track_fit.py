@@ -26,7 +26,8 @@ class TrackFit(NamedTuple):
 
     The track becomes the other where its positions or the other's whole poses are `mirrored` (y to -y), it is turned by
     `angle` (rad, against its headings) and multiplied by `scale`. `as_is`: the share of pairs for which nothing has to
-    be done. `pairs`: those that moved.
+    be done. `pairs`: those that moved. `across`: the share of its pairs that lie across one and the same step, which
+    may be a leap.
     """
 
     scale: float
@@ -35,6 +36,7 @@ class TrackFit(NamedTuple):
     share: float
     as_is: float
     pairs: int
+    across: float
 
 
 def track_fit(track: Array, other: Array, min_metres: float) -> TrackFit | None:
@@ -49,12 +51,12 @@ def track_fit(track: Array, other: Array, min_metres: float) -> TrackFit | None:
     kept = np.abs(moved) > min_metres
     if not kept.any():
         return None
-    first, there = first[kept], np.where(np.abs(there[kept]) < 1e-9, 1e-9, there[kept])
+    first, second, there = first[kept], second[kept], np.where(np.abs(there[kept]) < 1e-9, 1e-9, there[kept])
     seen, heading = moved[kept] * np.exp(-1j * other[first, 2]), np.exp(1j * track[first, 2])
     fits = [
-        _fit(seen * heading / there, ""),
-        _fit(seen * heading / np.conj(there), "positions"),
-        _fit(np.conj(seen) * heading / there, "poses"),
+        _fit(seen * heading / there, "", first, second),
+        _fit(seen * heading / np.conj(there), "positions", first, second),
+        _fit(np.conj(seen) * heading / there, "poses", first, second),
     ]
     best = max(fits, key=lambda fit: fit.share)  # the first of equals: a straight track is its own mirror image
     return best._replace(as_is=fits[0].as_is)
@@ -98,7 +100,7 @@ def displacements(track: Array, first: Ints, second: Ints) -> Complex:
     return points[second] - points[first]
 
 
-def _fit(ratios: Complex, mirrored: Literal["", "positions", "poses"]) -> TrackFit:
+def _fit(ratios: Complex, mirrored: Literal["", "positions", "poses"], first: Ints, second: Ints) -> TrackFit:
     octaves, angles = np.log2(np.abs(ratios) + 1e-12), np.angle(ratios)
     rows = 2 * int(MAX_OCTAVES / OCTAVE) + 1
     row = np.clip(np.round((octaves + MAX_OCTAVES) / OCTAVE), 0, rows - 1).astype(np.int64)
@@ -117,7 +119,9 @@ def _fit(ratios: Complex, mirrored: Literal["", "positions", "poses"]) -> TrackF
         angle = float(wrap(angle + np.median(wrap(angles[near] - angle))))
     near = _agrees(octaves, angles, octave, angle)
     as_is = _agrees(octaves, angles, 0.0, 0.0)
-    return TrackFit(2.0**octave, angle, mirrored, float(near.mean()), float(as_is.mean()), len(ratios))
+    begun, ended = (np.bincount(ends[near], minlength=int(second.max()) + 1) for ends in (first, second))
+    across = float(np.cumsum(begun - ended).max()) / max(int(near.sum()), 1)
+    return TrackFit(2.0**octave, angle, mirrored, float(near.mean()), float(as_is.mean()), len(ratios), across)
 
 
 def _agrees(octaves: Array, angles: Array, octave: float, angle: float) -> Bools:

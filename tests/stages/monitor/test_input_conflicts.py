@@ -25,7 +25,7 @@ import omninav
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.mcap.message import Message
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.monitor.input_conflicts import JUDGEMENTS, InputConflicts, InputConflictsState
+from omninav.stages.monitor.input_conflicts import JUDGEMENTS, InputConflicts, InputConflictsState, Watched, tracked
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
@@ -138,6 +138,19 @@ def test_images_that_fit_no_place_are_said_and_a_quarter_that_fits_is_enough(fit
         seen, scale = Similarities(values), LengthScale(0.4)
         said = watch.step(ctx, state, strip, pose, None, seen, map, scale, estimate=estimate).conflicts.sentences
     assert [sentence[:35] for sentence in said] == (["the images fit no place of the map:"] if fits == 0.0 else [])
+
+
+def test_a_robot_that_stands_and_is_carried_off_does_not_look_like_a_wrong_unit() -> None:
+    def track_said(driven: np.ndarray, leap_m: float, unit: float) -> str:
+        rows = np.full((128, 14), np.nan)
+        rows[:, 0], rows[:, 9], rows[:, 2:4], rows[:, 5:7] = np.arange(128.0), 0.5, 0.0, 0.0
+        rows[:, 1], rows[:, 4] = driven, unit * driven + np.where(np.arange(128) < 64, 0.0, leap_m)
+        return tracked(Watched(rows), 0.4)
+
+    stood = np.clip(np.arange(128.0) - 60.0, 0.0, 8.0) / 8.0  # but for 1 m
+    assert track_said(stood, 1.2, 1.0) == ""
+    assert "odometry is about 0.5 times as long" in track_said(0.2 * np.arange(128.0), 0.0, 2.0)
+    assert "odometry is about 0.5 times as long" in track_said(0.2 * np.arange(128.0), 4.0, 2.0)
 
 
 def of_moved_camera(mount: tuple[float, float, float], sigma_m: float) -> tuple[list[str], bool]:

@@ -36,6 +36,17 @@ def test_pairs_by_hand_of_a_straight_track():
     assert agreement(line, line * 1.25, 1.0) == (pytest.approx(42 / 43), 43)
 
 
+def test_pairs_across_a_leap_of_a_robot_that_hardly_drives_are_told_from_those_along_a_drive():
+    step = np.clip(np.arange(60.0) - 26.0, 0.0, 8.0) / 8.0  # it drives 1 m
+    line = np.column_stack([step, np.zeros((60, 2))])
+    carried = line + np.where(np.arange(60)[:, None] < 30, 0.0, (1.2, 0.0, 0.0))
+    leapt, drove = track_fit(line, carried, 1.3), track_fit(TRACK, placed(TRACK), 0.5)
+    assert leapt.across == 1.0
+    assert leapt.scale == pytest.approx(2.2)
+    assert leapt.share > 0.5
+    assert 0.2 < drove.across < 0.4  # a pair is 15 of 60 steps long in the mean
+
+
 @given(st.floats(0.001, 1000.0), st.floats(-3.1, 3.1))
 def test_scale_and_angle_are_found(scale, angle):
     there = placed(TRACK * (scale, scale, 1.0)) + np.array((0.0, 0.0, angle))
