@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,8 @@ MAX_AGREEING = 0.1
 """Share of images that bear the estimate out in a map of another place, at most: best matches are there by chance."""
 MAX_AT_ESTIMATE = 0.5
 """Share of best matches at an estimate that was never sure, at most: more of them show that it is of this map."""
+CHECK_IMAGES = "check the log for lost images; if it has all of them, the robot was carried"
+"""Advice on a robot that is elsewhere than it can have driven."""
 FIRST_IMAGES = 10
 """Images that an estimate may take from anywhere."""
 
@@ -59,7 +62,11 @@ def stretches(logs: Iterable[Log], lost_m: float) -> list[Stretch]:
             found.pop()
             part = Part(part.log, before.first, part.last, part.state)
         found.append((part, verdict))
-    return [explained(part, verdict) for part, verdict in found]
+    told = [explained(part, verdict) for part, verdict in found]
+    for row, ((before, first), (part, again)) in enumerate(pairwise(found)):
+        if again == first and part.log is before.log:  # in another state
+            told[row + 1] = explained(part, Verdict(again.cause, f"as in {told[row].images}"))
+    return told
 
 
 def verdict_on(part: Part) -> Verdict:
@@ -124,13 +131,12 @@ def moved_unmeasured(part: Part) -> Verdict | None:
         return None
     seconds, intervals = float(log["time_s"][found] - log["time_s"][before]), np.diff(log["time_s"])
     words = (
-        f"at image {int(log['frame'][found])} it was found {gap:.1f} m from where odometry leads from image "
-        f"{int(log['frame'][before])}, after {driven:.1f} m in {seconds:.1f} s"
+        f"image {int(log['frame'][found])} is the first to agree with the estimate again, {gap:.1f} m from where "
+        f"odometry leads from image {int(log['frame'][before])} ({driven:.1f} m in {seconds:.1f} s)"
     )
     paused = float(intervals[before:found].max())
     if paused > PAUSES * np.median(intervals):
-        words += f"; no image came for {paused:.1f} s"
-        return Verdict("carried elsewhere", words, "were images lost? else the robot was carried")
+        return Verdict("carried elsewhere", f"{words}; no image came for {paused:.1f} s", CHECK_IMAGES)
     still = (np.abs(log.motion[rows]).max(axis=1) < STILL) & (log["correlation"][rows] < CHANGING)
     if still.sum() >= MIN_PART:
         words += f"; odometry stood still in {int(still.sum())} images that differ"
@@ -139,12 +145,12 @@ def moved_unmeasured(part: Part) -> Verdict | None:
     clear = np.isfinite(log["landmarks_away_m"]) | (log["lead_against"] > DISTINCT_LEAD)
     seen = [row for row in range(before + 1, found) if clear[row]][:FIRST_SEEN]
     by, metres = (seen[-1], float(np.median(away[seen]))) if seen else (found, gap)
+    shown = f"images up to {int(log['frame'][by])} show the robot {metres:.1f} m from the estimate, but "
     can = SPEED_FACTOR * float(steps.max()) * (by - before)
     if metres > log.gate + can:
-        words += (
-            f"; up to image {int(log['frame'][by])} it was seen {metres:.1f} m away, and can have driven {can:.1f} m"
+        return Verdict(
+            "carried elsewhere", f"{words}; {shown if seen else ''}it can have driven only {can:.1f} m", CHECK_IMAGES
         )
-        return Verdict("carried elsewhere", words, "were images lost? else the robot was carried")
     return Verdict("odometry slipped", words, "check wheels and floor, and that odometry is in metres")
 
 

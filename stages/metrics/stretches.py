@@ -203,7 +203,7 @@ def in_short(log: Log) -> str:
     if not log.known("confidence") and log.sure.all() and (log["estimate_weight"] == 1.0).all():
         return "Nothing is known of how sure the estimates are: this variant states one pose, whatever it saw."
     start, all_on = int(log["frame"][sure[0]]), bool(log.sure[sure[0] :].all())
-    words = f"Sure of the estimate from image {start} to the end ({images})."
+    words = f"Sure of the estimate from image {start} to the end ({counted(len(sure), 'image')})."
     if not all_on:
         words = f"Sure of the estimate in {100 * len(sure) / len(log):.0f} % of {images}, from image {start} on."
     turned = median(np.where(log["position_error_m"] > log.gate, 0.0, np.abs(log["heading_error_deg"]))[log.sure])

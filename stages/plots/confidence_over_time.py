@@ -36,15 +36,17 @@ class ConfidenceOverTime(PlotStage):
             chart.base.band((each.start_s, each.end_s), BANDS[each.state])
             chart.name(each.state, BANDS[each.state], "square")
         chart.base.level(0.5, "quiet")
-        chart.base.line(np.column_stack([seconds, last.confidence]), "blue", 1.6)
+        chart.base.line(np.column_stack([seconds, last.confidence]), "ink", 1.6)
+        if found:
+            chart.name("confidence", "ink")
         low = float((last.confidence < 0.5).mean())
-        longest = sorted(found, key=lambda each: each.first - each.last)[:MAX_TOLD]
-        told = [f" Images {each.first} to {each.last}, {each.cause}: {each.evidence}." for each in longest]
+        longest = sorted(sorted(found, key=lambda each: each.first - each.last)[:MAX_TOLD], key=lambda each: each.first)
+        told = [f" {each.images.capitalize()}, {each.cause}: {each.evidence}." for each in longest]
         return self.drawn(
             name="confidence_over_time",
             title="Confidence over time",
-            caption="The probability that the estimate is right, from the images and the belief; no ground truth is "
-            f"used. {100 * low:.0f} % of the frames are below a half (dotted).{''.join(told)}",
+            caption="The probability that the estimate is right, computed from images and belief without ground truth. "
+            f"{100 * low:.0f} % of the frames are below a half (dotted).{''.join(told)}",
             content=chart.svg(),
             order=12,
         )

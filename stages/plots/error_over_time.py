@@ -24,8 +24,9 @@ class ErrorOverTime(PlotStage):
         return self.drawn(
             name="error_over_time",
             title="Error over time",
-            caption=" ".join(_summary(log, len(logs) > 1) for log in logs) + " Odometry alone starts at each log's "
-            "first true pose and is not aligned. The scale is logarithmic.",
+            caption=" ".join(_summary(log, len(logs) > 1) for log in logs)
+            + " Odometry alone starts at the first true pose and is not aligned. Dotted: the limits of convergence, "
+            "1 m and 20°. The scale is logarithmic.",
             content=_draw(logs),
             order=11,
         )
@@ -69,7 +70,7 @@ def _draw(logs: Sequence[Drive]) -> bytes:
             chart.base.line(np.column_stack([seconds, np.clip(estimate, low, None)]), "blue", 1.6)
             chart.name("estimate", "blue")
             settled = _settled(drive)
-            if settled is not None:
+            if settled:  # at 0 the axis would hide it
                 chart.base.upright(float(seconds[settled]), "green")
                 chart.name("converged", "green")
             if len(logs) > 1:

@@ -163,7 +163,7 @@ def _what_images_show(snapshot: EncodedPanorama | None) -> list[str]:
         return ["Panoramas have forward in the middle and the robot's left on the left."]
     if len(snapshot.headings) == 1:
         return ["The camera's images."]
-    headings = ", ".join(f"{math.degrees(heading):.0f}°" for heading in snapshot.headings)
+    headings = ", ".join(f"{math.degrees(heading):z.0f}°" for heading in snapshot.headings)
     return [f"Windows cut from the camera's images look, from left to right, to {headings} from forward."]
 
 
@@ -283,7 +283,7 @@ def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> li
         facts.append(("error", f"{metres:.3f} m, {degrees:.1f}°"))
     if known(drive.estimate[one]).all():
         x, y, heading = drive.estimate[n]
-        facts.append(("estimate", f"x {x:.3f} m, y {y:.3f} m, {math.degrees(heading):.0f}°"))
+        facts.append(("estimate", f"x {x:z.3f} m, y {y:z.3f} m, {math.degrees(heading):z.0f}°"))
     if isinstance(belief, PlaceBelief):
         place = int(np.argmax(belief.probabilities))
         facts.append(("believed", f"place {place}, {100 * belief.probabilities[place]:.0f} %"))

@@ -35,6 +35,11 @@ class Stretch(Value):
     advice: str
     """Advice: a line to type, or a thing to check; or empty."""
 
+    @property
+    def images(self) -> str:
+        """Its images, in words."""
+        return f"image {self.first}" if self.first == self.last else f"images {self.first} to {self.last}"
+
 
 class Stretches(Value):
     """All stretches of a drive that were not tracked, in order."""

@@ -1,5 +1,7 @@
 """Stated probabilities and ellipses against what came true."""
 
+import re
+
 import numpy as np
 import pytest
 from measured_drives import AT_ORIGIN, Row, figures, made_drive
@@ -21,6 +23,7 @@ from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.stretches import Stretch, Stretches
 
 
 def test_statements_that_come_true_as_often_as_stated_have_no_calibration_error():
@@ -99,6 +102,13 @@ def test_confidence_is_plotted_where_there_is_one():
     figure = ConfidenceOverTime().step(Context("plot"), made([0.9, 0.2, 0.3, 0.1])).plot
     assert figure is not None
     assert "75 %" in figure.caption
+    once = {"start_s": 0.0, "end_s": 0.1, "metres": 0.0, "cause": "a cause", "evidence": "numbers", "advice": ""}
+    found = (Stretch(0, 0, 0, state="searching", **once), Stretch(0, 1, 3, state="unsure", **once))
+    banded = ConfidenceOverTime().step(Context("plot"), made([0.9, 0.2, 0.3, 0.1]), Stretches(found)).plot
+    assert banded is not None
+    assert banded.caption.endswith(" Image 0, a cause: numbers. Images 1 to 3, a cause: numbers.")
+    assert re.findall("<path[^>]*--blue", banded.content.decode()) == []  # a band has this colour, the curve another
+    assert banded.content.count(b">confidence</text>") == 2  # the axis and the legend
     assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).plot is None
 
 

@@ -81,12 +81,24 @@ def test_a_robot_that_is_found_elsewhere_was_carried_or_its_odometry_failed():
         ]
     carried = {"landmarks_away_m": 5.0, "match_away_m": 5.0, "estimate_x": np.where(ALONG < 7.9, ALONG, JUMPED)}
     assert found(confidence=0.1, **carried) == [(30, 39, "unsure", "carried elsewhere")]
+    (told,) = stretches([Log(drive(confidence=0.1, **carried))], 2.5)
+    assert told.evidence == (
+        "image 40 is the first to agree with the estimate again, 5.0 m from where odometry leads from image 29 "
+        "(2.2 m in 5.5 s); images up to 32 show the robot 5.0 m from the estimate, but it can have driven only 0.9 m"
+    )
+    assert told.advice == "check the log for lost images; if it has all of them, the robot was carried"
+    half = np.where(AWAY & (np.arange(N) >= 34), 0.1, 1.0)
+    first, again = stretches([Log(drive(position_error_m=3.0, confidence=half, **carried))], 2.5)
+    assert (first.state, again.state) == ("wrong", "unsure")
+    assert again.evidence == "as in images 30 to 33; by ground truth the estimate was off by 3.00 m (median)"
+    assert not again.advice
     assert found(estimate_x=JUMPED) == [(35, 35, "jumped", "carried elsewhere")]
 
 
 def test_before_the_first_sure_estimate_the_robot_is_searched_for():
     sure = np.arange(N) >= 4
     assert found(confidence=1.0 * sure) == [(0, 3, "searching", "first images")]
+    assert in_short(Log(drive(confidence=1.0 * sure))) == "Sure of the estimate from image 4 to the end (56 images)."
     never = {"confidence": np.zeros(N), "landmarks_away_m": np.full(N, np.nan), "match_lead": np.full(N, 0.1)}
     assert found(**never, match_away_m=np.full(N, 9.0)) == [(0, N - 1, "searching", "another place")]
     for error, cause in ((9.0, "another place"), (0.9, "places that look alike")):  # metres by ground truth, in the map

@@ -56,6 +56,14 @@ def test_every_picture_can_be_drawn_is_small_and_says_what_it_shows(plots):
         assert len(each.caption) > 30
 
 
+def test_errors_name_their_limits_and_mark_no_convergence_at_once():
+    drive = small_run().drive
+    errors = ErrorOverTime().step(CTX, dataclasses.replace(drive, estimate=drive.truth)).plot
+    assert "Dotted: the limits of convergence, 1 m and 20°." in errors.caption
+    assert "Converged at once" in errors.caption
+    assert b">converged</text>" not in errors.content
+
+
 def test_the_same_run_gives_the_same_pictures_byte_for_byte(plots):
     assert [plot.content for plot in all_plots(small_run())] == [plot.content for plot in plots]
 
@@ -94,6 +102,8 @@ def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     facts = dict(slides[4].facts)
     wrong = np.hypot(*(drive.estimate[4] - drive.truth[4])[:2])
     assert facts["error"].startswith(f"{wrong:.3f} m")
+    ahead = dataclasses.replace(drive, estimate=np.tile([1.0, -1e-9, -1e-9], (30, 1)))
+    assert dict(FrameByFrame().step(CTX, ahead, *given).plot.slides[4].facts)["estimate"] == "x 1.000 m, y 0.000 m, 0°"
     assert facts["best match"].startswith("number 7, similarity 90 %, taken")
     assert [words for words, _ in slides[4].photographs] == ["image", "best match in the map"]
     assert slides[4].overlay != slides[5].overlay
