@@ -145,11 +145,38 @@ def _read(name: str) -> dict[str, Any]:
 
 
 def options_with(entry: Entry) -> list[str]:
-    """Lists the options that are this stage: `match=l2`, and those of `options.yaml` that name it."""
+    """Lists the options that are this stage: `match=l2`, and those of `options.yaml` that name it.
+
+    Not `ROLE=NAME` where configuration has the stage only in nodes of other names: its ports are not those of the role.
+    """
     role, _, name = entry.name.partition(".")
     if entry.origin != "built in":  # offered to Hydra under its own name
         return [f"{'' if is_group(role) else '+'}{role}={name}"]
-    own = [f"{role}={name}"] if node_option(role, name) else []
+    nodes, chosen = _uses()
+    fits = role in nodes.get(entry.target, {role}) or (role, name) in chosen
+    own = [f"{role}={name}"] if fits and node_option(role, name) else []
     listed = ((group, name, node) for group, options in _listed().items() for name, node in options.items())
     named = (f"{group}={name}" for group, name, node in listed if node.get("_target_") == entry.target)
     return list(dict.fromkeys([*own, *named]))
+
+
+@functools.cache
+def _uses() -> tuple[dict[str, set[str]], set[tuple[str, str]]]:
+    """The nodes and groups that hold each stage in configuration, and the options that files choose for groups."""
+    nodes: dict[str, set[str]] = {}
+    chosen: set[tuple[str, str]] = set()
+    for group, options in _listed().items():
+        for node in filter(_is_node, options.values()):
+            nodes.setdefault(node["_target_"], set()).add(group)
+    folders = (folder for folder in files(CONF).iterdir() if folder.is_dir() and folder.name != "experiment")
+    contents = [_read(f"{folder.name}/{file.name}") for folder in folders for file in group_files(folder.name)]
+    while contents:
+        content = contents.pop()
+        contents += [value for value in content.values() if isinstance(value, dict)]
+        for name, node in (content.get("nodes") or {}).items():
+            if node and "_target_" in node:
+                nodes.setdefault(node["_target_"], set()).add(name)
+        for item in content.get("defaults") or ():
+            if isinstance(item, dict):
+                chosen |= {(key.rpartition("/")[2], str(option)) for key, option in item.items()}
+    return nodes, chosen

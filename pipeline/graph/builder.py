@@ -243,13 +243,13 @@ class _Builder:
         if node not in self.nodes:
             near = nearest(node, self.nodes, 0.7)
             hint = f"did you mean '{near}.{port}'? " if near else ""
-            hint += f"type '~{where}' if it can do without; " if wanted.optional and not near else ""
+            hint += f"type '~{where}' to leave this input out; " if wanted.optional and not near else ""
             self._problem(where, f"this reads {origin}, and there is no node '{node}'", hint + self._producers(wanted))
             return None
         outputs = self.nodes[node].signature.outputs
         if port not in outputs:
             hint = suggest(port, outputs, f"outputs of {node}", prefix=f"{node}.")
-            hint += f"; type '~{where}' if it can do without" if wanted.optional and not self.prefix else ""
+            hint += f"; type '~{where}' to leave this input out" if wanted.optional and not self.prefix else ""
             self._problem(
                 where,
                 f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'",

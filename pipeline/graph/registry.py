@@ -165,6 +165,8 @@ def _load(module_name: str) -> ModuleType:
         files = {module_name, str(user_path(module_name).resolve())}
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
         what = f"cannot be imported{f', line {lines[-1]}' if lines else ''}: {type(error).__name__}: {error}"
+        if "relative import" in str(error):
+            what += f"; outside of omninav write absolute imports, as `from {BUILT_IN}.… import …`"
         raise UnknownStage(f"module '{module_name}' {what}") from None
 
 

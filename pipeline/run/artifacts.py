@@ -86,7 +86,8 @@ def obtain(
         found = found_value(cache, key, ".omap", seed)
         if found is not None:
             file, value, _ = found
-            reason = "found: the same graph over the same log had made it before"
+            maker = read_header(file)["facts"].get("variant", artifact.variant)
+            reason = f"found: made before by {maker}, the same graph over the same log"
         else:
             own, every = Cache(run.memory / "artifacts"), list(_make(execution, [artifact, *together]))
             kept: tuple[Path, Value] | None = None
@@ -96,7 +97,7 @@ def obtain(
             reason = "made: code, parameters or log are new to the cache"
         _copy(file, target)
     made = {"variant": artifact.variant, "output": artifact.origin, "sha256": artifact_digest(target), "reason": reason}
-    return value, {**made, **read_header(target)["facts"]}
+    return value, {**read_header(target)["facts"], **made}
 
 
 def found_value(cache: Cache, key: str, suffix: str, seed: int) -> tuple[Path, Value, Any] | None:

@@ -164,8 +164,9 @@ def _model(content: dict[str, Any], where: str) -> type[Camera]:
     if name is None:
         raise UnreadableRecording(f"{where}: {_missing(content, Key('', 'projection'), {'': {'projection'}})}")
     if not isinstance(name, str) or name not in models:
-        near = nearest(name, models) if isinstance(name, str) else None
-        hint = f"did you mean '{near}'?" if near else f"one of {', '.join(sorted(models))}"
+        near = nearest(name, models, 0.7) if isinstance(name, str) else None
+        hint = f"did you mean '{near}'? " if near else ""
+        hint += f"one of {', '.join(sorted(models))}; a model of your own is named in OMNINAV_STAGES, or installed"
         broken = "".join(f"; {entry.name}: {entry.problem}" for entry in offered("camera") if entry.problem)
         raise UnreadableRecording(f"{where}: 'projection' cannot be {shown(name)}; {hint}{broken}")
     return models[name]

@@ -180,6 +180,7 @@ def test_a_camera_model_of_a_third_party_is_used_by_name(
     assert "nothing wrong" in checked.stdout
     listed = omninav("stages", f"camera.{name}", check=True).stdout
     assert "A fisheye lens whose images are squeezed." in listed
+    assert way == "file" or "    field  focal_px: float" in listed
 
 
 def test_a_camera_model_that_cannot_be_imported_is_named_where_another_is_missing(
@@ -190,7 +191,8 @@ def test_a_camera_model_that_cannot_be_imported_is_named_where_another_is_missin
     monkeypatch.setenv("OMNINAV_STAGES", "camera.broken=broken.py:Lens")
     refused = omninav("camera", "look", f"log={DRIVE}", "camera=mine.yaml")
     assert refused.returncode == 2
-    assert "'projection' cannot be 'stretched'" in refused.stderr
+    assert "'projection' cannot be 'stretched'; one of cylindrical, " in refused.stderr
+    assert "; a model of your own is named in OMNINAV_STAGES, or installed" in refused.stderr
     assert "camera.broken: module 'broken.py' cannot be imported" in refused.stderr
     assert "broken.py' cannot be imported, line " in refused.stderr
 

@@ -80,7 +80,8 @@ def test_a_map_may_be_made_by_a_graph_of_ones_own(omninav, tmp_path: Path, comma
 def test_check_says_who_reads_the_truth(omninav):
     said = omninav("check", "variant=omniview_mcl", check=True).stdout
     assert "nothing wrong" in said
-    readers = said.partition("ground truth is read by: ")[2].strip().split(", ")
+    assert " before the first tick, " in said
+    readers = said.partition("nodes that read ground truth: ")[2].strip().split(", ")
     drawn = ["frames_plot", "shown", "trajectory_plot"]  # over the built-in world's floor plan
     assert sorted(readers) == sorted(["drive", "prior (only with start=truth)", *drawn])
 
@@ -98,6 +99,8 @@ def test_check_says_who_reads_the_truth(omninav):
         (("evaluation=null",), "to take it out, type '~evaluation'"),
         (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
         (("stages", "matsch"), "did you mean 'omninav stages match'?"),
+        (("stages", "l2"), "no role, stage or value 'l2'; did you mean 'omninav stages match.l2'?"),
+        (("stages", "Particle"), "did you mean 'omninav stages values.belief.Particles'?"),
         (
             ("nodes.match.headngs=72",),
             "SelectiveMatch has no parameter 'headngs'\n      did you mean 'nodes.match.headi",
@@ -114,7 +117,7 @@ def test_check_says_who_reads_the_truth(omninav):
         (("check", "+seed=3"), "it is there already\n      type seed=3"),
         (("check", "wires.sensor.mapp=artifacts.map"), "did you mean 'wires.sensor.map=artifacts.map'?"),
         (("check", "~nodes.length_scale"), "if the node was taken out, type '~wires.length_scale' too"),
-        (("check", "~nodes.length_scale"), "type '~wires.sensor.length_scale' if it can do without"),
+        (("check", "~nodes.length_scale"), "type '~wires.sensor.length_scale' to leave this input out"),
         (("--config-dir=nowhere",), "there is no folder nowhere"),
         (("variant=wander", "log=d.mcap"), "wander does not take it\n      leave log=… out; its `inputs` are: camera"),
         (("variant=topological_nav",), "goal: topological_nav needs it: where to go"),
@@ -173,8 +176,16 @@ def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_sou
         "use  _target_: omninav.stages.match.selective.SelectiveMatch\n",
     ):
         assert part in selective, part
-    assert "use  _target_" in omninav("stages", "metrics.map_size", check=True).stdout
+    for other, wanted in (
+        ("metrics.map_size", []),
+        ("sensor.landmark_pose", []),
+        ("fusion.place_prior", ["prior=places"]),
+    ):
+        uses = re.findall("use  (.+)", omninav("stages", other, check=True).stdout)
+        assert uses[:-1] == wanted
+        assert uses[-1].startswith(f"_target_: omninav.stages.{other}.")
     assert "    field  values: an array of float64 >= 0" in omninav("stages", "Likelihood", check=True).stdout
+    assert "    field  better: " in omninav("stages", "MetricSpec", check=True).stdout
     assert "camera.unified.Unified" in omninav("stages", "camera", check=True).stdout
 
 
@@ -183,7 +194,7 @@ def test_variants_and_doctor_answer(omninav):
     assert re.match(r"omninav +the default: ", said)
     assert "omniview_mcl " in said
     assert "Gross & Koenig 2004" in said
-    assert "0 unusable" in omninav("doctor", check=True).stdout
+    assert "from packages and OMNINAV_STAGES, 0 unusable" in omninav("doctor", check=True).stdout
 
 
 def test_a_word_that_doctor_does_not_read_and_a_report_of_nothing_say_what_to_type(capsys, tmp_path, monkeypatch):

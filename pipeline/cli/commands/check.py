@@ -54,7 +54,7 @@ def command(arguments: list[str]) -> int:
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
     print(f"{prepared.variant}: nothing wrong with it. {sizes}")
-    print(f"{counted(before, 'stage')} before the loop, {tick} in every tick, {after} after it")
+    print(f"{counted(before, 'stage')} before the first tick, {tick} in every tick, {after} after the last one")
     print(_said_of_truth(truth_readers(graph)))
     return 0
 
@@ -135,4 +135,4 @@ def _check_experiment(config: Any, arguments: Sequence[str]) -> int:
 
 def _said_of_truth(readers: list[str]) -> str:
     named = ("prior (only with start=truth)" if name == "prior" else name for name in readers)
-    return f"ground truth is read by: {', '.join(named) or 'no stage'}"
+    return f"nodes that read ground truth: {', '.join(named) or 'none'}"

@@ -19,7 +19,8 @@ def command(arguments: list[str]) -> int:
         print(f"  {name:26} {version(name)}")
     broken = [entry for entry in rows if entry.problem]
     others = [entry for entry in rows if entry.origin != "built in" and not entry.problem]
-    print(f"{len(rows) - len(others) - len(broken)} built-in stages, {len(others)} from others, {len(broken)} unusable")
+    own = f"{len(rows) - len(others) - len(broken)} built-in stages"
+    print(f"{own}, {len(others)} from packages and OMNINAV_STAGES, {len(broken)} unusable")
     for entry in broken:
         print(f"  {entry.name} [{entry.origin}]: {entry.problem}")
     writable = "" if os.access(".", os.W_OK) else ", which cannot be written: change to another folder"

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from omninav.pipeline.cli.config_groups import options_with
 from omninav.pipeline.graph.parameters import Parameter, first_line, read_parameters
 from omninav.pipeline.graph.ports import type_name
-from omninav.pipeline.graph.problems import counted, suggest
+from omninav.pipeline.graph.problems import counted, nearest, suggest
 from omninav.pipeline.graph.registry import BUILT_IN, Entry, UnknownStage, entries, resolve
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.graph.value import VALUE_TYPES
@@ -26,9 +26,14 @@ def command(arguments: list[str]) -> int:
     roles, names = {entry.role for entry in known}, {entry.name for entry in known}
     for word in arguments:
         if word not in roles | names:
-            options, kind = (names, "stages") if "." in word else (roles, "roles")
+            options, kind, what = (
+                (names, "stages", "stage") if "." in word else (roles, "roles", "role, stage or value")
+            )
+            every = {name.rpartition(".")[2]: name for name in names} | classes | {role: role for role in roles}
+            near = None if "." in word else nearest(word, every)
             hint = suggest(word, options, kind, prefix="omninav stages ")
-            print(f"there is no {kind.removesuffix('s')} '{word}'; {hint}", file=sys.stderr)
+            hint = f"did you mean 'omninav stages {every[near]}'?" if near else hint
+            print(f"there is no {what} '{word}'; {hint}", file=sys.stderr)
             return 2
     broken = 0
     for entry in known:
@@ -45,9 +50,9 @@ def command(arguments: list[str]) -> int:
 def _values() -> list[Entry]:
     """The values that omninav itself defines: their modules are imported with those of its stages."""
     return [
-        Entry(target.removeprefix(f"{BUILT_IN}."), target, "built in", first_line(cls))
+        Entry(target.removeprefix(f"{BUILT_IN}.").removeprefix("omninav."), target, "built in", first_line(cls))
         for target, cls in sorted(VALUE_TYPES.items())
-        if target.startswith(f"{BUILT_IN}.") and not inspect.isabstract(cls)
+        if target.startswith("omninav.") and not inspect.isabstract(cls)
     ]
 
 
@@ -62,7 +67,7 @@ def _described(entry: Entry) -> Iterator[str]:
         yield f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n"
         return
     yield f"{entry.name}  [{entry.origin}]  {entry.summary}"
-    if value := VALUE_TYPES.get(entry.target):
+    if value := VALUE_TYPES.get(entry.target.replace(":", ".")):
         yield from _fields(value)
         return
     try:

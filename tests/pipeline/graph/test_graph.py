@@ -135,7 +135,7 @@ WRONG: dict[str, tuple[dict, dict, list[str]]] = {
     "an unknown node that an input can do without": (
         {"c": "Constant", "sum": "Add"},
         {"sum": {"number": "c.number", "other": "wheels.number"}},
-        ["no node 'wheels'\n    type '~wires.sum.other' if it can do without; outputs of type Number: c.number, sum"],
+        ["no node 'wheels'\n    type '~wires.sum.other' to leave this input out; outputs of type Number: c.number"],
     ),
     "an unknown node like one that is there, of which an input can do without": (
         {"start": "Constant", "sum": "Add"},

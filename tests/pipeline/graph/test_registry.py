@@ -135,13 +135,16 @@ def test_two_files_of_one_name_are_a_problem(stage_file: Path, monkeypatch: pyte
 
 
 def test_an_entry_that_is_not_understood_says_what_to_write_and_a_missing_file_is_named(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
     monkeypatch.setenv("OMNINAV_STAGES", "my_stage.py, lone=toys:Scale, match.a=toys.Scale, match.scale=toys:Scale")
     *wrong, right = plugins()
     assert [entry.name for entry in wrong] == ["my_stage.py", "lone=toys:Scale", "match.a=toys.Scale"]
     assert all("write role.name=package.module:Class" in entry.problem for entry in wrong)
     assert (right.name, right.target, right.problem) == ("match.scale", "toys:Scale", "")
+    (tmp_path / "copied.py").write_text("from .reference_match import ReferenceMatch\n")
+    with pytest.raises(UnknownStage, match=r"outside of omninav write absolute imports, as `from omninav\.stages\."):
+        resolve(f"{tmp_path / 'copied.py'}:Copied")
     with pytest.raises(UnknownStage, match=r"there is no file .*nothing\.py"):
         resolve("nothing.py:Twice")
 

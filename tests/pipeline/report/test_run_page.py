@@ -210,7 +210,7 @@ def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
     ]
     assert rows[0]["meaning"] == "Readings that are averaged."
     said = text_of(report(tmp_path, graph=graph))
-    assert "Parameters (1 of 2 is not the default)" in said
+    assert "Parameters (1 of 2 differs from the stage's own default)" in said
     changed, every = said.partition("Parameters (")[2].split("All 2")
     assert "nodes.smooth.window 9 5 Readings" in changed
     assert "robust" not in changed

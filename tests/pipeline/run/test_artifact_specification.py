@@ -88,6 +88,11 @@ def test_what_one_graph_gives_is_made_in_one_run_and_each_is_found_by_itself(tmp
     alone = {**two_of_one_graph(tmp_path / "alone"), "wires": {"reader": {"number": "artifacts.map"}}}
     del alone["artifacts"]["album"]
     assert sum_of(ended(alone)) == sum_of(made)
+    alone["artifacts"]["map"]["variant"] = "another"
+    alone["cache"] = str(tmp_path / "cache")
+    found = ended(alone).manifest["artifacts"]["map"]
+    assert found["variant"] == "another"
+    assert found["reason"] == "found: made before by toy, the same graph over the same log"
 
 
 @pytest.mark.parametrize("damage", ["a bit", "another's content", "an artifact that does not fit"])
