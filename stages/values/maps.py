@@ -22,8 +22,8 @@ class ReferenceGraph(GrowableArrays, Value):
     drive. `pose_source`: where the poses come from. `landmarks`: points that the references see, or None. Grows
     in place by `insert` and `join`.
 
-    The features of a map that is larger than 64 MB stay in its file: take those that are needed, `features[rows]`
-    (indices, a slice or a mask; a plain array), and never all of them. A map that grows is in memory.
+    The features of a map that is larger than 64 MB stay in its file: `features[rows]` (indices, a slice or a mask)
+    reads some as a plain array; `features[:]` reads all, for a stage that needs each. A map that grows is in memory.
     """
 
     in_place = True

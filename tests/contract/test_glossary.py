@@ -47,7 +47,7 @@ def test_every_title_that_a_stage_states_is_in_the_glossary():
     titles = {text_of(given["title"]) for _, given in described() if "title" in given}
     assert len(titles) > 100
     missing = {each for each in titles if not re.fullmatch(f"[{HOLE}, ]+", each)} - explained()
-    assert not missing, "\n".join(sorted(missing))
+    assert not missing, f"explain in a table below '{HEAD}' of docs/glossary.md:\n" + "\n".join(sorted(missing))
 
 
 def test_every_name_that_is_shown_as_it_is_stands_in_the_glossary():

@@ -71,14 +71,17 @@ def test_no_replaced_word_names_anything():
         for name in own_names(path)
         if name.lstrip("_") in REPLACED or name.lstrip("_").startswith(PREFIXES)
     }
-    assert not found, "\n".join(sorted(found))
+    assert not found, "another word is used for these, see docs/glossary.md:\n" + "\n".join(sorted(found))
 
 
 def test_no_docstring_begins_with_what_of_where_who_or_how():
     begins = re.compile(r'^\s*"""(What|Of|Where|Who|Whoever|How)\b.*', re.MULTILINE)
     files = [path for folder in ("pipeline", "stages", "omninav") for path in (ROOT / folder).rglob("*.py")]
     assert len(files) > 300
+    files += [ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]  # code to be copied
     found = {
         f"{path.relative_to(ROOT)}: {hit[0].strip()}" for path in files for hit in begins.finditer(path.read_text())
     }
-    assert not found, "\n".join(sorted(found))
+    assert not found, "begin docstrings with a verb or the thing itself, as CONTRIBUTING.md says:\n" + "\n".join(
+        sorted(found)
+    )
