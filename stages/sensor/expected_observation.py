@@ -163,8 +163,8 @@ class ExpectedObservation(NearReferences):
     ) -> NearReferences.Out:
         if similarities.exponent is None and similarities.colour_scale is None:
             raise BadInput(
-                "sensor: expected_observation compares as the match does, and does not know how this one does; use "
-                "match=selective, match=histogram_intersection or match=l2, or sensor=near_references"
+                "sensor: expected_observation needs a match that defines `exponent_and_scale`, as this one does not; "
+                "use match=selective, match=histogram_intersection or match=l2, or sensor=near_references"
             )
         view, histograms = features.values, isinstance(features, SegmentHistograms)
         how = similarities.exponent, similarities.colour_scale or MAX_COLOUR_DISTANCE

@@ -19,9 +19,9 @@ MODE_RADIUS = (1.0, math.radians(30.0))
 class PoseEstimate(Value):
     """A pose to act upon: the belief's heaviest mode, with the whole belief's mean beside it.
 
-    `covariance` (3, 3) is the mode's own, over (x, y, heading) in m, m, rad; `mode_weight` is its share of the
-    belief in [0, 1]; `mean` is the mean pose of the whole belief (circular in heading). `place`: which place of a
-    topological map that mode is; None where the map has no places.
+    `covariance` (3, 3) is the mode's, or what `WidenCovariance` made of it, over (x, y, heading) in m, m, rad;
+    `mode_weight` is its share of the belief in [0, 1]; `mean` is the mean pose of the whole belief (circular in
+    heading). `place`: which place of a topological map that mode is; None where the map has no places.
     """
 
     pose: Pose

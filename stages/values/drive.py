@@ -33,7 +33,7 @@ class Drive(Value):
     estimate: Array
     """The belief's heaviest mode."""
     covariance: Array
-    """Covariance of that mode (N, 3, 3)."""
+    """Covariance of that mode (N, 3, 3), widened where the graph has `WidenCovariance`."""
     mode_weight: Array
     """Share of that mode in the belief; 0 where there is none."""
     mean: Array

@@ -46,6 +46,9 @@ def test_the_first_word_of_two_explains_all_that_it_begins(capsys):
 
 def test_help_answers_and_hydras_own_flags_are_intact(omninav):
     assert "omninav resume runs/latest" in omninav("--help", check=True).stdout
+    first, *_, live = (omninav(*words, "--help", check=True).stdout for words in ([], ["live"]))
+    assert "transport=dds|rclpy|zenoh" in first
+    assert all(name in live for name in ("dds", "rclpy", "zenoh"))
     shown = omninav("--cfg", "job", "--package", "wires.fusion", "match=l2", check=True).stdout
     assert "likelihood: sensor.likelihood" in shown
     assert "--multirun" in omninav("--hydra-help", check=True).stdout

@@ -56,7 +56,7 @@ def test_a_recorded_log_is_read_and_its_configuration_says_nothing_of_worlds():
         ((*LOGS, "route=kitchen"), "route: nothing in this run reads it"),
         ((*LOGS, "world=office"), "world: nothing in this run reads it"),
         (("source=live", "publish=ros2", "log=live", "world=office"), "world: nothing in this run reads it"),
-        (("camera=camera.yaml",), "camera: without log=… nothing reads it"),
+        (("camera=camera.yaml",), "that of the simulated world is world_camera=… (or world.camera)"),
         (("speed=0.4", "rate=2"), "speed: without log=… nothing reads it"),
         (("variant=retrieval_mcl", "forgetting=none"), "forgetting: nothing in this run reads it"),
         (("nodes.source.layout_folders=[here]",), "SimulatedSource has no parameter 'layout_folders'"),

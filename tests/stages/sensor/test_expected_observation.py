@@ -118,7 +118,7 @@ def test_whatever_compares_otherwise_is_refused() -> None:
     stage, ctx, seen = ExpectedObservation(), Context("sensor"), SegmentHistograms(FEATURES[4])
     stage.setup(ctx)
     alike = CosineMatch().step(Context("match"), seen, MAP).similarities
-    with pytest.raises(BadInput, match="use match=selective"):
+    with pytest.raises(BadInput, match="defines `exponent_and_scale`, as this one does not; use match=selective"):
         stage.step(ctx, alike, seen, even(REFERENCES), MAP)
 
 
