@@ -168,6 +168,7 @@ def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_sou
     lines = omninav("stages", "match", check=True).stdout.strip().split("\n")
     assert len(lines) > 5
     assert all(re.match(r"match\.\w+ +\S", line) for line in lines)
+    assert re.search(r"^live\.publish +PublishBelief: \S", omninav("stages", "live", check=True).stdout, re.MULTILINE)
     selective = omninav("stages", "match.selective", check=True).stdout
     assert omninav("stages", "SelectiveMatch", check=True).stdout == selective
     for part in (
@@ -242,7 +243,9 @@ def test_compare_and_report_print_tables(omninav, demo: Path, tmp_path: Path):
     said = omninav("compare", str(demo), str(demo), check=True).stdout
     assert "position error" in said.lower()
     assert "report.html" in omninav("report", str(demo), check=True).stdout
-    assert "Sure of the estimate" in omninav("explain", str(demo), check=True).stdout
+    explained = omninav("explain", str(demo), check=True)
+    assert "Sure of the estimate" in explained.stdout
+    assert "doing" not in explained.stderr
     assert 'id="confidence_over_time"' in (demo / "report.html").read_text()
     assert "What happened, stretch by stretch" in (demo / "report.html").read_text()
     assert omninav("compare", str(demo)).returncode == 2

@@ -29,19 +29,19 @@ def command(arguments: list[str]) -> int:
             options, kind, what = (
                 (names, "stages", "stage") if "." in word else (roles, "roles", "role, stage or value")
             )
-            every = {name.rpartition(".")[2]: name for name in names} | classes | {role: role for role in roles}
-            near = None if "." in word else nearest(word, every)
+            last = {name.rpartition(".")[2]: name for name in names} | classes | {role: role for role in roles}
+            near = None if "." in word else nearest(word, last)
             hint = suggest(word, options, kind, prefix="omninav stages ")
-            hint = f"did you mean 'omninav stages {every[near]}'?" if near else hint
+            hint = f"did you mean 'omninav stages {last[near]}'?" if near else hint
             print(f"there is no {what} '{word}'; {hint}", file=sys.stderr)
             return 2
-    broken = 0
+    broken, every = 0, [entry.name for entry in known]
     for entry in known:
         listed = entry.role in arguments and (entry in stages or entry.role not in of_stages)
         if arguments and not listed and entry.name not in arguments:
             continue
         broken += bool(entry.problem)
-        print("\n".join(_described(entry) if entry.name in arguments else _listed(entry)))
+        print("\n".join(_described(entry) if entry.name in arguments else _listed(entry, every.count(entry.name) > 1)))
     if broken:
         print(f"{counted(broken, 'plugin')} cannot be loaded; all other stages can be used", file=sys.stderr)
     return 0
@@ -56,8 +56,10 @@ def _values() -> list[Entry]:
     ]
 
 
-def _listed(entry: Entry) -> list[str]:
+def _listed(entry: Entry, one_of_several: bool) -> list[str]:
+    """The line of a stage, with its class where a file holds several."""
     origin = "" if entry.origin == "built in" else f"[{entry.origin}] "
+    origin += f"{re.split('[.:]', entry.target)[-1]}: " if one_of_several else ""
     what = f"cannot be used: {entry.problem}" if entry.problem else entry.summary
     return [f"{entry.name:38} {origin}{what}"]
 

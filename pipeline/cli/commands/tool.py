@@ -29,7 +29,6 @@ def command(arguments: list[str]) -> int:
 def run_tool(name: str, words: Sequence[str]) -> None:
     """Run a tool with the arguments that words give it. Raises `StageFailed` for what no reader has put into words."""
     with Progress() as progress, compile_notice(progress.say):
-        progress.say("reading the arguments")
         tool = tool_from(tool_class(name), words)
         ctx = Context(name)
         ctx.status = progress.say
