@@ -93,6 +93,8 @@ def test_a_robot_that_is_found_elsewhere_was_carried_or_its_odometry_failed():
     assert again.evidence == "as in images 30 to 33; by ground truth the estimate was off by 3.00 m (median)"
     assert not again.advice
     assert found(estimate_x=JUMPED) == [(35, 35, "jumped", "carried elsewhere")]
+    moved = ALONG + np.where(np.arange(N) >= 31, 20.0, 0.0)  # the estimate was there before it was sure
+    assert found(confidence=0.1, landmarks_away_m=0.1, estimate_x=moved) == [(30, 39, "unsure", "carried elsewhere")]
 
 
 def test_before_the_first_sure_estimate_the_robot_is_searched_for():
