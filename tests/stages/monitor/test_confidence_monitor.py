@@ -376,6 +376,10 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     # It is rather wrong than right, and wrong in the next image too.
     assert elsewhere == pytest.approx((0.1 + 0.9 * 0.2) * math.log(0.9))
     assert again == pytest.approx(0.1 * few)
+    for odds, probability, most in ((0.0, 0.1, 3.9), (5.0, 0.1, 3.9), (0.0, 0.49, 3.9), (0.0, 0.51, 7.7)):
+        for _ in range(100):  # one wall misleads all images that show it
+            odds = by_landmarks(odds, fix(0.0, probability), 1.0, here, gate, 0.5, 2.0)[0]
+        assert odds == pytest.approx(most, abs=0.1)
     once = by_landmarks(4.0, None, 1.0, here, gate, 1.0, 2.0)[0]
     kept = math.log(0.98105 / 0.01895)  # of 0.98201, less a 500th of what is above a half
     assert once == pytest.approx(kept + 0.2 * math.log(0.5 / 0.95), abs=1e-3)
