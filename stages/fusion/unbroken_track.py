@@ -41,7 +41,8 @@ DRIFT, TURN_DRIFT = 0.25, math.radians(5.0)
 
 
 class UnbrokenTrackState(State):
-    """The pose (3,) that landmarks confirmed last, carried by odometry, and the path on which they did (m).
+    """The pose (3,) that landmarks confirmed last, carried by odometry, and the path on which they did (m), from the
+    first such pose on; NaN before it.
 
     `since`: way since then, on which the robot may have been carried as far as `carried` and turned by `turned` (rad);
     `against`: way on which landmarks spoke against the track, and `elsewhere`: on which they confirmed another one (m).
@@ -49,7 +50,7 @@ class UnbrokenTrackState(State):
     (N, 3) and `descriptors` (N, D) are the last image's, and `moved` (3,) is the motion since.
     """
 
-    pose: Array = field(default_factory=lambda: np.zeros(3))
+    pose: Array = field(default_factory=lambda: np.full(3, np.nan))
     confirmed: float = 0.0
     since: float = 0.0
     carried: float = 0.0
@@ -64,6 +65,10 @@ class UnbrokenTrackState(State):
         """Go on from a pose (3,) that was confirmed over a path of this length (m)."""
         self.pose, self.confirmed = pose.copy(), length
         self.since, self.carried, self.turned, self.against, self.elsewhere = 0.0, 0.0, 0.0, 0.0, 0.0
+
+    def lose(self) -> None:
+        """Forget the track; `against` it and `since` go on."""
+        self.pose, self.confirmed, self.carried, self.turned = np.full(3, np.nan), 0.0, 0.0, 0.0
 
     def leads_to(self, pose: Array) -> bool:
         """Tells whether a robot that was on the track may be at a pose (3,) by now."""
@@ -112,7 +117,7 @@ class UnbrokenTrack(Stage):
             state.pose, state.moved = compose(state.pose, moved), compose(state.moved, moved)
             state.since += math.hypot(motion.x, motion.y)
         if state.since > MAX_SINCE * unit:
-            state.confirmed = 0.0
+            state.lose()
         left_out, surely = np.zeros(0 if fix is None else len(fix), np.bool_), False
         if features is not None:
             landmarks = None if map is None else map.landmarks
@@ -144,8 +149,9 @@ class UnbrokenTrack(Stage):
         poses = np.empty((0, 3)) if fix is None else fix.poses
         shares = np.array([share_within(belief.poses, belief.weights, pose, *NEAR) for pose in poses])
         agrees = fix is not None and len(poses) and fix.probabilities[0] >= SURE and shares[0] > BELIEVED
-        if agrees and (not state.confirmed or state.leads_to(poses[0])):
-            state.confirm(poses[0], min(state.confirmed + min(state.since, MAX_STEP * unit), MAX_CONFIRMED * unit))
+        if agrees and ((leads := state.leads_to(poses[0])) or not state.confirmed):
+            step = min(state.since, MAX_STEP * unit) if leads else 0.0  # one pose alone is no path
+            state.confirm(poses[0], min(state.confirmed + step, MAX_CONFIRMED * unit))
             return np.zeros(len(poses), np.bool_), False
         how = carried(before, now, camera_step(moved, mount)) if len(before[0]) else Carried(math.inf)
         state.carried = max(state.carried, how.at_most)
@@ -153,7 +159,7 @@ class UnbrokenTrack(Stage):
         # a narrow view turns out of what it saw
         surely = how.surely and driven < FREQUENT[0] and abs(float(moved[2])) < FREQUENT[1]
         if math.isinf(state.carried):
-            state.confirmed, state.carried, state.turned = 0.0, 0.0, 0.0
+            state.lose()
         if agrees:  # the belief gave way, and may have been right before
             state.elsewhere += driven
             if state.elsewhere >= state.confirmed:

@@ -126,6 +126,21 @@ def test_a_track_that_was_never_sure_rules_nothing_out():
     assert all(each.fix is not None and not each.track.unbroken for each in driven(10, probability=0.94))
 
 
+@pytest.mark.parametrize("confirmed", [1, 3])
+def test_one_sure_pose_after_a_way_without_rules_nothing_out_and_three_do(confirmed: int):
+    """It may be of the next shelf, and a robot that then stands has no way on which others could speak against it."""
+    state, stage, ctx = UnbrokenTrackState(), UnbrokenTrack(), Context("track", np.random.default_rng(0))
+    poses = np.column_stack([0.1 * np.arange(20.0), np.zeros((20, 2))])
+    poses[12:] = poses[12]
+    fixes = [None] * 10 + [fix_at(poses[10 + n]) for n in range(confirmed)]
+    fixes += [fix_at(poses[12] + (0.9, 0.0, 0.0), 0.8)] * (20 - len(fixes))
+    out = []
+    for n, image in enumerate(seen_from(poses)):
+        motion = Motion(*between(poses[n - 1], poses[n]).tolist()) if n else None
+        out.append(stage.step(ctx, state, even(poses[[n]]), image, fixes[n], motion, LengthScale(0.5)))
+    assert [each.fix is not None for each in out[13:]] == [confirmed == 1] * 7
+
+
 def test_a_track_leads_as_far_off_as_odometry_may_drift_and_the_robot_may_have_been_carried():
     # After 4 m: 0.3 + 0.5 + 4 / 4 m, and 30 + 4 x 5 degrees.
     state = UnbrokenTrackState(pose=np.array([1.0, 2.0, math.pi]), confirmed=9.0, since=4.0, carried=0.5)
