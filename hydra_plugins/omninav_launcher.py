@@ -8,7 +8,7 @@ from hydra.core.config_store import ConfigStore
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 NAME = "omninav"
 
@@ -31,7 +31,7 @@ class OmninavLauncher(Launcher):
         from omninav.pipeline.cli.sweep_jobs import run_sweep  # other programs of Hydra's load this file too
 
         sweep = Path(str(self._config.hydra.sweep.dir)).absolute()
-        words = [str(word) for word in self._config.hydra.overrides.hydra]
+        words: Any = OmegaConf.to_container(self._config.hydra.overrides.hydra, resolve=False)  # each job's are its own
         ended = run_sweep(sweep, self._config.executor, words, self._folders, job_overrides, initial_job_idx)
         return [_returned(overrides, objective) for overrides, objective in ended]
 

@@ -1,5 +1,6 @@
 """The jobs of a sweep that `executor=…` runs: how they are given to it, and how one of them runs there."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -90,6 +91,7 @@ def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
         with read_write(config.hydra.runtime):
             config.hydra.runtime.output_dir = str(folder)
         HydraConfig.instance().set_config(config)
+        config = copy.deepcopy(config)  # what HydraConfig holds resolves within the one that was set
         with read_write(config), open_dict(config):
             del config["hydra"]
         (Path(given["sweep"]) / LOGS / f"{given['number']}.folder").write_text(str(folder), encoding="utf-8")

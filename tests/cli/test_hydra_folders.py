@@ -70,13 +70,16 @@ def test_a_run_of_its_own_name_has_hydras_files_too_and_only_settings_that_are_r
     assert not {"world", "route", "topics", "tour"} & set(config)
 
 
-def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_path: Path):
-    words = ("hydra.sweep.dir=swept", "hydra.sweep.subdir=seed_${seed}", "seed=0,1")
+@pytest.mark.parametrize("executor", [(), ("executor.workers=1",)])
+@pytest.mark.parametrize(("subdir", "name"), [("at_${seed}", "at_{}"), ("${hydra.job.override_dirname}", "seed={}")])
+def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_path, executor, subdir: str, name: str):
+    words = ("hydra.sweep.dir=swept", f"hydra.sweep.subdir={subdir}", "seed=0,1", *executor)
     toy("--config-dir=mine", "-m", *words, check=True)
     for seed in (0, 1):
-        manifest = json.loads((tmp_path / "swept" / f"seed_{seed}" / "manifest.json").read_text())
+        (folder,) = (tmp_path / "swept").glob(f"{name.format(seed)}*")
+        manifest = json.loads((folder / "manifest.json").read_text())
         assert (manifest["status"], manifest["seed"]) == ("complete", seed)
-        assert (tmp_path / "swept" / f"seed_{seed}" / ".hydra" / "config.yaml").exists()
+        assert (folder / ".hydra" / "config.yaml").exists()
     page = (tmp_path / "swept" / "sweep.html").read_text()
     assert "2 jobs: 2 complete" in page
     assert not list(tmp_path.glob("runs/[!.]*"))
