@@ -1,6 +1,7 @@
 """Executors by Dask: a scheduler that runs already, or workers that a batch system such as Slurm starts."""
 
 import logging
+import shutil
 import sys
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -61,6 +62,8 @@ def dask_cluster(settings: ExecutorSettings) -> DaskExecutor:
 
 def slurm(settings: ExecutorSettings) -> DaskExecutor:
     """`executor=slurm`: each worker is a batch job of one core; one that dies is started again."""
+    if shutil.which("sbatch") is None:
+        raise BadInput("executor=slurm: there is no command 'sbatch' here; type this on a login node of the cluster")
     from dask_jobqueue import SLURMCluster
 
     options = own_options(settings, ("partition", "time", "account", "interface"))

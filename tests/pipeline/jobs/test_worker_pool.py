@@ -229,6 +229,13 @@ def test_what_is_no_executor_is_named(monkeypatch: pytest.MonkeyPatch):
         executor_of(ExecutorSettings("mine"))
 
 
+def test_slurm_is_refused_at_once_where_its_command_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BadInput, match="executor=slurm: there is no command 'sbatch' here"):
+        executor_of(ExecutorSettings("slurm"))
+
+
 def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
 
