@@ -279,7 +279,7 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
     if gone is not None:
         yield Problem(gone, "this setting is gone", replaced()[gone])
         return
-    if word.is_add():
+    if word.is_add() or word.is_force_add():
         if name is None and not word.is_force_add() and not isinstance(inside, Mapping):
             yield Problem(path, "it is there already", f"type {path}={value}")
         return

@@ -26,6 +26,12 @@ def test_an_option_that_a_file_chooses_and_nobody_offers_is_named_with_what_offe
     assert problem.hint.startswith("a stage of your own is offered by OMNINAV_STAGES=match.mine=FILE.py:CLASS; ")
 
 
+def test_a_change_of_an_artifacts_graph_is_not_blamed_for_another_word():
+    words = with_unlisted_parameters(["+artifacts.map.nodes.source.stop=40"], ())
+    (found,) = invalid_overrides(words, (), "Error merging override hydra.sweeper.n_trials=abc")
+    assert found.what == "Error merging override hydra.sweeper.n_trials=abc"
+
+
 def test_an_unknown_option_comes_before_what_depends_on_it():
     found = invalid_overrides(["match=l3", "nodes.match.nothing=1"], (), "")
     assert [problem.where for problem in found] == ["match"]
