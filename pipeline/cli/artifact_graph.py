@@ -110,6 +110,8 @@ def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any
 
 def is_repeatable(node: Any) -> bool:
     """Tells whether a node may be in an artifact's graph too: all may but sources that give their ticks once."""
+    if not isinstance(node, Mapping):  # reported by `build`
+        return False
     try:
         return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
     except UnknownStage:  # reported by `build`

@@ -51,7 +51,7 @@ def decisive_settings() -> set[str]:
 
 def _node(config: Any, group: str) -> dict[str, Any]:
     node = (config.get("nodes") or {}).get(group)
-    plain: Any = {} if node is None else OmegaConf.to_container(node, resolve=False)
+    plain: Any = {} if not isinstance(node, Mapping) else OmegaConf.to_container(node, resolve=False)
     return dict(plain)
 
 

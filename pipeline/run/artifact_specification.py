@@ -68,7 +68,7 @@ def read_specifications(config: Mapping[str, Any]) -> dict[str, ArtifactSpecific
         if spec.together_with is not None and spec.together_with not in others:
             hint = suggest(spec.together_with, others, "artifacts")
             problems.append(Problem(f"{where}.together_with", f"there is no artifact '{spec.together_with}'", hint))
-        nodes = [str(node) for node in config.get("nodes") or {}]
+        nodes = [str(node) for node, content in (config.get("nodes") or {}).items() if content is not None]
         for key, names in (("inherit", spec.inherit), ("must_match", spec.must_match)):
             for node in names:
                 if node not in nodes:

@@ -32,6 +32,19 @@ def test_what_the_first_image_shows_to_be_wrong_is_found(settings, what, tmp_pat
         assert what in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("nodes.features=null", "artifacts.map.inherit: there is no node 'features'"),
+        ("nodes.features=5", "nodes.features: a node needs `_target_`"),
+        ("nodes.source=5", "nodes.source: a node needs `_target_`"),
+    ],
+)
+def test_a_node_that_is_taken_out_or_is_none_is_said_to_be_missed(word: str, said: str, capsys) -> None:
+    assert main(["check", "variant=omniview_mcl", word]) == 2
+    assert said in capsys.readouterr().err
+
+
 def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "executor.workers=-1"]) == 2
