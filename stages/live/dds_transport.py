@@ -34,7 +34,7 @@ class DdsTransport(Transport):
     def __init__(self, domain: int) -> None:
         super().__init__()
         from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
-        from cyclonedds.core import DDSException, WaitSet
+        from cyclonedds.core import DDSException, InstanceState, ReadCondition, SampleState, ViewState, WaitSet
         from cyclonedds.domain import Domain, DomainParticipant
 
         settings = ",".join(filter(None, (os.environ.get("CYCLONEDDS_URI", ""), _settings())))
@@ -48,6 +48,7 @@ class DdsTransport(Transport):
         self._writers: dict[str, Any] = {}
         self._types: dict[str, str] = {}
         self._offers = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+        self._alive = ReadCondition(self._offers, SampleState.Any | ViewState.Any | InstanceState.Alive)
         self._waitset = WaitSet(self._participant)
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._receive, name="dds", daemon=True)
@@ -81,7 +82,7 @@ class DdsTransport(Transport):
 
     def offered(self) -> dict[str, str]:
         found = {}
-        for sample in self._offers.read(N=10_000):
+        for sample in self._offers.read(N=10_000, condition=self._alive):  # not of those that have left
             if getattr(sample, "participant_key", None) == self._participant.guid:
                 continue
             topic, kind = getattr(sample, "topic_name", None), str(getattr(sample, "type_name", "")).split("::")

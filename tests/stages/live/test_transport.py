@@ -112,6 +112,22 @@ def test_discovery_reaches_as_far_as_ros_says(domain: int, monkeypatch: pytest.M
     assert subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S, check=True).stdout.strip() == seen
 
 
+SPEAK = """
+import sys
+from omninav.stages.live.transport import connect
+connect("dds").publish("/hello", "std_msgs/msg/String", bytes(12))
+sys.stdin.read()
+"""
+
+
+def test_a_publisher_that_has_left_offers_nothing(domain: int):
+    transport = connect("dds")
+    with subprocess.Popen([sys.executable, "-c", SPEAK], stdin=subprocess.PIPE) as other:
+        until(lambda: "/hello" in transport.offered())
+        other.communicate()
+    until(lambda: "/hello" not in transport.offered())
+
+
 def test_without_limits_discovery_is_cyclones_own(monkeypatch: pytest.MonkeyPatch):
     for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"):
         monkeypatch.delenv(name, raising=False)
