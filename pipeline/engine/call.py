@@ -2,10 +2,14 @@
 
 import inspect
 import math
+import pickle
+import random
 import time
 from array import array
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 from omninav.pipeline.files import DISK
 from omninav.pipeline.graph.contents import wrong_output
@@ -22,7 +26,7 @@ VALIDATED_TICKS = 10
 a NaN may come late."""
 GUARDED_EVERY = 8
 """Every so many calls of another's stage, and in its first `VALIDATED_TICKS`, its inputs and what it gave before must
-be as they were; encoding them takes longer than a small stage."""
+be as they were, and the process' generators of random numbers; to look takes longer than a small stage."""
 
 
 class StageFailed(Exception):
@@ -98,6 +102,7 @@ class Call:
         guards = self.foreign and (called < VALIDATED_TICKS or called % GUARDED_EVERY == 0)
         guarded = self.guarded + self.guarded_once if guards else []
         before = self._bytes([given[name] for name in guarded]) if guarded else b""
+        generators = _generators() if guards else b""
         start = time.perf_counter()
         try:
             out = self.step(self.ctx, **given)
@@ -106,6 +111,12 @@ class Call:
         except (Exception, SystemExit) as error:
             raise self._failed(error, self._place()) from error
         self.times.append(time.perf_counter() - start)
+        if guards and _generators() != generators:
+            self.ctx.used_rng = True  # the cache keeps what it gives for this seed alone
+            self.ctx.warn(
+                f"stage '{self.node.name}' ({self.node.target}) draws random numbers from numpy.random or random, "
+                "which the run's seed does not decide: take them from ctx.rng"
+            )
         if guarded and self._bytes([given[name] for name in guarded]) != before:
             raise StageFailed(f"{self._place()}: it changes its inputs, which others read too; write to a copy")
         if self.outputs and out is not None and not isinstance(out, Outputs):
@@ -150,3 +161,8 @@ class Call:
         tick = self.ctx.tick
         when = f" at tick {tick.index} (log {tick.log}, frame {tick.frame})" if self.node.lifetime == "tick" else ""
         return f"stage '{self.node.name}' ({self.node.target}) failed{when}"
+
+
+def _generators() -> bytes:
+    """The states of the random numbers that a process shares."""
+    return pickle.dumps((random.getstate(), np.random.get_state()))

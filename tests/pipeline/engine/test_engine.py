@@ -1,7 +1,9 @@
 """The engine: lifetimes, delays, absence, logs in a row, and going on from a checkpoint."""
 
 import math
+import random
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -287,6 +289,16 @@ def test_a_prefix_that_drew_is_replayed_for_its_seed_alone(tmp_path: Path):
     found = [cached_run(tmp_path / str(n), cache, seed, scale="Noise") for n, seed in enumerate((0, 1, 0))]
     assert [replayed for _, replayed in found] == [False, False, True]
     assert found[0][0] == found[2][0] != found[1][0]
+
+
+@pytest.mark.parametrize("draw", [np.random.rand, random.random])
+def test_a_stage_that_draws_from_others_than_its_own_generator_is_named_and_kept_for_its_seed_alone(draw: Callable):
+    graph = graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}})
+    call = Engine(graph).calls["scale"]
+    call.step = lambda ctx, number: draw() and None
+    call.run({"source.number": Number(1.0)})
+    assert "stage 'scale' (toys.Scale) draws random numbers" in call.ctx.warnings[0]
+    assert call.ctx.used_rng
 
 
 def test_runs_that_differ_in_their_seed_share_what_follows_from_artifacts_but_not_from_draws():
