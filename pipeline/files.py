@@ -33,7 +33,7 @@ class Taken(Exception):
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file under a temporary name and rename it, so that no reader ever sees half of it."""
     with whole_file(path) as part:
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
+        part.write_bytes(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
 
 
 @contextmanager

@@ -21,3 +21,8 @@ def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_
     assert not left.exists()
     assert all(file.exists() for file in others)
     assert (tmp_path / "out.mcap").read_bytes() == b"whole"
+
+
+def test_what_no_text_can_hold_is_written_as_its_number(tmp_path: Path) -> None:
+    write_whole(tmp_path / "page.html", "a file named \udcff")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == "a file named \\udcff"
