@@ -71,17 +71,25 @@ class Call:
 
     def set_up(self) -> None:
         """Set up the stage. Raises `StageFailed` with its name for whatever it raises, but `BadInput`."""
-        if self.foreign and self.state is not None:
-            try:
-                encode(encode_state(self.state))
-            except BadEncoding as error:
-                raise StageFailed(f"stage '{self.node.name}' ({self.node.target}): its State: {error}") from None
+        if self.foreign:
+            self.check_state()
         try:
             self.node.stage.setup(self.ctx)
         except BadInput:
             raise
         except (Exception, SystemExit) as error:
             raise self._failed(error, f"stage '{self.node.name}' ({self.node.target}) failed in setup") from error
+
+    def check_state(self) -> None:
+        """Raise `StageFailed` for the first field of the stage's State that no checkpoint can hold."""
+        for name, value in encode_state(self.state).items() if self.state is not None else ():
+            try:
+                encode(value)
+            except BadEncoding as error:
+                raise StageFailed(
+                    f"stage '{self.node.name}' ({self.node.target}): field '{name}' of its State: {error}; a "
+                    "State holds numbers, texts, arrays, Values and lists of them: make all else in setup"
+                ) from None
 
     def run(self, values: dict[str, Any]) -> bool:
         """Run the stage on the values of this tick and put its outputs there. False where a source has ended."""
@@ -117,6 +125,8 @@ class Call:
                 f"stage '{self.node.name}' ({self.node.target}) draws random numbers from numpy.random or random, "
                 "which the run's seed does not decide: take them from ctx.rng"
             )
+        if self.foreign and not called:
+            self.check_state()
         if guarded and self._bytes([given[name] for name in guarded]) != before:
             raise StageFailed(f"{self._place()}: it changes its inputs, which others read too; write to a copy")
         if self.outputs and out is not None and not isinstance(out, Outputs):

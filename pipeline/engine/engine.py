@@ -295,7 +295,12 @@ class Engine:
             notes={name: call.ctx.notes() for name, call in self.calls.items()},
             sequences={name: sequence.size for name, sequence in self.sequences.items()},
         )
-        checkpoints.save(self.options.memory / "checkpoint", present, self._rows)
+        try:
+            checkpoints.save(self.options.memory / "checkpoint", present, self._rows)
+        except BadEncoding:
+            for call in self.calls.values():
+                call.check_state()
+            raise
 
     def _verify_sequences(self) -> None:
         """Check that the sequences hold exactly what the ticks gave, before anything is computed from them."""

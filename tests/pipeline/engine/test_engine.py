@@ -17,7 +17,7 @@ from omninav.pipeline.engine.prefix import cached_prefix, following, keep_prefix
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
-from toys import Big, Collected, Number, graph_of_toys
+from toys import Big, Collected, Number, Remember, graph_of_toys
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -196,6 +196,23 @@ def test_another_out_a_fact_that_is_no_json_and_what_cannot_be_kept_are_named_wi
     fails(lambda ctx, number: ctx.warn(ValueError("a")), "TypeError: ctx.warn takes a sentence, not ValueError")
     fails(lambda ctx, number: ctx.count(3), "TypeError: ctx.count begins with a name")
     fails(lambda ctx, number: out.Out(number=Number({1, 2})), "builtins.set cannot be written")
+
+
+@pytest.mark.parametrize("at", [0, 2])
+def test_a_state_that_no_checkpoint_can_hold_is_named_with_its_field(tmp_path: Path, at: int):
+    graph = graph_of({"source": "Count", "seen": "Remember"}, {"seen": {"number": "source.number"}})
+    engine = Engine(graph, {}, EngineOptions(0, tmp_path, tmp_path / "memory"))
+
+    def step(ctx: Context, number: Number, seen: Remember.Seen) -> None:
+        seen.values = (number, open) if ctx.tick.index >= at else ()
+
+    engine.calls["seen"].step = step
+    with pytest.raises(
+        StageFailed,
+        match=r"stage 'seen' \(toys.Remember\): field 'values' of its State: builtins.*make all else in setup",
+    ):
+        engine.run()
+    assert engine.ticks == (0 if at == 0 else 10)
 
 
 FULL = {
