@@ -63,6 +63,8 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
         if "/" not in group and group != "variant":
             near = f"a stage of your own is offered by OMNINAV_STAGES={group}.{option}=FILE.py:CLASS; {near}"
         return [Problem(group, f"the defaults of a file choose '{option}', which there is not", near)]
+    if not problems and (lacking := re.search(r"Could not override '(hydra\.(sweeper|launcher)[\w.]+)'", message)):
+        return [Problem(lacking[1], f"this {lacking[2]} has no such setting", f"choose another: hydra/{lacking[2]}=…")]
     return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
 
 
@@ -71,7 +73,8 @@ def composed_of(words: Sequence[str], folders: Sequence[str] = ()) -> Any:
     try:
         return compose(with_unlisted_parameters(words, folders))
     except HydraException as error:
-        raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
+        cause = f": {error.__cause__}".partition("\n")[0] if str(error).startswith("Error merging") else ""
+        raise ProblemsFound(invalid_overrides(words, folders, f"{error}{cause}")) from None
 
 
 def _several_values(word: Override) -> Problem:

@@ -139,6 +139,25 @@ def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(swept):
     assert "Traceback" not in ended.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("objective=null",), "hydra/sweeper=optuna: nothing says what it optimises; type objective="),
+        (("hydra.sweeper.n_jobs=0",), "hydra.sweeper.n_jobs: 0, expected a whole number >= 1"),
+        (("hydra.sweeper.n_trials=abc",), "Value 'abc' of type 'str' could not be converted to Integer"),
+        (("hydra.sweeper.direction=sideways",), "Please set either 'minimize' or 'maximize' to direction"),
+        (("hydra/sweeper=basic", "hydra.sweeper.n_trials=2"), "n_trials: this sweeper has no such setting"),
+    ],
+)
+def test_what_an_optimiser_cannot_do_is_said_before_the_first_job(omninav, words: tuple[str, ...], said: str):
+    pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="pip install 'omninav[optuna]'")
+    well = ("hydra/sweeper=optuna", "objective=position_error_m.p90")
+    given = {word.partition("=")[0]: word for word in (*well, *words)}
+    ended = omninav("-m", *given.values(), "seed=choice(0,1)", *SHORT)
+    assert (ended.returncode, "Traceback" in ended.stderr) == (2, False)
+    assert said in ended.stderr
+
+
 def test_an_objective_that_no_run_has_is_named_with_what_there_is(omninav, shared_cache: Path):
     ended = omninav("variant=plain_matching", SHORT[1], f"cache={shared_cache}", "objective=position_error_m.medan")
     assert ended.returncode == 2

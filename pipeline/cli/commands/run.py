@@ -23,13 +23,18 @@ from omninav.pipeline.cli.overrides import composed_of, invalid_overrides, jobs_
 from omninav.pipeline.cli.sweep_jobs import is_of_executor
 from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.files import Taken, locked
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, one_line
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.prepared_run import Prepare, prepare_run
 from omninav.pipeline.run.run_folder import new_folder
 
 LAUNCHER = "hydra/launcher=omninav"
 """Word that sends the jobs of a sweep to the executor that was typed."""
+
+SWEEPING = ("hydra.sweeper", "hydra.launcher", "hydra/sweeper", "hydra/launcher")
+"""Beginnings of the words that choose and set who runs a sweep."""
+OPTIMISERS = ("optuna", "ax", "nevergrad")
+"""Hydra's sweepers that optimise, and leave `optimization_results.yaml`."""
 
 
 def command(
@@ -92,7 +97,6 @@ def _handed_over(
             ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
             show_sweep(Path(page).parent)
-            # By Hydra's sweepers for Optuna, Ax and Nevergrad.
             optimum = Path(page).parent / "optimization_results.yaml"
             if optimum.is_file():
                 print(f"optimum: {shown(optimum)}\n{optimum.read_text(encoding='utf-8').strip()}", flush=True)
@@ -106,8 +110,12 @@ def _sweep(hydra: Any, job: Callable[[Any], float | None], words: Sequence[str],
         hydra.multirun(CONFIG, job, [*words, "hydra.mode=MULTIRUN"])
     except HydraException:
         raise
-    except Exception:
+    except Exception as error:
         ends = _ends(outcomes)
+        typed = [word for word in words if word.startswith(SWEEPING) and word != LAUNCHER]
+        if not ends and typed and not isinstance(error, ProblemsFound | BadInput):
+            what = one_line(f"{type(error).__name__}: {error}")
+            raise BadInput(f"the sweep cannot begin: {what}; change {' '.join(typed)}") from error
         if not ends or any(code == "0" for code, _, _ in ends):
             raise
         print("every job failed: there is no best one", file=sys.stderr, flush=True)
@@ -125,7 +133,9 @@ def _own_folder(hydra: Any, words: Sequence[str]) -> Iterator[tuple[Path, list[s
 
     A folder that is named by the second is a new one. Raises `BadInput` where another sweep is in it.
     """
-    place = hydra.compose_config(CONFIG, [*words], RunMode.MULTIRUN).hydra.sweep
+    config = hydra.compose_config(CONFIG, [*words], RunMode.MULTIRUN)
+    _refuse_unfit_sweeper(config)
+    place = config.hydra.sweep
     folder = Path(str(place.dir))
     words_of_folder: list[str] = []
     as_written: Any = OmegaConf.to_container(place, resolve=False)
@@ -140,6 +150,16 @@ def _own_folder(hydra: Any, words: Sequence[str]) -> Iterator[tuple[Path, list[s
         raise BadInput(
             f"{folder}: {taken} runs a sweep in it; wait until it has ended, or name another: hydra.sweep.dir=…"
         ) from None
+
+
+def _refuse_unfit_sweeper(config: Any) -> None:
+    """Raise `BadInput` where Hydra's sweepers that optimise would find out at the end that they cannot."""
+    chosen = config.hydra.runtime.choices["hydra/sweeper"]
+    if chosen in OPTIMISERS and not config.get("objective"):
+        raise BadInput(f"hydra/sweeper={chosen}: nothing says what it optimises; type objective=NAME of metrics.json")
+    for name in ("n_jobs", "n_trials"):
+        if config.hydra.sweeper.get(name) == 0:
+            raise BadInput(f"hydra.sweeper.{name}: 0, expected a whole number >= 1")
 
 
 def _refuse_other_sweep(folder: Path, words: Sequence[str]) -> None:
