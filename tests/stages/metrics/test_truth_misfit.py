@@ -50,6 +50,14 @@ def test_the_change_with_which_a_truth_fits_is_named(truth: np.ndarray, said: st
     assert re.search(said, "".join(ctx.warnings))
 
 
+@pytest.mark.parametrize("offset", [(0.3, -0.2, 0.0), (3.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+def test_of_a_robot_that_stands_still_no_change_of_the_truth_is_told(offset: tuple[float, float, float]) -> None:
+    still = np.tile(PATH[:1], (80, 1))
+    assert not truth_misfit(made_drive(still, still + np.array(offset), confidences=SURE))
+    straight = still + np.outer(np.arange(80), [0.1, 0.0, 0.0])
+    assert "on the robot" not in truth_misfit(made_drive(straight, straight + np.array(offset), confidences=SURE))
+
+
 def test_images_without_a_truth_are_left_out_and_half_seconds_are_told() -> None:
     late = [None, *np.roll(PATH, -1, axis=0)[1:]]
     assert "0.5 s later" in truth_misfit(made_drive(late, PATH, every_s=0.5, confidences=SURE))
