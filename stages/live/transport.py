@@ -3,6 +3,7 @@
 import atexit
 import importlib
 import os
+import re
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter, deque
@@ -21,6 +22,8 @@ DEPTH, NEWEST_DEPTH = 1000, 16
 """Messages of a topic that DDS keeps until our thread takes them: all of them, or only the newest are wanted."""
 MAX_WAITING = 10_000
 """Messages of one topic that wait to be taken; of more the oldest is overtaken. A minute of odometry at 150 Hz."""
+NAME = re.compile(r"/?[\w:]+(/\w+)*", re.ASCII)
+"""Pattern of the names of topics, and of frames in transforms (`/tf:map:base_link`)."""
 
 
 class TransportError(BadInput):
@@ -155,7 +158,9 @@ def opened(key: tuple[str, int | str], make: Callable[[], Opened]) -> Opened:
 
 
 def full_name(topic: str) -> str:
-    """A topic's name as ROS resolves it: `scan` is `/scan`."""
+    """A topic's name as ROS resolves it: `scan` is `/scan`. Raises `TransportError` for what is none."""
+    if not NAME.fullmatch(topic):
+        raise TransportError(f"{topic!r:.80}: no topic has such a name; type one as /camera/image (a-z, 0-9, _ and /)")
     return topic if topic.startswith("/") else f"/{topic}"
 
 

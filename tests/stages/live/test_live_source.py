@@ -294,6 +294,7 @@ def test_a_range_finder_that_is_missing_and_a_request_of_another_type_are_noted_
     [
         ({"topics": Topics(image="/odom")}, "/odom: it cannot be both image and odometry; give"),
         ({"topics": Topics(truth="/odom")}, "/odom: it cannot be both odometry and truth; give"),
+        ({"topics": Topics(image="a b")}, "'a b': no topic has such a name; type one as /camera/image"),
         ({"goal": "/initialpose"}, "/initialpose: it cannot be both initial_pose and goal; give"),
         (
             {"topics": Topics(odometry="/tf:odom:base_link")},
