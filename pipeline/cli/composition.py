@@ -267,7 +267,7 @@ def _name_past_links(config: Any) -> None:
     """Names paths among the runs past their link, which will soon point elsewhere."""
     runs = Path(str(config.get("runs", "runs"))).resolve()
     for key in settings_left_open():
-        file = config.get(key)
+        file = OmegaConf.select(config, key)  # whose errors name the key
         if isinstance(file, str) and Path(file).is_file() and Path(file).resolve().is_relative_to(runs):
             config[key] = _past_links(file)
 

@@ -60,6 +60,9 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     if not problems and (lacking := re.search(r"Could not find '([\w/]+)/(\w+)'", message)):
         group, option = lacking.groups()
         near = suggest_option(group, option, _options(group, folders), "options")
+        if group.startswith("hydra/"):
+            near += "; packages as hydra-submitit-launcher, hydra-joblib-launcher and hydra-optuna-sweeper have others"
+            return [Problem(group, f"there is no '{option}'", near)]
         if "/" not in group and group != "variant":
             near = f"a stage of your own is offered by OMNINAV_STAGES={group}.{option}=FILE.py:CLASS; {near}"
         return [Problem(group, f"the defaults of a file choose '{option}', which there is not", near)]
@@ -129,6 +132,8 @@ def _how_to_write(word: str) -> str:
             f"is typed in quotes within quotes: '{word.partition('=')[0]}=\"…\"'"
         )
     name, _, value = word.partition("=")
+    if value and not name.isascii():
+        return "names before = are written in a to z, digits, _ and ."
     if re.fullmatch(r"\+{0,2}[\w./@]+", name) and re.fullmatch(r"[^'\"\\$[{][^'\"\\$]*", value):
         return f"write quotes within quotes: \"{name}='{value}'\""
     return "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""

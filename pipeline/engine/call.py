@@ -162,7 +162,10 @@ class Call:
 
     def _failed(self, error: BaseException, place: str) -> Exception:
         """The error that states which stage failed, and when."""
-        message = f"{place}: {type(error).__name__}: {error}"
+        try:
+            message = f"{place}: {type(error).__name__}: {error}"
+        except Exception as another:
+            message = f"{place}: {type(error).__name__}, whose text cannot be had ({type(another).__name__})"
         if isinstance(error, OSError) and error.errno in DISK:
             return BadInput(f"{message}; {HINTS[error.errno]}")
         return StageFailed(message)

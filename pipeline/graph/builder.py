@@ -95,7 +95,8 @@ class _Builder:
             self._problem(where, f"'{name}' cannot be the name of a node", "choose another name")
             return None
         if not isinstance(spec, Mapping) or not isinstance(spec.get("_target_"), str):
-            self._problem(where, "a node needs `_target_`", f"type {where}._target_=omninav.stages.…")
+            instead = "" if isinstance(spec, Mapping) else " in place of it"
+            self._problem(where, "a node needs `_target_`", f"type ++{where}._target_=omninav.stages.…{instead}")
             return None
         target = spec["_target_"]
         try:

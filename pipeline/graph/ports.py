@@ -134,7 +134,8 @@ PLAIN: dict[Any, Any] = {
 
 def _convert_plain(value: Any, expected: Any, where: str) -> Any:
     if not isinstance(value, PLAIN.get(expected, ())) or (isinstance(value, bool) and expected is not bool):
-        raise _unfit(value, expected, where)
+        quotes = expected is str and type(value) in (int, float) and where[-1:] != "]"
+        raise _unfit(value, expected, where, f"type '{where}=\"{value}\"' for a text" if quotes else "")
     if expected is float and not -sys.float_info.max <= value <= sys.float_info.max:
         raise _unfit(value, expected, where, "write a finite number")
     return expected(value) if expected in (float, Path) else value

@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 from distributed import Client
+from distributed.comm import get_address_host_port
 
 from omninav.pipeline.graph.problems import BadInput
 
@@ -95,6 +96,8 @@ def slurm(settings: ExecutorSettings) -> DaskExecutor:
 def _client(where: Any) -> Any:
     _quiet()
     try:
+        if isinstance(where, str) and not where.startswith("inproc:"):
+            get_address_host_port(where)  # a client of what is no address complains again when it is thrown away
         return Client(where, timeout=START_S if not isinstance(where, str) else 5, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise BadInput(f"executor.address={where}: no scheduler answers there ({error!s:.200})") from None

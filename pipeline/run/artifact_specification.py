@@ -64,7 +64,7 @@ def read_specifications(config: Mapping[str, Any]) -> dict[str, ArtifactSpecific
             found[str(name)] = ArtifactSpecification(**arguments)
     for name, spec in found.items():
         where = f"artifacts.{name}"
-        others = [other for other in found if other != name]
+        others = [str(other) for other in block if other != name]
         if spec.together_with is not None and spec.together_with not in others:
             hint = suggest(spec.together_with, others, "artifacts")
             problems.append(Problem(f"{where}.together_with", f"there is no artifact '{spec.together_with}'", hint))

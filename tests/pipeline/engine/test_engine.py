@@ -139,6 +139,20 @@ def test_a_failing_stage_is_named_with_the_place(early: bool, said: str):
         engine.run()
 
 
+def test_an_error_without_a_text_is_named_by_its_type():
+    class Speechless(Exception):
+        def __str__(self) -> str:
+            raise ValueError
+
+    def step(ctx: Context, number: Number) -> None:
+        raise Speechless
+
+    engine = Engine(graph_of({"source": "Count", "scale": "Scale"}, {"scale": {"number": "source.number"}}))
+    engine.calls["scale"].step = step
+    with pytest.raises(StageFailed, match=r"'scale' .*: Speechless, whose text cannot be had \(ValueError\)"):
+        engine.run()
+
+
 def test_a_source_whose_stamps_go_back_within_a_log_is_named_with_both(monkeypatch: pytest.MonkeyPatch):
     class Back(Tick):
         def __post_init__(self) -> None:

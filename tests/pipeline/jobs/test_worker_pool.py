@@ -236,6 +236,13 @@ def test_slurm_is_refused_at_once_where_its_command_is_missing(tmp_path: Path, m
         executor_of(ExecutorSettings("slurm"))
 
 
+def test_no_client_is_made_for_what_is_no_address(monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+    monkeypatch.setattr("omninav.pipeline.jobs.dask_executor.Client", None)
+    with pytest.raises(BadInput, match=r"executor.address=garbage: no scheduler answers there"):
+        executor_of(ExecutorSettings("dask", options={"address": "garbage"}))
+
+
 def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
 
