@@ -6,7 +6,7 @@ import os
 import shutil
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, suppress
 from datetime import datetime
 from io import TextIOWrapper
 from pathlib import Path
@@ -41,7 +41,7 @@ def execute(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | No
 
     Raises `StageFailed` or `BadInput`; by then the manifest records it and the traceback is in `run.log`.
     """
-    with running(run, prepared, display) as engine:
+    with chdir("."), running(run, prepared, display) as engine:  # a stage may change the folder for itself alone
         while engine.tick():
             pass
     return read_metrics(run.folder)

@@ -1,11 +1,13 @@
 """A run's folder: there when all that a resume needs is in it, and never another run's."""
 
+import os
 from pathlib import Path
 
 import pytest
-from toy_runs import begun, noisy_sum
+from toy_runs import begun, ended, noisy_sum
 
 from omninav.pipeline.run import run_folder
+from toys import Noise
 
 
 def start(root: Path) -> Path:
@@ -42,3 +44,12 @@ def test_a_folder_in_place_of_the_link_to_the_latest_run_is_named(
     folder = start(tmp_path)
     said = capsys.readouterr().err
     assert said == f"{tmp_path / 'latest'} is a folder and no link, and does not lead to this run: {folder}\n"
+
+
+def test_a_stage_that_changes_the_working_folder_changes_it_for_its_run_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Noise, "setup", lambda self, ctx: os.chdir("/"))
+    assert (ended(noisy_sum(Path("runs"))).folder / "report.html").is_file()
+    assert Path.cwd() == tmp_path
