@@ -2,7 +2,6 @@
 
 import inspect
 import math
-import pickle
 import random
 import time
 from array import array
@@ -110,7 +109,7 @@ class Call:
         guards = self.foreign and (called < VALIDATED_TICKS or called % GUARDED_EVERY == 0)
         guarded = self.guarded + self.guarded_once if guards else []
         before = self._bytes([given[name] for name in guarded]) if guarded else b""
-        generators = _generators() if guards else b""
+        generators = _generators() if guards else ()
         start = time.perf_counter()
         try:
             out = self.step(self.ctx, **given)
@@ -176,6 +175,7 @@ class Call:
         return f"stage '{self.node.name}' ({self.node.target}) failed{when}"
 
 
-def _generators() -> bytes:
+def _generators() -> tuple[Any, ...]:
     """The states of the random numbers that a process shares."""
-    return pickle.dumps((random.getstate(), np.random.get_state()))
+    state: Any = np.random.get_state(legacy=False)
+    return random.getstate(), [np.asarray(each).tobytes() for each in state["state"].values()]
