@@ -11,9 +11,9 @@ from omninav.stages.values.landmarks import Landmarks
 BESIDE, HALF_AT = 0.45, 1.6
 """Share of the landmarks of the nearest reference that agree on the pose of an image beside it, and the distance, in
 length scales, at which half as many do: medians over drawn rooms by day (docs/experiments/landmarks.md)."""
-AT_FIRST, SPREAD = 0.4, 1.0
+AT_FIRST = 0.4
 """Share of the landmarks to expect that images show, before a drive has told it: between rooms by day, 1, and with half
-of the lamps off, 0.3; and standard deviation of its logarithm, which is half as large over the images of one drive."""
+of the lamps off, 0.3."""
 ADAPTED = 0.05
 """Weight of a sure pose in the mean over a drive."""
 MAX_AGAINST = 4.0
@@ -26,9 +26,12 @@ class LandmarksShown(Value):
     log_share: float = math.log(AT_FIRST)
 
     def log_odds(self, shown: Ints, expected: Array) -> Array:
-        """Log odds (K,), at most 0, of poses on which so many landmarks (K,) agree, by how many are missing there."""
+        """Log odds (K,), at most 0, of poses on which so many landmarks (K,) agree, by how many are missing there.
+
+        The logarithm of the share has a standard deviation of 1: within a drive of a half, and more between its rooms.
+        """
         missing = np.maximum(self.log_share - _log_shares(shown, expected), 0.0)
-        return np.asarray(-np.minimum(0.5 * np.square(missing / SPREAD), MAX_AGAINST))
+        return np.asarray(-np.minimum(0.5 * np.square(missing), MAX_AGAINST))
 
     def seen(self, shown: Ints, expected: Array, probability: float) -> "LandmarksShown":
         """Gives the share after an image with a pose (K = 1) of this probability."""

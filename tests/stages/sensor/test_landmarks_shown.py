@@ -29,8 +29,10 @@ def test_one_expects_what_the_nearest_reference_sees_and_less_the_farther_it_is(
 
 
 def test_missing_landmarks_speak_against_a_pose_and_as_many_as_are_expected_for_none() -> None:
-    told = LandmarksShown(0.0).log_odds(np.array([90, 120, 33, 9, 1, 8]), np.array([90.0, 90.0, 90.0, 90.0, 90.0, 0.0]))
-    assert told == pytest.approx([0.0, 0.0, -0.5 * math.log(90 / 33) ** 2, -0.5 * math.log(10) ** 2, -4.0, 0.0])
+    told = LandmarksShown(0.0).log_odds(
+        np.array([90, 120, 33, 9, 1, 8, 1]), np.array([90.0, 90.0, 90.0, 90.0, 90.0, 0.0, 0.5])
+    )
+    assert told == pytest.approx([0.0, 0.0, -0.5 * math.log(90 / 33) ** 2, -0.5 * math.log(10) ** 2, -4.0, 0.0, 0.0])
 
 
 def test_a_drive_in_the_dark_teaches_to_expect_fewer() -> None:
