@@ -30,7 +30,7 @@ class ConfidenceOverTime(PlotStage):
         if not np.isfinite(last.confidence).any():
             return self.Out()
         seconds = last.seconds
-        chart = Chart((0.0, max(float(seconds[-1]), 0.1)), (0.0, 1.0), "time (s)", "confidence", height=(140.0, 140.0))
+        chart = Chart((0.0, max(float(seconds[-1]), 0.1)), (0.0, 1.05), "time (s)", "confidence", height=(140.0, 140.0))
         found = [each for each in (stretches.all if stretches else ()) if each.log == last.log[0]]
         for each in found:
             chart.base.band((each.start_s, each.end_s), BANDS[each.state])
