@@ -31,7 +31,10 @@ class Taken(Exception):
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file under a temporary name and rename it, so that no reader ever sees half of it."""
+    """Write a file under a temporary name and rename it, so that no reader ever sees half of it.
+
+    Characters that UTF-8 cannot hold (lone surrogates) are escaped.
+    """
     with whole_file(path) as part:
         part.write_bytes(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
 

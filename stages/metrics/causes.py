@@ -144,12 +144,12 @@ def moved_unmeasured(part: Part) -> Verdict | None:
     away = np.where(np.isfinite(log["landmarks_away_m"]), log["landmarks_away_m"], log["match_away_m"])
     clear = np.isfinite(log["landmarks_away_m"]) | (log["lead_against"] > DISTINCT_LEAD)
     seen = [row for row in range(before + 1, found) if clear[row]][:FIRST_SEEN]
-    told = [(found, gap, "")]
+    leaps = []
     if seen:
         metres = float(np.median(away[seen]))
         shown = f"images up to {int(log['frame'][seen[-1]])} show the robot {metres:.1f} m from the estimate, but "
-        told.insert(0, (seen[-1], metres, shown))
-    for by, metres, shown in told:
+        leaps.append((seen[-1], metres, shown))
+    for by, metres, shown in [*leaps, (found, gap, "")]:
         can = SPEED_FACTOR * float(steps.max()) * (by - before)
         if metres > log.gate + can:
             return Verdict("carried elsewhere", f"{words}; {shown}it can have driven only {can:.1f} m", CHECK_IMAGES)

@@ -15,7 +15,7 @@ AT_FIRST = 0.4
 """Share of the landmarks to expect that images show, before a drive has told it: between rooms by day, 1, and with half
 of the lamps off, 0.3."""
 ADAPTED = 0.05
-"""Weight of a sure pose in the mean over a drive."""
+"""Weight of a certain pose in the mean over a drive; others count by their probability."""
 MAX_AGAINST = 4.0
 """Largest log odds (nats) against a pose by landmarks that are missing: people may hide them."""
 
