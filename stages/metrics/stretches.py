@@ -13,7 +13,7 @@ import numpy.typing as npt
 from omninav.pipeline import counted
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.confidence import MIN_EMPTY, MIN_SEEN, MIN_SURE
+from omninav.stages.values.confidence import MIN_EMPTY, MIN_SEEN, SURE_STATES
 from omninav.stages.values.conflicts import FOREIGN
 from omninav.stages.values.stretches import Stretch, StretchState
 
@@ -59,6 +59,12 @@ class Log:
         """Tells whether a column was recorded."""
         return bool(np.isfinite(self[name]).any())
 
+    def texts(self, name: str) -> list[str]:
+        """A column of texts; "" where nothing was recorded."""
+        found = self.columns.get(name)
+        texts = [""] * len(self) if found is None else np.ma.filled(np.ma.asarray(found, object), "").tolist()
+        return [text if isinstance(text, str) else "" for text in texts]
+
     @cached_property
     def estimates(self) -> Array:
         """Poses (N, 3)."""
@@ -72,14 +78,13 @@ class Log:
     @cached_property
     def conflicts(self) -> list[str]:
         """The inputs that do not fit each other at each image; "": none."""
-        found = self.columns.get("conflict")
-        texts = [""] * len(self) if found is None else np.ma.filled(np.ma.asarray(found, object), "").tolist()
-        return [text if isinstance(text, str) else "" for text in texts]
+        return self.texts("conflict")
 
     @cached_property
     def sure(self) -> Bools:
-        """Which estimates are sure: by the confidence, or without a monitor by the belief's concentration."""
-        stated = self["confidence"] >= MIN_SURE if self.known("confidence") else self["confident"] == 1.0
+        """Which estimates are sure: by the robot's state, or without a monitor by the belief's concentration."""
+        states = self.texts("state")
+        stated = np.isin(states, SURE_STATES) if any(states) else self["confident"] == 1.0
         return np.asarray(np.isfinite(self["estimate_x"]) & stated)
 
     @cached_property

@@ -9,7 +9,7 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.plane.track_fit import track_fit
-from omninav.stages.values.confidence import MIN_SURE
+from omninav.stages.values.confidence import SURE_STATES, TRACKING_STATES
 from omninav.stages.values.drive import Drive, known
 
 from .map_frame import in_map_frame
@@ -38,8 +38,8 @@ def truth_misfit(drive: Drive) -> str:
     """
     rows = known(drive.truth) & known(drive.estimate)
     truth, estimate, seconds = drive.truth[rows], drive.estimate[rows], drive.seconds[rows]
-    sure = drive.confidence[rows & np.isfinite(drive.confidence)]
-    if not len(sure) or np.median(sure) < MIN_SURE:  # a robot that is lost may follow odometry at another place
+    sure = [TRACKING_STATES[each] in SURE_STATES for each in drive.state[rows & (drive.state >= 0)]]
+    if 2 * sum(sure) < len(sure) or not sure:  # a robot that is lost may follow odometry at another place
         return ""
     off_m = float(np.median(position_errors(estimate, truth)))
     off_deg = float(np.median(heading_errors_deg(estimate, truth)))

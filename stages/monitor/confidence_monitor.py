@@ -231,11 +231,13 @@ class ConfidenceMonitor(Stage):
             recent.missed = 0.0 if recent.found else max(recent.missed, looked_for)
             odds = min(odds, (1.0 - recent.missed) * odds) + math.log(1.0 - FOUND_AT_FIRST * recent.missed)
             odds = (1.0 - sure) * odds + recent.geometry
-        probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
+        right_place = 1.0 / (1.0 + math.exp(-odds))
         if conflicts is not None and conflicts.misleading:
-            probability *= self.right_in_conflict
+            right_place *= self.right_in_conflict
+        probability = right_place * mass_within(belief, pose, self.within_m, radians)
+        of_mode = max(probability, right_place * min(1.0, estimate.mode_weight))
         recent.empty = 0 if similarities is not None and seen else recent.empty + 1
-        return self.Out(confidence=PoseConfidence(probability, recent.told(probability)), leads=leads)
+        return self.Out(confidence=PoseConfidence(probability, recent.told(of_mode), of_mode), leads=leads)
 
 
 def by_landmarks(

@@ -50,7 +50,7 @@ class WidenCovariance(Stage):
     square is added to the variances. After a pose from landmarks, the square of odometry's drift (`DRIFT_M`) is added
     instead while it is smaller."""
     min_confidence: Annotated[float, Bounds(ge=0, le=1)] = 0.5
-    """Confidence below which the covariance covers the whole map; 0: never."""
+    """Probability of the mode below which the covariance covers the whole map; 0: never."""
 
     class Out(Outputs):
         estimate: PoseEstimate
@@ -79,7 +79,7 @@ class WidenCovariance(Stage):
         if sigmas is not None and len(sigmas):
             away = map.poses[: len(sigmas), :2] - [estimate.pose.x, estimate.pose.y]  # later ones are learned since
             covariance += np.diag(sigmas[np.argmin((away**2).sum(axis=1))] ** 2)
-        if confidence.probability < self.min_confidence:
+        if confidence.of_mode < self.min_confidence:
             covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))
 

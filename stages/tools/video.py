@@ -17,6 +17,7 @@ from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.recordings.messages import pose_of
+from omninav.stages.values.confidence import SURE_STATES
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.thumbnails import decoded
 
@@ -157,7 +158,7 @@ class Floor:
         for piece in np.split(way, self.carried[self.carried <= number]):
             cv2.polylines(floor, [piece], False, BLACK, 1, cv2.LINE_AA)
         state = scene["/estimate/state"].data if "/estimate/state" in scene else ""
-        colour = BLUE if state in ("tracking", "blind", "") else ORANGE
+        colour = BLUE if state in (*SURE_STATES, "") else ORANGE
         self._dart(floor, self.poses[number], BLACK)
         if "/estimate/pose" in scene:
             self._dart(floor, np.array(pose_of(scene["/estimate/pose"])), colour)

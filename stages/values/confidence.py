@@ -14,6 +14,8 @@ TrackingState = Literal["searching", "tracking", "lost", "blind"]
 landmarks are looked for)."""
 TRACKING_STATES: tuple[TrackingState, ...] = get_args(TrackingState)
 """All of them."""
+SURE_STATES: tuple[TrackingState, ...] = ("tracking", "blind")
+"""Those of a robot that knows where it is."""
 MIN_SURE = 0.5
 """Probability from which on an estimate is rather right than wrong."""
 
@@ -22,15 +24,19 @@ MIN_SEEN, MIN_EMPTY = 8, 3
 
 
 class PoseConfidence(Value):
-    """The probability that the estimate is right, within a tolerance in position and heading, and what follows."""
+    """The probability that the estimate is right, within a tolerance in position and heading, and what follows.
+
+    `of_mode`: the probability that the robot is in the belief's mode whose pose was estimated, however wide that is.
+    """
 
     probability: Probability
     state: TrackingState = "tracking"
+    of_mode: Probability = 1.0
 
     @property
     def is_sure(self) -> bool:
         """Tells whether the robot knows where it is."""
-        return self.state in ("tracking", "blind")
+        return self.state in SURE_STATES
 
 
 class WrongPoseAgreement(Value):

@@ -27,7 +27,7 @@ def drive(**changed):
     for name, value in changed.items():
         columns[name] = columns[name].copy()
         columns[name][LOST if np.ndim(value) == 0 else slice(None)] = value
-    return columns
+    return columns | {"state": np.where(columns["confidence"] >= 0.5, "tracking", "lost").astype(object)}
 
 
 def found(**changed):
@@ -120,11 +120,11 @@ def test_evidence_has_its_numbers_and_ground_truth_where_there_is_one():
 
 def test_without_evidence_of_images_states_are_told_and_causes_are_not():
     sound = drive(confidence=0.1)
-    few = {name: sound[name] for name in list(sound)[:12]}
+    few = {name: sound[name] for name in (*list(sound)[:12], "state")}
     assert [each.cause for each in stretches([Log(few)], 2.5)] == ["not recorded"]
     assert in_short(Log(few)).endswith(
         "recorded no causes, which only particle filters in a map do (nodes.evidence, as in variant=omninav)."
     )
-    slam = {name: column for name, column in few.items() if name != "confidence"}
+    slam = {name: column for name, column in few.items() if name not in ("confidence", "state")}
     slam |= {"confident": np.ones(N), "similarity": np.where(AWAY, np.nan, 0.9)}  # references are near at times only
     assert stretches([Log(slam)], 2.5) == []

@@ -149,6 +149,16 @@ def test_a_wide_belief_is_less_sure_than_a_narrow_one():
     assert drive(list(range(8)), spread=1.0)[-1] < drive(list(range(8)))[-1] - 0.1
 
 
+def test_a_robot_in_a_mode_wider_than_the_tolerance_is_tracked_though_its_pose_is_uncertain():
+    told = stated(list(range(8)), spread=0.4)[-1]
+    assert told.probability < 0.5  # within 0.5 m are 54 %, within 10 degrees 33 % of a spread of 23 degrees
+    assert told.of_mode > 0.6
+    assert told.state == "tracking"
+    lost = stated([n + 20 for n in range(20)], spread=0.4)[-1]
+    assert lost.of_mode < 0.1
+    assert lost.state == "searching"
+
+
 def test_a_robot_that_stands_gains_little_from_the_same_image_again():
     once, standing = drive([0])[-1], drive([0] * 6, step=0.0, novelty=0.05)[-1]
     assert standing < drive(list(range(6)))[-1] - 0.02
@@ -257,7 +267,9 @@ def test_a_pose_at_the_same_place_is_wrong_where_it_is_turned_away(heading: floa
 
 def test_inputs_that_mislead_lower_the_confidence():
     def sure(conflicts: Conflicts | None) -> float:
-        return judged(ConfidenceMonitor(), HERE, alike(), conflicts=conflicts).probability
+        told = judged(ConfidenceMonitor(), HERE, alike(), conflicts=conflicts)
+        assert told.of_mode == pytest.approx(told.probability)
+        return told.probability
 
     alone = sure(None)
     assert alone > 0.5

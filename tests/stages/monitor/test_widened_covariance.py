@@ -21,9 +21,9 @@ OWN = np.diag((0.01, 0.02, 0.003))
 POSE = Pose(10.0, 0.0, 0.0)
 
 
-def widened(confidence: float, length_scale: float = 0.5, floor: float = 0.4) -> PoseEstimate:
+def widened(of_mode: float, length_scale: float = 0.5, floor: float = 0.4) -> PoseEstimate:
     estimate = PoseEstimate(POSE, OWN, 0.9, POSE)
-    told = PoseConfidence(confidence)
+    told = PoseConfidence(0.4 * of_mode, of_mode=of_mode)  # of a mode that is wider than the tolerance
     stage, state = WidenCovariance(floor=floor), WidenCovarianceState()
     return stage.step(Context("wide"), estimate, told, LengthScale(length_scale), MAP, state).estimate
 
