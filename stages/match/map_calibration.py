@@ -80,8 +80,6 @@ def compared_with(poses: Array, view: int, near_m: float) -> tuple[Ints, Array]:
     All, or of a large map those within `near_m` metres and an even sample of the others.
     """
     others = np.delete(np.arange(len(poses)), view)
-    if len(others) <= MAX_COMPARED:
-        return others, np.ones(len(others))
     near = np.hypot(*(poses[others, :2] - poses[view, :2]).T) <= near_m
     far = others[~near]
     number = min(MAX_COMPARED, len(far))

@@ -195,7 +195,7 @@ def _placed(camera: Camera, found: Array, board: Array) -> Array | None:
         solution = np.linalg.svd(rows)[2][-1].reshape(3, 3)  # columns of [r1 r2 t], one after the other
         r1, r2, t = solution[0] / scale, solution[1] / scale, solution[2]
         length = (np.linalg.norm(r1) + np.linalg.norm(r2)) / 2.0
-        toward = np.sign(np.median((shifted @ solution * seen).sum(axis=1))) or 1.0
+        toward = np.copysign(1.0, np.median((shifted @ solution * seen).sum(axis=1)))
         r1, r2, t = (toward / length * part for part in (r1, r2, t))
         u, _, v = np.linalg.svd(np.stack([r1, r2, np.cross(r1, r2)], axis=1))
         rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v

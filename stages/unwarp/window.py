@@ -98,8 +98,6 @@ class PerspectiveWindow(Stage):
             raise BadInput(
                 f"unwarp: an ordinary camera looks one way, not {self.directions}; write nodes.unwarp.directions=1"
             )
-        pixels, size = image.pixels, (self.columns, self.rows)
-        if pixels.shape[1::-1] != size:
-            pixels = cast(Pixels, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA))
+        pixels = cast(Pixels, cv2.resize(image.pixels, (self.columns, self.rows), interpolation=cv2.INTER_AREA))
         field = 2.0 * math.atan(camera.width / (2.0 * camera.focal_x))
         return Windows(pixels[np.newaxis], np.array([camera.yaw]), field)

@@ -37,10 +37,11 @@ def elevations_deg(camera: Camera, radius: float | np.ndarray) -> np.ndarray:
     return np.degrees(np.arcsin(rays[:, 2]))
 
 
-def test_a_mirror_by_five_numbers_is_that_of_the_unified_model() -> None:
-    camera = mirror_camera(SIZE, RING, np.array([200.0, 220.0, 322.0, 236.0, math.log(0.3)]))
+@pytest.mark.parametrize("k", [1.001, 1.3, 20.0])
+def test_a_mirror_by_five_numbers_is_that_of_the_unified_model(k: float) -> None:
+    camera = mirror_camera(SIZE, RING, np.array([200.0, 220.0, 322.0, 236.0, math.log(k - 1.0)]))
     x, y, z = 2.0, -1.5, -0.7
-    depth = math.sqrt(x * x + y * y + z * z) - 1.3 * z
+    depth = math.sqrt(x * x + y * y + z * z) - k * z
     assert camera.ring == RING
     assert camera.project(np.array([x, y, z]))[0] == pytest.approx(
         [322.0 + 200.0 * x / depth, 236.0 + 220.0 * y / depth]
@@ -71,9 +72,11 @@ def test_a_polynomial_s_numbers_are_in_units_of_the_outer_radius() -> None:
     assert camera.ring == RING
 
 
-def test_a_polynomial_starts_as_its_mirror() -> None:
-    mirror = mirror_camera(SIZE, RING, np.array([200.0, 220.0, 322.0, 236.0, math.log(0.2)]))
-    start = polynomial_start(RING, mirror)
+@pytest.mark.parametrize("inner", [0.0, RING.inner])
+def test_a_polynomial_starts_as_its_mirror(inner: float) -> None:
+    ring = RING._replace(inner=inner)
+    mirror = mirror_camera(SIZE, ring, np.array([200.0, 220.0, 322.0, 236.0, math.log(0.2)]))
+    start = polynomial_start(ring, mirror)
     assert start[:4] == pytest.approx([322.0, 236.0, 1.1, 0.0])
     radii = np.linspace(RING.inner, RING.outer, 30)
     assert elevations_deg(polynomial_camera(SIZE, RING, start), radii) == pytest.approx(

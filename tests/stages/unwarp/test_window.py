@@ -93,7 +93,9 @@ def test_what_the_camera_does_not_see_is_black_and_said() -> None:
     assert np.array_equal(cut.seen[0], elevation <= MIRROR.elevations[0])
     share = 100 * (1 - cut.seen.mean())
     assert f"{share:.1f} % of the windows are outside" in ctx.details["windows_beyond_the_camera"]
-    assert windows(MIRROR, white, field_deg=50.0).seen is None
+    inside = Context("unwarp")
+    assert windows(MIRROR, white, inside, field_deg=50.0).seen is None
+    assert not inside.details
 
 
 def test_an_ordinary_camera_s_image_is_as_it_is() -> None:
