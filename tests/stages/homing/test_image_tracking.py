@@ -23,6 +23,9 @@ def test_a_full_circle_is_repeated_beyond_both_edges():
     image = panorama()
     assert (image.seam, image.columns) == (SEAM, 360)
     np.testing.assert_array_equal(image.grey[:, :SEAM], image.grey[:, 360 : 360 + SEAM])
+    left, right = 4.0 - SEAM, 355.0 + SEAM
+    edges = [(left, 4.0), (right, 85.0), (left - 0.1, 9.0), (right + 0.1, 9.0), (9.0, 3.9), (9.0, 85.1), (np.nan, 9.0)]
+    assert image.inside(np.array(edges), 4.0).tolist() == [True] * 2 + [False] * 5
 
 
 def test_a_larger_image_is_made_small_and_points_go_there_and_back():

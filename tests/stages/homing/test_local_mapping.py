@@ -344,9 +344,9 @@ def test_at_the_target_seven_of_ten_matches_have_its_bearings(share: int, depth_
     assert homing.mapping._contradicted(near, of_one_side)
 
 
-@pytest.mark.parametrize(("beyond", "contradicted"), [(0.98, False), (1.02, True)])
-def test_near_the_target_bearings_may_be_off_by_twice_what_is_left_of_the_way(
-    beyond: float, contradicted: bool
+@pytest.mark.parametrize(("beyond", "inliers", "contradicted"), [(0.98, 6, False), (1.02, 33, True), (1.02, 34, False)])
+def test_near_the_target_bearings_may_be_off_by_twice_what_is_left_of_the_way_unless_a_third_agrees(
+    beyond: float, inliers: int, contradicted: bool
 ) -> None:
     rng = np.random.default_rng(0)
     there, aside = (each / np.linalg.norm(each, axis=1)[:, None] for each in rng.normal(size=(2, 100, 3)))
@@ -356,7 +356,7 @@ def test_near_the_target_bearings_may_be_off_by_twice_what_is_left_of_the_way(
     turned = math.cos(off) * there + math.sin(off) * np.cross(axis, there)
     here, goal = turn_about_vertical(0.5), turn_about_vertical(0.8)
     map = LocalMap(
-        1, 3, "tracking", 6, rows=np.arange(100), places=5.0 * there, kinds=np.full(100, TRACKED),
+        1, 3, "tracking", inliers, rows=np.arange(100), places=5.0 * there, kinds=np.full(100, TRACKED),
         rotation=here, goal_rotation=goal, goal_translation=np.array([0.06, 0.08, 0.0]),
     )  # fmt: skip
     first = turned @ (here.T @ goal).T

@@ -78,9 +78,10 @@ def test_a_target_in_the_dark_stays_lost_and_says_why(monkeypatch: pytest.Monkey
 
 
 def test_a_compass_limits_the_turn():
-    pose = (4.4, 4.6, 2.0)
-    found = vector(MinWarping(max_turn_deg=20), seen(pose), seen(TARGET))
-    assert abs(found.turn) <= math.radians(20)
+    here, there = seen((4.4, 4.6, 2.0)), seen(TARGET)
+    within, beyond = (vector(MinWarping(max_turn_deg=limit), here, there) for limit in (100, 60))
+    assert math.degrees(within.turn) == pytest.approx(math.degrees(0.4 - 2.0), abs=6)
+    assert (beyond.state, abs(beyond.turn) <= math.radians(60)) == ("new", True)
 
 
 def test_columns_are_seen_where_geometry_says():

@@ -34,12 +34,12 @@ def a_walk(number: int = 80, step: float = 0.1) -> ReferenceGraph:
 
 
 def test_right_cells_are_near_and_of_the_nearest_heading_and_wrong_ones_well_away():
-    references = np.array([[0.1, 0, 0], [0.2, 0, math.pi / 2], [0.51, 0, 0], [1.51, 0, 0]])
+    references = np.array([[0.1, 0, 0], [0.2, 0, math.pi / 2], [0.51, 0, 0], [1.5, 0, 0], [1.51, 0, 0]])
     right, wrong = right_and_wrong(np.array([0.0, 0.0, 0.3]), references, HEADINGS, 0.5)
     # Turned by 0.3 - pi / 2, which is -1.6 of 8 steps: the sixth.
     assert np.argwhere(right).tolist() == [[0, 0], [1, 6]]
-    assert wrong.any(axis=1).tolist() == [False, False, False, True]
-    turns = np.radians([29.0, 31.0, -59.0, -61.0])  # of views of one heading: right within 30, wrong beyond 60 degrees
+    assert wrong.any(axis=1).tolist() == [False, False, False, False, True]
+    turns = np.radians([29.5, 30.5, -59.5, -60.5])  # of views of one heading: right within 30, wrong beyond 60 degrees
     right, wrong = right_and_wrong(np.zeros(3), np.column_stack([[0.5, 0, 0, 0], 0 * turns, turns]), 1, 0.5)
     assert right[:, 0].tolist() == [True, False, False, False]
     assert wrong[:, 0].tolist() == [False, False, False, True]
