@@ -5,6 +5,7 @@ from offenders import assert_each
 
 from omninav.pipeline import Tick
 from omninav.pipeline.graph.registry import built_in, resolve
+from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.graph.value import VALUE_TYPES
 from omninav.testing import check_stage
 
@@ -18,6 +19,13 @@ def test_there_are_stages():
 
 def test_each_keeps_what_every_stage_promises():
     assert_each([entry.target for entry in ENTRIES], lambda target: check_stage(resolve(target)))
+
+
+def test_what_a_simulator_tells_is_truth_but_for_its_images_and_its_walls():
+    for entry in ENTRIES:
+        if ".simulator." in entry.target:
+            told = signature(resolve(entry.target)).outputs.values()
+            assert {port.name for port in told if not port.truth} <= {"image", "grid"}, entry.target
 
 
 def test_every_value_says_what_it_is():

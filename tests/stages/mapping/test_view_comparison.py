@@ -11,6 +11,7 @@ from made_places import made_map
 from made_tour import Landmarks, along, scattered
 
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.graph.contents import violation
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, compare
 from omninav.stages.mapping.view_comparison import ViewComparison
@@ -51,6 +52,7 @@ def compared(
 
 def test_images_are_taken_where_enough_time_has_passed_with_a_tolerance_of_a_tenth() -> None:
     views = compared([0.0, 0.89, 0.9, 1.7, 2.0, 2.9])
+    assert violation(views) is None
     assert views.frames.tolist() == [0, 2, 4, 5]
     assert np.diff(views.orders).tolist() == [1, 1, 1]
     assert views.poses.tolist() == [[POSES[n].x, POSES[n].y, POSES[n].heading] for n in (0, 2, 4, 5)]

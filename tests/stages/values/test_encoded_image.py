@@ -41,7 +41,7 @@ def test_the_size_of_a_progressive_jpeg_and_of_a_lossless_webp_is_read():
 
 
 SKIPPED = b"".join(b"\xff%c\0\x0a\0\0\1\0\0\1\0\1" % marker for marker in (0xE0, 0xC4, 0xC8, 0xCC, 0xDB))
-JPEG = b"\xff\xd8" + SKIPPED + b"\xff\1\xff\xd0\xff\xd7\xff\0\xff\xff\xc2\0\x0b\x08" + struct.pack(">HH", 300, 515)
+JPEG = b"\xff\xd8" + SKIPPED + b"\xff\1\xff\xd0\xff\xd8\xff\0\xff\xff\xc2\0\x0b\x08" + struct.pack(">HH", 300, 515)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from omninav.pipeline.graph.contents import violation
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.homing import LocalMap
 from omninav.stages.values.pose import Motion
@@ -18,3 +19,4 @@ def test_a_motion_moves_the_robot_in_its_own_frame_by_the_metres_of_a_unit() -> 
     np.testing.assert_allclose(moved.odometry, [2.0, 4.0, np.pi / 2], atol=1e-12)
     assert replace(map, metres=0.0).moved(Motion(2.0, 4.0, 0.0)).translation.tolist() == [1.0, 2.0, 0.0]
     assert map.moved(None) is map
+    assert violation(LocalMap(1, 1, "lost")) is None

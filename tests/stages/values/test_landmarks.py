@@ -66,6 +66,7 @@ def test_poses_that_are_ruled_out_leave_the_others_more_probable() -> None:
         agree=np.array([0, 1, 2, -1, 2], np.int8),
     )
     left = fix.without(np.array([False, True, False]))
+    assert violation(fix) is violation(left) is None
     assert len(left) == 2
     assert (left.poses[:, 0].tolist(), left.inliers.tolist()) == ([0.0, 6.0], [30, 10])
     assert left.covariances[:, 0, 0].tolist() == [1.0, 3.0]

@@ -45,6 +45,7 @@ def test_points_are_those_of_patches_and_then_both_ends_of_each_column() -> None
         np.arange(10.0, 18.0).reshape(2, 2, 2),
     )
     both = LocalFeatures(bearings, points, looks, colours, patches.sizes, columns)
+    assert violation(both) is None
     root = math.sqrt(0.75)
     ends = [[0.0, root, 0.5], [0.0, 0.5, -root], [root, 0.5, 0.0], [0.0, 0.0, -1.0]]
     assert both.point_bearings() == pytest.approx(np.concatenate([bearings, ends]))
@@ -87,6 +88,7 @@ def test_drives_keep_their_views_the_ways_between_them_and_what_was_believed() -
     for number, begins in enumerate((True, False, False, True, False)):
         drives.move(quarter)
         drives.keep(view(float(number)), np.array([1.0, 2.0, 3.0]) if number == 1 else None, begins, 10 + number)
+    assert violation(drives) is None
     drives.move(quarter)
     drives.move(quarter)
     assert len(drives) == 5
