@@ -113,7 +113,8 @@ def described_landmarks(map: ReferenceGraph) -> str:
     if landmarks is None:
         return "none; type landmarks=sift where a map is made"
     sees = np.diff(landmarks.starts)
-    few = f", {int((sees == 0).sum()) + len(map) - len(sees)} references see none" if (sees == 0).any() else ""
+    none = len(map) - np.count_nonzero(sees)
+    few = f", {none} references see none" if none else ""
     return (
         f"{len(landmarks)}, a reference sees {np.median(sees) if len(sees) else 0:.0f} (median){few}; "
         f"bearings to {np.degrees(landmarks.sigma_rad):.2f} deg, pose variances x {landmarks.variance_factor:.1f}"

@@ -1,5 +1,6 @@
 """Maps as folders of images, and what is refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -64,6 +65,10 @@ def test_what_a_forward_camera_sees_is_cut_out_of_the_middle(tmp_path: Path):
     image = cv2.imread(str(tmp_path / "out" / "3.png"))
     assert image.shape == (8, 8, 3)
     assert (image == 255).all()
+    single = tmp_path / "map.omap"
+    write_artifact(single, replace(reference_graph(6), features=np.zeros((6, 1, 20), np.float32)))
+    with pytest.raises(BadInput, match=r"field_deg=80: the images of .*map\.omap are no panoramas; leave it out"):
+        ExportMap(maps=str(single), field_deg=80, out=str(tmp_path / "other")).run(CTX)
 
 
 def test_maps_without_their_images_are_refused(tmp_path: Path):

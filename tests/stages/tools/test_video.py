@@ -6,7 +6,7 @@ from omninav.pipeline import BadInput, Context
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.pipeline.mcap.writer import written_log
 from omninav.stages.plots.pose_messages import pose_messages
-from omninav.stages.tools.video import BAND, BLUE, LIGHT, MAX_HEIGHT, ORANGE, WIDTH, Floor, MakeVideo, scenes_in
+from omninav.stages.tools.video import BAND, BLUE, GREEN, LIGHT, MAX_HEIGHT, ORANGE, WIDTH, Floor, MakeVideo, scenes_in
 
 SECOND = 10**9
 
@@ -79,7 +79,7 @@ def test_a_long_way_along_y_fits_into_the_height_and_lies_in_the_middle(tmp_path
     assert (floor.frame(5)[BAND:, WIDTH // 2 - 2 : WIDTH // 2 + 3] < 100).any(axis=(1, 2)).sum() < 200
 
 
-def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
+def test_an_occupied_cell_and_the_planned_route_are_drawn_where_they_lie(tmp_path):
     with written_log(tmp_path / "result.mcap") as log:
         write_scene(log, 100, 1.0, 1.0)
         data = np.zeros((30, 50), np.int8)
@@ -87,11 +87,18 @@ def test_an_occupied_cell_is_drawn_where_it_lies(tmp_path):
         place = {"position": {"x": -1.0, "y": 0.0}}
         info = {"resolution": 0.1, "width": 50, "height": 30, "origin": place}
         log.write("/grid", "nav_msgs/msg/OccupancyGrid", SECOND * 100, {"info": info, "data": data.ravel()})
+        poses = [
+            {"pose": pose} for pose in pose_messages(np.array([[0.0, 2.5, 0.0], [1.0, 2.5, 0.0], [3.0, 2.5, 0.0]]))
+        ]
+        log.write("/plan", "nav_msgs/msg/Path", SECOND * 100, {"poses": poses})
     floor = Floor(list(scenes_in(LogReader(tmp_path / "result.mcap"))))
     rows, columns = np.nonzero((floor.plan == LIGHT).all(axis=2))
     expected = floor.pixels(np.array([[3.0, 0.3], [3.1, 0.2]]))
     drawn = np.array([[columns.min(), rows.min()], [columns.max(), rows.max()]])
     assert np.abs(drawn - expected).max() <= 1
+    rows, columns = np.nonzero((floor.frame(0)[BAND:] == GREEN).all(axis=2))
+    (left, row), (right, _) = floor.pixels(np.array([[0.0, 2.5], [3.0, 2.5]]))
+    assert np.abs([columns.min() - left, columns.max() - right, rows.min() - row, rows.max() - row]).max() <= 2
 
 
 @pytest.mark.parametrize(("seconds", "rate"), [(0.0, 1.0), (0.001, 120.0), (100.0, 1.0)])
