@@ -30,8 +30,8 @@ def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
     with whole_file(path.with_name(f"{path.name}.csv")) as part, part.open("wb") as file:
         file.write((",".join(columns) + "\n").encode())
         csv.write_csv(table, file, csv.WriteOptions(include_header=False))
-    with whole_file(path.with_name(f"{path.name}.parquet")) as part:
-        parquet.write_table(table, part)
+    with whole_file(path.with_name(f"{path.name}.parquet")) as part, part.open("wb") as file:
+        parquet.write_table(table, file)  # a file, since pyarrow takes no path that is not UTF-8
 
 
 def _column(values: npt.NDArray[Any]) -> Any:
@@ -56,7 +56,7 @@ def read_table(path: Path, wanted: Callable[[str], bool] = lambda name: True) ->
     import pyarrow.parquet as parquet
 
     try:
-        with parquet.ParquetFile(path) as file:
+        with path.open("rb") as opened, parquet.ParquetFile(opened) as file:
             schema, left = file.schema_arrow, UNPACKED_BYTES + UNPACKED_RATIO * path.stat().st_size
             names = [name for name in schema.names if wanted(name)]
             batches = []

@@ -34,7 +34,7 @@ MAX_DIGITS = 10
 class ImageFolder(Recording):
     """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
-    Images are turned as the EXIF orientation of JPEG files states (`turned`).
+    Images are turned as the EXIF orientation of JPEG and PNG files states (`turned`).
     Counted in `dropped`: `missing_image`, `impossible_motion`, `no_position`, `no_time`, `duplicate_frame`,
     `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.

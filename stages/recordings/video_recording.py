@@ -33,6 +33,10 @@ COMPARED, MIN_CHANGE = 6, 0.1
 first one's, above which they differ: a camera at rest makes 0.001."""
 TOLERANCE_NS = 1_000_000
 """Between a frame's time as the container states it, and as the decoder does."""
+MIN_STEPS, IRREGULAR, REACHED = 10, 1.5, 0.9
+"""Smallest number of times between frames whose median tells that a video has fewer frames than by its stated rate:
+if it is above so many times of that; and the share of its stated length up to which it then has frames if it is whole,
+as the last one is shown for a while."""
 CONTAINERS = re.compile(
     rb"....(?:ftyp|moov|mdat|wide|free|skip|pnot)|RIFF....AVI |\x1aE\xdf\xa3|\x47.{187}\x47"
     rb"|\x00\x00\x01\xba|OggS|FLV\x01",
@@ -63,9 +67,9 @@ class VideoRecording(Recording):
                 "several tracks; write one that is progressive: "
                 f"`ffmpeg -i {path.name} -map 0:v:0 -vf yadif -c:v libx264 progressive.mp4`"
             )
-        stated = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        hidden = self._hidden()
-        self.stamps = self._in_order(_presentation_times(path))[hidden:]
+        hidden, times = self._hidden(), _presentation_times(path)
+        stated = _stated(self._capture, times)
+        self.stamps = self._in_order(times)[hidden:]
         self.stamps -= self.stamps[0] if len(self.stamps) else 0
         stated -= hidden
         if stated > len(self.stamps) and stated < MAX_FRAMES and not self.dropped:
@@ -180,7 +184,7 @@ def _opened(path: Path, packets: bool = False, ignoring_edits: bool = False) -> 
         raise UnreadableRecording(f"{path}: {error.strerror}; name a video that can be read") from None
     if not CONTAINERS.match(head):
         raise UnreadableRecording(f"{path}: this is no video, expected MP4, MOV, AVI, MKV, WebM, MPEG or Ogg")
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its messages on broken packets are counted here
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # no messages: frames without a picture are counted
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     options = os.environ.get(CAPTURE_OPTIONS, "")
     if ignoring_edits:
@@ -210,6 +214,16 @@ def _presentation_times(path: Path) -> list[int]:
             "give the parts, log=[FIRST,SECOND]"
         )
     return times
+
+
+def _stated(capture: cv2.VideoCapture, times: list[int]) -> float:
+    """Number of frames that a video states, which but in an MP4 is its length by its rate: if its frames come less
+    often than that, as many as fit into the length, or all of these `times` (ns) if they reach to its end."""
+    stated, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
+    steps = np.diff(np.unique(times)) / 1e9
+    if len(steps) < MIN_STEPS or rate <= 0.0 or np.median(steps) < IRREGULAR / rate:
+        return float(stated)
+    return float(len(times) if max(times) / 1e9 >= REACHED * stated / rate else stated / rate // np.median(steps))
 
 
 def _position(capture: cv2.VideoCapture) -> int:

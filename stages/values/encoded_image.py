@@ -22,7 +22,7 @@ MAX_SCANS = 64
 PNG_DEPTH = 24
 """Byte of a PNG that states its bits per channel."""
 EXIF_BYTES = 4096
-"""Largest part of a JPEG's beginning in which its EXIF orientation is looked for, bytes."""
+"""Largest part of a JPEG or PNG in which its EXIF orientation is looked for, bytes."""
 _TURNS: dict[int, Callable[[npt.NDArray[Any]], npt.NDArray[Any]]] = {
     2: lambda pixels: pixels[:, ::-1],
     3: lambda pixels: pixels[::-1, ::-1],
@@ -42,7 +42,7 @@ class Undecodable(ValueError):
 def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS) -> Bytes:
     """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
 
-    A JPEG is turned as its EXIF orientation states, as of a camera that was held on its side.
+    A JPEG or PNG is turned as its EXIF orientation states, as of a camera that was held on its side.
     JPEG, PNG, BMP, PNM, WebP and TIFF. Raises `Undecodable`; before anything is unpacked where the file states that it
     is larger than `max_pixels`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with
     grey.
@@ -70,20 +70,30 @@ def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS)
 
 
 def orientation_of(data: bytes) -> int:
-    """The orientation that the beginning of a JPEG file states in its EXIF, 1 to 8; 1, as it is, where it has none.
+    """The orientation that the beginning of a JPEG or PNG file states in its EXIF, 1 to 8; 1, as it is, where it has
+    none.
 
-    Exif 2.32 (CIPA DC-008), tag 0x0112.
+    Exif 2.32 (CIPA DC-008), tag 0x0112; PNG third edition, 11.3.3.5.
     """
-    at = 2
     try:
-        while data.startswith(b"\xff\xd8") and data[at] == 0xFF and data[at + 1] != 0xDA:
-            if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
-                entries = _entries(data[at + 10 : at + 10 + EXIF_BYTES], 0x0112)
-                return next((value for _, kind, value in entries if kind == 3), 1)
-            at += 2 + struct.unpack_from(">H", data, at + 2)[0]
+        entries = _entries(_exif(data), 0x0112)
+        return next((value for _, kind, value in entries if kind == 3), 1)
     except (IndexError, struct.error):
-        pass
-    return 1
+        return 1
+
+
+def _exif(data: bytes) -> bytes:
+    at = 8
+    while data.startswith(b"\x89PNG") and at < len(data):
+        if data[at + 4 : at + 8] == b"eXIf":
+            return data[at + 8 : at + 8 + EXIF_BYTES]
+        at += 12 + struct.unpack_from(">I", data, at)[0]
+    at = 2
+    while data.startswith(b"\xff\xd8") and data[at] == 0xFF and data[at + 1] != 0xDA:
+        if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
+            return data[at + 10 : at + 10 + EXIF_BYTES]
+        at += 2 + struct.unpack_from(">H", data, at + 2)[0]
+    return b""
 
 
 def size_of(data: bytes) -> tuple[int, int]:

@@ -63,8 +63,9 @@ def test_arguments_that_do_not_fit_are_said(words: str, said: str, capsys: pytes
 def test_a_tool_is_called_from_python(tmp_path: Path) -> None:
     whole = tmp_path / "a.omap"
     write_artifact(whole, reference_graph(20))
-    omninav.tool("map cut", str(whole), area=[0, -4, 8, 4], out=tmp_path / "b.omap")
-    cut = read_artifact(tmp_path / "b.omap")
+    omninav.tool("map cut", str(whole), area=[0, -4, 8, 4], out=tmp_path / "b=c.omap")
+    cut = read_artifact(tmp_path / "b=c.omap")
+    assert main(["map", "show", "b=c.omap"]) == 0  # a file, and no argument
     assert isinstance(cut, ReferenceGraph)
     assert 0 < len(cut) < 20
     with pytest.raises(omninav.BadInput, match=r"'map cot': there is no such tool; did you mean 'map cut'\?"):

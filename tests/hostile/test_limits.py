@@ -1,6 +1,7 @@
 """Small inputs that would take minutes or gigabytes: each is refused or counted within limits of time and memory."""
 
 import bz2
+import os
 import sqlite3
 import struct
 import subprocess
@@ -200,15 +201,17 @@ import numpy as np
 from omninav.pipeline.tables import read_table, write_table
 from omninav.stages.recordings.truth_file import read_trajectory
 print(len(read_trajectory(Path("truth.csv")).stamps))
-write_table(Path("frames"), {"x": np.ma.masked_invalid([1.0, np.nan])})
-print(len(read_table(Path("frames.parquet"))))
+write_table(Path("frames").absolute(), {"x": np.ma.masked_invalid([1.0, np.nan])})
+print(len(read_table(Path("frames.parquet").absolute())))
 """
 
 
-def test_tables_are_read_and_written_under_a_limit_of_addresses(tmp_path: Path):
-    (tmp_path / "truth.csv").write_text("t,x,y,yaw\n0,0,0,0\n1,1,0,0\n")
+def test_tables_are_read_and_written_under_a_limit_of_addresses_in_a_folder_whose_name_is_not_utf_8(tmp_path: Path):
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    (folder / "truth.csv").write_text("t,x,y,yaw\n0,0,0,0\n1,1,0,0\n")
     done = subprocess.run(
-        [sys.executable, "-c", UNDER_A_LIMIT], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", UNDER_A_LIMIT], cwd=folder, capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "2\n2\n", "")
 

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from omegaconf import OmegaConf
@@ -46,7 +47,7 @@ def run_tool(name: str, words: Sequence[str]) -> None:
 def tool_from(cls: type[Tool], words: Sequence[str]) -> Tool:
     """A tool with the arguments that words give it. Raises `ProblemsFound` with everything that does not fit."""
     typed, folders = read_words(words)
-    plain = [word for word in typed if "=" not in word and word[:1] not in "+~"]
+    plain = [word for word in typed if ("=" not in word or Path(word).exists()) and word[:1] not in "+~"]
     problems, parsed = parsed_words([word for word in typed if word not in plain])
     given = OmegaConf.create()
     if cls.groups:

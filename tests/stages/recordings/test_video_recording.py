@@ -147,6 +147,17 @@ def test_a_cut_video_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     assert recording.dropped["missing_frame"] == len(LEVELS) - len(recording.stamps)
 
 
+def test_frames_that_come_less_often_than_the_stated_rate_are_not_missing(tmp_path: Path) -> None:
+    path = Path(video(tmp_path / "slow.mkv", pictures(), "MJPG"))
+    content = bytearray(path.read_bytes())
+    at = content.index(b"\x23\xe3\x83\x84") + 4  # Matroska's DefaultDuration, of four bytes: ns a frame
+    assert content[at : at + 4] == (80_000_000).to_bytes(4)
+    content[at : at + 4] = (20_000_000).to_bytes(4)
+    path.write_bytes(content)
+    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) > 3 * len(LEVELS)
+    assert not open_recording(str(path)).dropped
+
+
 def test_what_is_no_video_is_refused_before_anything_is_decoded(tmp_path: Path) -> None:
     (tmp_path / "list.mp4").write_text("#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n")
     (tmp_path / "cut.mp4").write_bytes(Path(video(tmp_path / "whole.mp4", pictures())).read_bytes()[:2000])

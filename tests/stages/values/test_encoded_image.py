@@ -76,6 +76,16 @@ def test_a_jpeg_is_turned_as_its_exif_says_and_as_opencv_turns_it(orientation: i
     assert orientation_of(with_exif(orientation, 4)) == 1
 
 
+@pytest.mark.parametrize("last", [False, True])
+def test_a_png_is_turned_as_its_exif_says(last: bool):
+    data, exif = encoded(".png"), with_exif(6, 3)[24:58]
+    chunk = struct.pack(">I", len(exif)) + b"eXIf" + exif
+    at = data.index(b"IEND" if last else b"IDAT") - 4
+    turned = data[:at] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + data[at:]
+    assert orientation_of(turned) == 6
+    assert (decode_image(turned) == np.rot90(decode_image(data), -1)).all()
+
+
 @pytest.mark.parametrize(("width", "height"), [(8193, 4096), (2**31 - 1, 1), (0, 4), (2**32 - 1, 2**32 - 1)])
 def test_an_image_that_says_it_is_too_large_is_not_decoded(width: int, height: int):
     with pytest.raises(Undecodable, match=f"{width} x {height} pixels, at most"):
