@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -265,7 +266,7 @@ def _lacks(config: Any, name: str) -> bool:
 
 def _name_past_links(config: Any) -> None:
     """Names paths among the runs past their link, which will soon point elsewhere."""
-    runs = Path(str(config.get("runs", "runs"))).resolve()
+    runs = os.path.realpath(str(config.get("runs", "runs")))
     for key in settings_left_open():
         file = OmegaConf.select(config, key)  # whose errors name the key
         if isinstance(file, str) and Path(file).is_file() and Path(file).resolve().is_relative_to(runs):
@@ -274,8 +275,8 @@ def _name_past_links(config: Any) -> None:
 
 def _past_links(file: str) -> str:
     """A file's own path where it is named by way of a link."""
-    path = Path(file)
-    return file if path.resolve() == path.absolute() else str(path.resolve())
+    own = os.path.realpath(file)  # Path.resolve raises RuntimeError on a link to itself, until Python 3.13
+    return file if own == os.path.abspath(file) else own
 
 
 # settings that are read

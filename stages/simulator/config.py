@@ -15,6 +15,9 @@ FAR = 1e5
 Coordinate = Annotated[float, Bounds(ge=-FAR, le=FAR)]
 Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Bounds(gt=0, le=FAR)]
+Motion = Annotated[float, Bounds(ge=1e-3, le=FAR)]
+DayNumber = Annotated[int, Bounds(ge=0, le=4000)]
+"""A day of a world, from 2026 on: in 2038 the seconds of messages exceed 32 bits."""
 Extent = tuple[Positive, Positive]
 LampSpacing = Annotated[float, Bounds(ge=0.3, le=FAR)]
 Spread = Annotated[float, Bounds(ge=0, le=FAR)]
@@ -243,13 +246,13 @@ class Robot:
     """A differential drive that is steered along a route."""
 
     radius: Positive = 0.25
-    speed: Positive = 0.45
+    speed: Motion = 0.45
     """Maximum, m/s."""
-    turn_speed: Positive = 0.9
+    turn_speed: Motion = 0.9
     """Maximum, rad/s."""
-    acceleration: Positive = 0.5
+    acceleration: Motion = 0.5
     """m/s²."""
-    turn_acceleration: Positive = 2.0
+    turn_acceleration: Motion = 2.0
     """rad/s²."""
     look_ahead: Positive = 0.45
     """Distance along the route to the point that is steered for (pure pursuit)."""
@@ -437,7 +440,8 @@ class WorldConfig:
     ramps: Ramps = Ramps()
 
     def __post_init__(self) -> None:
-        """Raise ValueError for rooms and doors out of place, rooms of one name, crowds, and names that are none."""
+        """Raise ValueError for rooms and doors out of place, rooms of one name, crowds, names that are none, and a
+        camera above the ceiling."""
         named = [room.name for room in self.rooms]
         if twice := sorted({name for name in named if named.count(name) > 1}):
             raise ValueError(f"rooms: two or more are named {', '.join(twice)}; give each a name of its own")
@@ -455,6 +459,9 @@ class WorldConfig:
                         f"{where}, doors.{k}: {door.width:g} m at {door.at:g} m are not within its {door.side} wall, "
                         f"which is {length:g} m long"
                     )
+        eye = self.camera.get("height")
+        if isinstance(eye, int | float) and eye >= self.height:
+            raise ValueError(f"height: the ceiling is {self.height:g} m high, and the camera {eye:g} m (camera.height)")
         for number, day in enumerate(self.days):
             most = int(self.size[0] * self.size[1] * MAX_PEOPLE_PER_M2)
             if day.people > most:

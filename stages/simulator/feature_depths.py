@@ -1,16 +1,14 @@
 """Depths of image features in a simulated world."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 
-from .config import WorldConfig
+from .config import DayNumber, WorldConfig
 from .first_hits import first_hits
 from .world import World
 
@@ -22,7 +20,7 @@ class FeatureDepths(Stage):
     """A recorded log: then nothing is known of the place and the output is absent."""
     world: WorldConfig = WorldConfig()
     """The simulated world."""
-    day: Annotated[int, Bounds(ge=0)] = 0
+    day: DayNumber = 0
     """Day of the simulated world."""
 
     class Out(Outputs):

@@ -1,14 +1,12 @@
 """Floor plans of a simulated world, or of the place where a log was recorded."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.recordings.occupancy_grid import grid_beside, grid_digest, read_grid
 from omninav.stages.values.floor_plan import FloorPlan
 
-from .config import WorldConfig
+from .config import DayNumber, WorldConfig
 
 
 class FloorPlanOfLog(Stage):
@@ -23,7 +21,7 @@ class FloorPlanOfLog(Stage):
     """The recorded logs."""
     world: WorldConfig | None = WorldConfig()
     """The simulated world, for runs without a log; null: a real place, of which there is no plan."""
-    day: Annotated[int, Bounds(ge=0)] | tuple[int, ...] = 1
+    day: DayNumber | tuple[DayNumber, ...] = 1
     """Its days."""
 
     class Out(Outputs):

@@ -1,14 +1,12 @@
 """Views of a simulated robot's camera from the same place on another day."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Pose
 
-from .config import WorldConfig
+from .config import DayNumber, WorldConfig
 from .robot_camera import RobotCamera
 from .world import World
 
@@ -22,7 +20,7 @@ class OtherDay(Stage):
 
     world: WorldConfig = WorldConfig()
     """The simulated world."""
-    day: Annotated[int, Bounds(ge=0)] = 1
+    day: DayNumber = 1
     """The other day."""
 
     class Out(Outputs):

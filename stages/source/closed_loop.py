@@ -13,7 +13,7 @@ from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.cameras import shutter_times
-from omninav.stages.simulator.config import Kidnapping, WorldConfig
+from omninav.stages.simulator.config import DayNumber, Kidnapping, WorldConfig
 from omninav.stages.simulator.drawn_plan import ONE_PLAN
 from omninav.stages.simulator.drawn_starts import drawn_pose, drawn_way_back
 from omninav.stages.simulator.obstacles import gather
@@ -69,7 +69,7 @@ class ClosedLoop(Source):
 
     world: WorldConfig = WorldConfig()
     """The world, with the robot that drives in it."""
-    day: Annotated[int, Bounds(ge=0)] = 1
+    day: DayNumber = 1
     """As the world is on this day."""
     route: str = "drive"
     """The robot starts where this route of the world does, and faces along it."""

@@ -11,7 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.config import DayNumber, WorldConfig
 from omninav.stages.simulator.drawn_starts import drawn_pose
 from omninav.stages.simulator.first_hits import first_hits
 from omninav.stages.simulator.robot_camera import RobotCamera
@@ -42,7 +42,7 @@ class HomingGrid(Source):
     """A camera.yaml in place of the log's own."""
     world: WorldConfig = WorldConfig()
     """The world that they are rendered of."""
-    day: Annotated[int, Bounds(ge=0)] = 0
+    day: DayNumber = 0
     """As the world is on this day."""
     target: tuple[float, float, float] | Literal["drawn"] = (10.0, 8.0, 0.5)
     """x, y (m), heading (rad), of which only x and y matter in a log; `drawn`: anywhere on the free floor, another

@@ -5,7 +5,7 @@ from typing import Any
 
 from omninav.pipeline import Context, digest_text
 from omninav.stages.recordings.recording import Recording
-from omninav.stages.simulator.config import Kidnapping, WorldConfig
+from omninav.stages.simulator.config import DayNumber, Kidnapping, WorldConfig
 from omninav.stages.simulator.record_log import record_log
 from omninav.stages.simulator.simulated_recording import SimulatedRecording, drive_digest, in_order
 
@@ -27,7 +27,7 @@ class SimulatedSource(Playback):
     """The simulated world."""
     route: str = "drive"
     """Which of the world's routes is driven."""
-    day: int | tuple[int, ...] = 1
+    day: DayNumber | tuple[DayNumber, ...] = 1
     """On which day of the world, or one after the other on several."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """When and how the robot is lifted: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""

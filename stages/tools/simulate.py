@@ -1,7 +1,7 @@
 """Writes a drive through a simulated world as a log."""
 
 from omninav.pipeline import BadInput, Context, Tool, user_path
-from omninav.stages.simulator.config import Kidnapping, WorldConfig
+from omninav.stages.simulator.config import DayNumber, Kidnapping, WorldConfig
 from omninav.stages.simulator.record_log import record_log
 
 
@@ -20,7 +20,7 @@ class Simulate(Tool):
     """The simulated world."""
     route: str = "drive"
     """Name of a route of the world."""
-    day: int | tuple[int, ...] = 1
+    day: DayNumber | tuple[DayNumber, ...] = 1
     """Day, or several days, to drive on; floor plan and grid are those of the first."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """Further ones besides those of the route."""

@@ -326,6 +326,8 @@ def test_a_link_to_itself_in_place_of_a_run_is_one_line(capsys: pytest.CaptureFi
     Path("runs/latest").symlink_to("latest")
     assert main(["resume", "runs/latest"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+    assert main(["check", "map=runs/latest", "log=drive.mcap"]) == 2
+    assert "map: runs/latest: there is no such file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
