@@ -107,6 +107,12 @@ class Camera(Value, ABC):
         super().__init_subclass__(**kwargs)
         if projection:
             cls.projection = projection
+            other = MODELS.setdefault(projection, cls)
+            if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+                raise BadInput(
+                    f"camera: the projection '{projection}' of {cls.__module__}.{cls.__qualname__} is that of "
+                    f"{other.__module__}.{other.__qualname__}; give it a name of its own"
+                )
             MODELS[projection] = cls
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ which `layout.expand` turns into single bodies. Metres and radians in the map fr
 field states otherwise.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -462,6 +463,10 @@ class WorldConfig:
         eye = self.camera.get("height")
         if isinstance(eye, int | float) and eye >= self.height:
             raise ValueError(f"height: the ceiling is {self.height:g} m high, and the camera {eye:g} m (camera.height)")
+        at = self.camera.get("position")
+        away = [value for value in at.values() if isinstance(value, int | float)] if isinstance(at, dict) else []
+        if math.hypot(*away) > self.robot.radius:
+            raise ValueError(f"camera.position: it is beside the robot, whose radius is {self.robot.radius:g} m")
         for number, day in enumerate(self.days):
             most = int(self.size[0] * self.size[1] * MAX_PEOPLE_PER_M2)
             if day.people > most:

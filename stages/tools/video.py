@@ -76,7 +76,8 @@ class MakeVideo(Tool):
         for lost in messages.details.values():
             print(f"{lost}; the video shows what is left", file=sys.stderr)
         if not scenes:
-            raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and the end; see its frames.csv")
+            end = f"{self.end:g} s" if self.end else "the end"
+            raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and {end}; see its frames.csv")
         lasted = scenes[-1]["seconds"] - scenes[0]["seconds"]
         rate = self.speed * (len(scenes) - 1) / lasted if lasted > 0.0 else self.speed
         rate = min(max(rate, MIN_RATE), MAX_RATE)

@@ -37,11 +37,15 @@ def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_fo
         prepare_run(CONFIG | {"plots": "some"})
 
 
-def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(tmp_path: Path) -> None:
+def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = ended(CONFIG | {"runs": str(tmp_path)})
+    monkeypatch.chdir(tmp_path)  # it was started elsewhere
     before = {file.name: digest_file(file) for file in run.folder.iterdir() if file.is_file()}
     assert (run.folder / "report.html").read_text().count("<figure id=") == 1
     redraw(run.folder, "all")
+    assert Path.cwd() == tmp_path
     page = (run.folder / "report.html").read_text()
     assert page.count("<figure id=") == 2
     assert f"{run.folder.name}</pre>" in page  # and not the folder in which it was drawn

@@ -17,6 +17,9 @@ def test_all_models_of_the_folder_are_found_by_their_names_in_camera_yaml() -> N
     assert {"hyperbolic", "donut", "cylindrical", "equirectangular", "fisheye", "perspective"} <= set(found)
     assert {"double_sphere", "kannala_brandt", "ocamcalib", "unified"} <= set(found)
     assert all(model.projection == name for name, model in found.items())
+    with pytest.raises(BadInput, match=r"'cylindrical' of .*Other is that of .*camera\.cylindrical\."):
+        type("Other", (Camera,), {}, projection="cylindrical")
+    assert camera_models() == found
 
 
 def test_a_model_that_a_user_wrote_is_read_from_camera_yaml() -> None:

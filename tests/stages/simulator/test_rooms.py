@@ -85,6 +85,7 @@ def test_furniture_stands_in_its_room_away_from_the_door_and_is_the_same_each_ti
             r"rooms\.0 .*doors\.0: .* east wall, which is 3",
         ),
         ({"height": 0.5, "camera": {"height": 0.9}}, r"height: the ceiling is 0\.5 m high, and the camera 0\.9 m"),
+        ({"camera": {"position": {"x": 0.2, "y": -0.2}}}, r"camera\.position: .* radius is 0\.25 m"),
         ({"days": ({"people": 1000},)}, r"days\.0\.people: 1000, expected at most 108"),
         ({"rooms": (DEN,), "days": ({}, {"lamps_off": ("dne",)})}, r"days\.1\.lamps_off: .* 'dne'; .*: den$"),
     ],
