@@ -151,7 +151,8 @@ class ConfidenceMonitor(Stage):
     the estimate, and an image without one counts against it, the more, the more of the map's own images have one: the
     robot may be nowhere on the map. So until one is found, in images that have features, appearance is not believed
     either: it agrees with itself in another building too. Where `track` reports that the robot was carried, all that
-    was known before is forgotten.
+    was known before is forgotten. Where the estimate jumps away from what landmarks said was right, that speaks against
+    it.
 
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
@@ -200,6 +201,7 @@ class ConfidenceMonitor(Stage):
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
         leads, seen = None, features is None or len(features) >= MIN_SEEN
+        jumped = len(recent.estimates) > 0 and consistency(recent.estimates[-1:], pose, gate, radians)[0] < 0.5
         if similarities is not None and similarities.values.size and seen:
             novelty = 1.0 if likelihood is None else likelihood.novelty
             leads = leads_of_best(similarities, map, pose, ELSEWHERE * gate)
@@ -226,6 +228,8 @@ class ConfidenceMonitor(Stage):
             if recent.found:  # it may have left the mapped way; before, that would excuse every other building
                 nearest = float(np.hypot(*(map.poses[:, :2] - pose[:2]).T).min(initial=math.inf))
                 looked_for *= share_found(nearest / length_scale.metres)
+            if jumped and (fix is None or float(fix.probabilities.sum()) < 0.5):
+                recent.geometry = min(recent.geometry, -recent.geometry)  # it was said of the pose that this one left
             recent.geometry, sure = by_landmarks(recent.geometry, fix, looked_for, pose, (gate, radians), new, most)
             recent.found |= sure >= SURE or recent.geometry >= SURE_TOGETHER
             recent.missed = 0.0 if recent.found else max(recent.missed, looked_for)

@@ -405,6 +405,23 @@ def test_landmarks_speak_for_the_pose_they_give_and_their_absence_against_every_
     assert by_landmarks(4.0, None, 1.0, here, gate, 0.0, 2.0)[0] == pytest.approx(4.0)  # nor from the same image again
 
 
+def test_what_landmarks_said_for_a_pose_speaks_against_another_to_which_the_estimate_jumps():
+    map, way = line_with_landmarks(1.0), list(range(10))
+    here = [fix(float(x), 0.4) for x in range(10)]
+
+    def after(jump: float, seen: LandmarkFix | None) -> float:
+        recent = ConfidenceMonitorState()
+        for x, found in zip((*way, 10.0 + jump), (*here, seen), strict=True):
+            inputs = {"motion": Motion(1.0, 0.0, 0.0), "features": features(200), "fix": found}
+            judged(ConfidenceMonitor(), HERE + np.array((x, 0.0, 0.0)), alike(int(x)), recent, None, map, **inputs)
+        return recent.geometry
+
+    assert after(0.0, None) > 3.0  # it drives on
+    assert after(20.0, None) < -3.0
+    assert after(20.0, fix(30.0, 0.99)) > 3.0  # found by landmarks
+    assert after(20.0, fix(30.0, 0.1)) < -1.5
+
+
 def test_missed_landmarks_take_away_what_agreement_says_and_not_what_disagreement_does():
     def told(x: float, number: int, seen: LandmarkFix | None = None) -> float:
         """Log odds after an image whose best match lies at x, then one that has as many features."""
