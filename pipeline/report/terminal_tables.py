@@ -1,13 +1,13 @@
 """Results and comparisons as tables for the terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from string import ascii_uppercase
 from typing import Any
 
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
-from omninav.pipeline.graph.results import Metrics, by_path
+from omninav.pipeline.graph.results import Metrics
 
 from .headlines import headline_rows
 from .metrics import best_of, head_of, is_detail, metric_values
@@ -17,6 +17,7 @@ from .sweep_table import Overview
 MAX_HEAD_LENGTH = 24
 """Longest run's name at the head of a column, in characters."""
 
+_ABSENT = "–"
 COLUMN_EDGE = 3
 """Columns of the terminal that a table's column takes beside its text."""
 
@@ -91,7 +92,7 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> TerminalTable:
         caption="\n".join(below),
         caption_justify="left",
     )
-    table.add_column("")
+    table.add_column("", overflow="fold")
     for head in heads:
         table.add_column(head, justify="right", overflow="fold")
     table.add_row("variant", *(str(run["manifest"].get("variant", "")) for run in runs))
@@ -114,8 +115,26 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> TerminalTable:
 
 
 def differing_settings(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
-    """Dotted names of settings that are not the same in all configurations, with each one's value ('–': not there)."""
-    flat = [dict(by_path(config)) for config in configs]
-    names = dict.fromkeys(name for settings in flat for name in settings)
-    found = [(name, [str(settings.get(name, "–")) for settings in flat]) for name in names]
-    return [(name, values) for name, values in found if len(set(values)) > 1]
+    """Dotted names of settings that are not the same in all configurations, with each one's value ('–': not there).
+
+    Of stages that differ, or that one configuration lacks, the classes are given, and neither parameters nor wires.
+    Artifacts of one graph are listed once.
+    """
+    found: dict[tuple[str, ...], tuple[str, list[str]]] = {}
+    for name, values in _differing("", configs):
+        own = name.split(".", 2)[-1] if name.startswith("artifacts.") else name
+        found.setdefault((own, *values), (name, values))
+    return list(found.values())
+
+
+def _differing(name: str, values: Sequence[Any]) -> Iterator[tuple[str, list[str]]]:
+    parts = [value for value in values if isinstance(value, Mapping)]
+    if len(parts) == len(values) and len({str(part.get("_target_")) for part in parts}) == 1:
+        for key in dict.fromkeys(key for part in parts for key in part):
+            yield from _differing(f"{name}.{key}".lstrip("."), [part.get(key, _ABSENT) for part in parts])
+    elif any(value != values[0] for value in values) and not (_ABSENT in values and ".wires." in f".{name}"):
+        yield name, [_in_short(value) for value in values]
+
+
+def _in_short(value: Any) -> str:
+    return str(value.get("_target_", "…")).rpartition(".")[2] if isinstance(value, Mapping) else str(value)

@@ -114,7 +114,22 @@ def test_runs_with_long_names_stand_under_letters_that_are_explained():
 
 
 def test_settings_that_one_run_does_not_have_differ_too():
-    assert differing_settings([{"a": 1, "b": {"c": 2}}, {"a": 1}]) == [("b.c", ["2", "–"])]
+    assert differing_settings([{"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"d": 3}}]) == [("b.c", ["2", "–"])]
+    of_two = [
+        {
+            "nodes": {"match": {"_target_": f"stages.{cls}", **own}, "both": {"_target_": "stages.B", "own": own}},
+            "wires": {"both": {"in": f"{cls}.out"}, **own},
+        }
+        for cls, own in (("L2", {}), ("Cosine", {"power": 2}))
+    ]
+    artifacts = [{"artifacts": {name: {"graph": graph} for name in ("map", "words")}} for graph in of_two]
+    rows = [
+        ("nodes.match", ["L2", "Cosine"]),
+        ("nodes.both.own.power", ["–", "2"]),
+        ("wires.both.in", ["L2.out", "Cosine.out"]),
+    ]
+    assert differing_settings(of_two) == rows
+    assert differing_settings(artifacts) == [(f"artifacts.map.graph.{name}", values) for name, values in rows]
 
 
 def test_control_characters_of_a_text_are_shown_and_never_sent():
