@@ -18,6 +18,8 @@ SUFFIXES |= {suffix: suffix for suffix in (".png", ".bmp", ".webp", ".ppm")}
 """Suffixes of images, in small letters, and the one that stands for their kind."""
 DIGITS = re.compile(r"\d+")
 """Part of a name that differs within a series."""
+CAMERA = re.compile(r"\D*(?:cam|camera|lens)[-_ ]?\d+(?=\D+\d)", re.IGNORECASE)
+"""Beginning of a name that numbers a camera: another part differs within its series."""
 MAX_SERIES = 4
 """Series of images that are named."""
 WRAP_STEPS = 10.0
@@ -44,7 +46,7 @@ class UndescribedFolder(Format):
         recording = ImageFolder(log, folder, description, str(folder), options)
         for other, number in others:
             recording.drop("another_kind", f"{log}: {number} {other} beside {count} {kind}", number)
-        series = Counter(DIGITS.sub("#", path.stem) for path in recording.paths)
+        series = Counter(_series(path.stem) for path in recording.paths)
         if len(series) > 1:
             names = ", ".join(f"{name} ({number})" for name, number in series.most_common(MAX_SERIES))
             told = (
@@ -57,6 +59,12 @@ class UndescribedFolder(Format):
         if options.rate is None:
             recording.assumed = (*recording.assumed, f"{log}: {rate:g} image per second (rate=… says otherwise)")
         return recording
+
+
+def _series(name: str) -> str:
+    numbered = CAMERA.match(name)
+    end = numbered.end() if numbered else 0
+    return name[:end] + DIGITS.sub("#", name[end:])
 
 
 def _kinds(folder: Path) -> Counter[str]:

@@ -68,6 +68,11 @@ def test_images_of_several_series_in_one_folder_are_told(tmp_path: Path) -> None
     assert "images of" not in " ".join(open_recording(str(folder)).assumed)
     (folder / "image_1.jpg").rename(folder / "right_0.jpg")
     assert "images of 2 series, image_# (1), right_# (1)" in " ".join(open_recording(str(folder)).assumed)
+    for old, new in (("image_0", "cam1_0"), ("right_0", "cam2_0")):
+        (folder / f"{old}.jpg").rename(folder / f"{new}.jpg")
+    assert "images of 2 series, cam1_# (1), cam2_# (1)" in " ".join(open_recording(str(folder)).assumed)
+    (folder / "cam2_0.jpg").rename(folder / "cam1_1.jpg")
+    assert "images of" not in " ".join(open_recording(str(folder)).assumed)
 
 
 @pytest.mark.parametrize(
