@@ -16,7 +16,8 @@ FAR = 1e5
 Coordinate = Annotated[float, Bounds(ge=-FAR, le=FAR)]
 Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Bounds(gt=0, le=FAR)]
-Motion = Annotated[float, Bounds(ge=1e-3, le=FAR)]
+Pace = Annotated[float, Bounds(ge=1e-3, le=FAR)]
+"""A speed or acceleration (m or rad): slower, a drive has more images than a memory."""
 DayNumber = Annotated[int, Bounds(ge=0, le=4000)]
 """A day of a world, from 2026 on: in 2038 the seconds of messages exceed 32 bits."""
 Extent = tuple[Positive, Positive]
@@ -247,13 +248,13 @@ class Robot:
     """A differential drive that is steered along a route."""
 
     radius: Positive = 0.25
-    speed: Motion = 0.45
+    speed: Pace = 0.45
     """Maximum, m/s."""
-    turn_speed: Motion = 0.9
+    turn_speed: Pace = 0.9
     """Maximum, rad/s."""
-    acceleration: Motion = 0.5
+    acceleration: Pace = 0.5
     """m/s²."""
-    turn_acceleration: Motion = 2.0
+    turn_acceleration: Pace = 2.0
     """rad/s²."""
     look_ahead: Positive = 0.45
     """Distance along the route to the point that is steered for (pure pursuit)."""
@@ -442,7 +443,7 @@ class WorldConfig:
 
     def __post_init__(self) -> None:
         """Raise ValueError for rooms and doors out of place, rooms of one name, crowds, names that are none, and a
-        camera above the ceiling."""
+        camera above the ceiling or beside the robot."""
         named = [room.name for room in self.rooms]
         if twice := sorted({name for name in named if named.count(name) > 1}):
             raise ValueError(f"rooms: two or more are named {', '.join(twice)}; give each a name of its own")
