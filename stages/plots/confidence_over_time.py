@@ -40,13 +40,14 @@ class ConfidenceOverTime(PlotStage):
         if found:
             chart.name("confidence", "ink")
         low = float((last.confidence < 0.5).mean())
+        why = ": the place is doubtful, or the belief is wider than the tolerance" if low else ""
         longest = sorted(sorted(found, key=lambda each: each.first - each.last)[:MAX_TOLD], key=lambda each: each.first)
         told = [f" {each.images.capitalize()}, {each.cause}: {each.evidence}." for each in longest]
         return self.drawn(
             name="confidence_over_time",
             title="Confidence over time",
             caption="The probability that the estimate is right, computed from images and belief without ground truth. "
-            f"{100 * low:.0f} % of the frames are below a half (dotted).{''.join(told)}",
+            f"{100 * low:.0f} % of the frames are below a half (dotted){why}.{''.join(told)}",
             content=chart.svg(),
             order=12,
         )
