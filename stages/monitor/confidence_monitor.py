@@ -201,12 +201,12 @@ class ConfidenceMonitor(Stage):
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
         leads, seen = None, features is None or len(features) >= MIN_SEEN
-        jumped = len(recent.estimates) > 0 and consistency(recent.estimates[-1:], pose, gate, radians)[0] < 0.5
+        jumped = len(recent.estimates) > 0 and consistency(recent.estimates[-1:], pose, gate, radians)[0] <= 0.5
         if similarities is not None and similarities.values.size and seen:
             novelty = 1.0 if likelihood is None else likelihood.novelty
             leads = leads_of_best(similarities, map, pose, ELSEWHERE * gate)
             distinct, against = share_counted(leads.over_elsewhere), share_counted(leads.over_estimate)
-            repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
+            repeated = recent.contradicted > 0.5 and not jumped
             new = 1.0 if against > 0.5 and not repeated else novelty
             recent.contradicted = against
             recent.add(leads.place, pose, new, novelty * distinct, new * against)

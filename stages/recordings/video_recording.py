@@ -34,9 +34,8 @@ first one's, above which they differ: a camera at rest makes 0.001."""
 TOLERANCE_NS = 1_000_000
 """Between a frame's time as the container states it, and as the decoder does."""
 MIN_STEPS, IRREGULAR, REACHED = 10, 1.5, 0.9
-"""Smallest number of times between frames whose median tells that a video has fewer frames than by its stated rate:
-if it is above so many times of that; and the share of its stated length up to which it then has frames if it is whole,
-as the last one is shown for a while."""
+"""Frames come less often than the stated rate says if the median of at least `MIN_STEPS` intervals is `IRREGULAR` times
+as long. Such a video is whole if its last frame, which is shown for a while, is beyond `REACHED` of its length."""
 CONTAINERS = re.compile(
     rb"....(?:ftyp|moov|mdat|wide|free|skip|pnot)|RIFF....AVI |\x1aE\xdf\xa3|\x47.{187}\x47"
     rb"|\x00\x00\x01\xba|OggS|FLV\x01",
@@ -217,8 +216,8 @@ def _presentation_times(path: Path) -> list[int]:
 
 
 def _stated(capture: cv2.VideoCapture, times: list[int]) -> float:
-    """Number of frames that a video states, which but in an MP4 is its length by its rate: if its frames come less
-    often than that, as many as fit into the length, or all of these `times` (ns) if they reach to its end."""
+    """Number of frames that a video should have. Only MP4 stores it; elsewhere OpenCV gives length times rate, too many
+    where frames come less often: then as many as fit, or all of these `times` (ns) if they reach the end."""
     stated, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
     steps = np.diff(np.unique(times)) / 1e9
     if len(steps) < MIN_STEPS or rate <= 0.0 or np.median(steps) < IRREGULAR / rate:

@@ -17,7 +17,7 @@ Coordinate = Annotated[float, Bounds(ge=-FAR, le=FAR)]
 Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Bounds(gt=0, le=FAR)]
 Pace = Annotated[float, Bounds(ge=1e-3, le=FAR)]
-"""A speed or acceleration (m or rad): slower, a drive has more images than a memory."""
+"""A speed or acceleration (m, rad and s): a slower drive has more images than memory holds."""
 DayNumber = Annotated[int, Bounds(ge=0, le=4000)]
 """A day of a world, from 2026 on: in 2038 the seconds of messages exceed 32 bits."""
 Extent = tuple[Positive, Positive]
