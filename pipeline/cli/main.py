@@ -26,20 +26,20 @@ WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "doctor")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 well, 1 a stage failed, 2 the configuration or an input is wrong."""
-    before = sys.stdout
+    before = sys.stdout, sys.stderr
     mend_streams()
     try:
         with cleaned(sys.stdout, sys.stderr):
             code = _run(list(sys.argv[1:] if argv is None else argv))
         lost = lost_output()
+        if lost is not None:
+            print(f"standard output: {lost.strerror}; what was printed is lost, all else was done", file=sys.stderr)
+        return code if lost is None else code or 2
     except BrokenPipeError:
         return 0
     finally:
-        if before is not None:
-            sys.stdout = before
-    if lost is not None:
-        print(f"standard output: {lost.strerror}; what was printed is lost, all else was done", file=sys.stderr)
-    return code if lost is None else code or 2
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = before
 
 
 def _run(arguments: list[str]) -> int:

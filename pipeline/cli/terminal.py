@@ -17,7 +17,10 @@ NO_TERMINAL = 120
 
 def show(renderable: Any) -> None:
     """Print a table or a text in the terminal's width; without one in `NO_TERMINAL` columns and no colour."""
-    _console().print(PlainTexts(renderable))
+    try:
+        _console().print(PlainTexts(renderable))
+    except SystemExit:  # so rich ends a program whose reader has gone
+        raise BrokenPipeError from None
 
 
 def terminal_width() -> int:
