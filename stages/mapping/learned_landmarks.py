@@ -108,7 +108,7 @@ class LearnLandmarks(Stage):
         looks = map_making.mean_descriptors(views, sightings)
         left_out = left_out_poses(views, sightings, looks, poses, sigma, _candidates(words))
         landmarks = Landmarks(
-            sightings.points.astype(np.float32),
+            sightings.points,
             stored_descriptors(looks),
             starts,
             seen,

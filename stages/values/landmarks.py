@@ -19,7 +19,7 @@ DESCRIPTOR_SCALE = 512.0
 class Landmarks(Value):
     """Points of the world that several references of a map see, with what they look like, and the references' words.
 
-    `points` (L, 3) float32: x, y (m) in the map frame, z (m) above the camera's projection centre. `descriptors` (L, D)
+    `points` (L, 3): x, y (m) in the map frame, z (m) above the camera's projection centre. `descriptors` (L, D)
     uint8: the mean of each point's descriptors as `stored_descriptors` makes them. Of reference r the points that it
     sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a bearing, as the map's
     own images miss its points. `words`: the visual words of the references, by which candidates are found.
@@ -32,7 +32,7 @@ class Landmarks(Value):
     given and the images confirm them; None where nothing was adjusted.
     """
 
-    points: Annotated[Floats, Shape("L", 3)]
+    points: Annotated[Array | Floats, Shape("L", 3)]
     descriptors: Annotated[Bytes, Shape("L", "D")]
     starts: Annotated[Ints, Shape("R+1"), Starts("S")]
     seen: Annotated[npt.NDArray[np.int32], Shape("S"), RowsOf("L")]

@@ -54,6 +54,7 @@ def _triangulate(
         low, high = starts[t], starts[t + 1]
         kept[low:high] = True
         weights[low:high] = 1.0
+        origin = centres[low]  # the map's own may be thousands of kilometres away
         point, views = np.empty(3), high - low
         for _ in range(ROUNDS):
             if views < MIN_VIEWS:
@@ -65,10 +66,10 @@ def _triangulate(
                         for j in range(3):
                             part = weights[o] * ((1.0 if i == j else 0.0) - bearings[o, i] * bearings[o, j])
                             square[i, j] += part
-                            right[i] += part * centres[o, j]
+                            right[i] += part * (centres[o, j] - origin[j])
             for i in range(3):
                 square[i, i] += 1e-9
-            point = solve(square, right)
+            point = solve(square, right) + origin
             views = 0
             for o in range(low, high):
                 x, y, z = point[0] - centres[o, 0], point[1] - centres[o, 1], point[2] - centres[o, 2]

@@ -51,4 +51,4 @@ def test_too_few_or_too_many_maps_are_counted(given: list[str] | None, least: in
 def test_points_follow_a_header_that_counts_them() -> None:
     header, _, points = ply(np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])).partition(b"end_header\n")
     assert b"element vertex 2\n" in header
-    assert np.frombuffer(points, "<f4").tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert np.frombuffer(points, "<f8").tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]

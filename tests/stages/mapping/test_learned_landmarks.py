@@ -56,6 +56,13 @@ def test_only_images_that_became_references_are_used() -> None:
     assert some.landmarks.descriptors.tobytes() == alone.landmarks.descriptors.tobytes()
 
 
+def test_a_map_of_national_coordinates_is_as_exact() -> None:
+    poses, origin = tour_poses(0.2)[:20], np.array([5e5, 5.4e6, 0.0])
+    here, there = (with_landmarks(graph_of(at), seen_along(poses)) for at in (poses, poses + origin))
+    assert len(here.landmarks) == len(there.landmarks) > 50
+    assert np.abs(there.landmarks.points - origin - here.landmarks.points).max() < 1e-4
+
+
 def test_a_tour_of_one_image_is_warned_of() -> None:
     poses, ctx, events = tour_poses()[:1], Context("landmarks"), [ReferenceEvent(0, "far")]
     words = LearnVisualWords(words=300).step(Context("words"), seen_along(poses), events).words

@@ -106,7 +106,7 @@ def test_landmarks_are_written_as_a_point_cloud(tmp_path: Path, capsys: pytest.C
     assert f"points.ply: {len(map.landmarks)} landmarks" in capsys.readouterr().out
     header, points = (tmp_path / "points.ply").read_bytes().split(b"end_header\n", 1)
     assert header.split(b"\n")[1:3] == [b"format binary_little_endian 1.0", b"element vertex %d" % len(map.landmarks)]
-    assert np.frombuffer(points, "<f4").reshape(-1, 3).tolist() == map.landmarks.points.tolist()
+    assert np.frombuffer(points, "<f8").reshape(-1, 3).tolist() == map.landmarks.points.tolist()
 
 
 def test_a_map_without_landmarks_has_no_point_cloud(tmp_path: Path):

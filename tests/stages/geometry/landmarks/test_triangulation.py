@@ -17,10 +17,11 @@ def towards(points, centres=CENTRES):
     return starts, np.tile(centres, (len(points), 1)), bearings
 
 
-def test_points_are_where_all_bearings_meet() -> None:
-    points = np.random.default_rng(0).uniform([-5, -4, -1], [6, 3, 2], (50, 3))
-    found = triangulated_tracks(*towards(points), **LIMITS)
-    assert found.points == pytest.approx(points, abs=1e-5)
+@pytest.mark.parametrize("origin", [[0.0, 0.0, 0.0], [5e5, 5.4e6, 0.0]])
+def test_points_are_where_all_bearings_meet(origin: list[float]) -> None:
+    points = origin + np.random.default_rng(0).uniform([-5, -4, -1], [6, 3, 2], (50, 3))
+    found = triangulated_tracks(*towards(points, origin + CENTRES), **LIMITS)
+    assert np.abs(found.points - points).max() < 1e-5
     assert found.kept.all()
 
 
