@@ -258,9 +258,9 @@ def by_landmarks(
     `found_rate`: share of the map's images whose landmarks give a pose; `gate`: agreement of poses (m, rad); `novelty`:
     how new the image is; `max_against`: log odds of images without a pose against the estimate, at most. A wrong pose
     is in one of `PLACES_ALIKE`, so that few landmarks that agree with the estimate count much for it; but poses that
-    are each rather wrong than right raise the odds to 50 at most. Where landmarks are elsewhere, as much as the pose
-    may be wrong speaks against the estimate. A sure pose outweighs all that was known before, as the robot may have
-    been carried elsewhere.
+    are each rather wrong than right raise the odds to 50 at most, and an image that is repeated counts as it is new.
+    Where landmarks are elsewhere, as much as the pose may be wrong speaks against the estimate. As far as a pose is
+    sure, it stands for all that was known before, as the robot may have been carried elsewhere.
     """
     probability = 1.0 / (1.0 + math.exp(-before))
     probability += (0.5 - probability) * CARRIED_SINCE * novelty
@@ -280,8 +280,10 @@ def by_landmarks(
     bound = math.log(1.0 / KIDNAPPING_PROBABILITY)
     if sure < 0.5:  # however many agree: one wall misleads all images that show it
         told = min(told, max(0.0, bound - kept))
-    kept += sure * (min(max(kept, -bound), bound) - kept)
-    return kept + (sure + (1.0 - sure) * counted) * told, sure
+    unbound = kept + sure * (min(max(kept, -bound), bound) - kept)
+    if told > 0.0:
+        return max(unbound + counted * told, kept + sure * (told - kept)), sure
+    return unbound + (sure + (1.0 - sure) * counted) * told, sure
 
 
 def share_found(distance: float) -> float:
