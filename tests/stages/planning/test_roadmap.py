@@ -23,7 +23,7 @@ from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.commands import GOAL_TOPIC, GoalPoint
 from omninav.stages.values.confidence import PoseConfidence
-from omninav.stages.values.homing import DrivingStatus, PathProgress
+from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
@@ -301,8 +301,8 @@ class Line:
         self.plan, self.point = RoadmapPlannerState(), GoalPoint(x, 0.0)
         self.map = graph_of(np.column_stack([np.arange(0.0, 6.5, 0.5), np.zeros((13, 2))]))
 
-    def at(self, x: float, seconds: float = 0.0, confidence: float = 0.5, **how) -> RoadmapPlanner.Out:
-        pose, point, self.point = Pose(x, 0.0, 0.3), self.point, None
+    def at(self, x: float, seconds: float = 0.0, confidence: float = 0.5, y: float = 0.0, **how) -> RoadmapPlanner.Out:
+        pose, point, self.point = Pose(x, y, 0.3), self.point, None
         known = PoseEstimate(pose, np.eye(3), 1.0, pose), PoseConfidence(confidence)
         tick = Tick(0, int(seconds * 1e9))
         return RoadmapPlanner().step(Context("planning"), self.plan, tick, self.map, *known, point=point, **how)
@@ -318,7 +318,11 @@ def test_it_drives_to_a_point_ahead_and_its_ratio_falls_from_one_within_each_leg
     assert [v.ratio for v in vectors] == pytest.approx([1.0, 0.5, 0.05, 1.0, 1.0, 0.8])
     assert [line.at(x).progress.last for x in (4.5, 5.5)] == [False, True]
     assert vars(line.at(5.5).progress) == vars(PathProgress(0, 0, 1, 3, True, False, False))
-    assert line.at(5.5, confidence=0.49).vector.state == "lost"
+    lost, why = line.at(5.5, confidence=0.49).vector, "the confidence in where it is is 0.49"
+    expected = HomingVector(3, pytest.approx(-0.3), 0.0, 0.5, 1.0, 1.0, None, 0, "lost", why)
+    assert vars(lost) == vars(expected)
+    assert vectors[0].why == ""
+    assert Line(6.0).at(0.2, y=0.2).route.places[0] == 1  # at 0.36 m, and the next at 0.82: the nearest is at 0.28
 
 
 def test_a_leg_is_done_beyond_two_metres_and_none_begins_before_the_robot_knows_where_it_is() -> None:
@@ -340,8 +344,9 @@ def test_where_the_map_falls_apart_no_path_leads_to_the_goal() -> None:
 def test_it_goes_to_points_within_five_metres_of_the_map_and_has_arrived_after_ten_seconds_within_a_decimetre() -> None:
     assert [Line(x).at(0.0).route.state for x in (10.9, 11.1)] == ["under way", "gave up"]
     line = Line(6.0)
-    states = [line.at(x, s).route.state for x, s in ((5.91, 0), (5.89, 5), (5.91, 9), (5.91, 18.9), (5.91, 19))]
-    assert states == ["under way"] * 4 + ["arrived"]
+    outs = [line.at(x, s) for x, s in ((5.91, 0), (5.89, 5), (5.91, 9), (5.91, 18.9), (5.91, 19))]
+    assert [out.route.state for out in outs] == ["under way"] * 4 + ["arrived"]
+    assert vars(outs[-1].progress) == vars(PathProgress(0, 1, 1, 1, True, False, True))
 
 
 def test_a_way_counts_longer_beside_where_it_was_blocked_and_ten_times_as_much_the_second_time() -> None:
