@@ -106,10 +106,9 @@ class RotationTranslationRotation(OdometryNoiseModel, Stage):
         """Predict the belief. `fix`: of the image before."""
         if motion is None:
             measured.start(None)
-        elif fix is not None:
-            measured.compare(fix)
-        if motion is None:
             return self.Out(belief=belief)
+        if fix is not None:
+            measured.compare(fix)
         model = self.model(motion)
         measured.move(motion, model)
         if type(motion) is Motion:

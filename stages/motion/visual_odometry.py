@@ -40,8 +40,8 @@ class VisualOdometryState(State):
     `odometry` (3,): the path so far. `length`: guessed lengths since the last keyframe (m), and `speed_ratio`: length
     seen over length guessed, of late. `scales` (N,): estimates of what lengths are to be multiplied by, and
     `map_scales` (M,): those of the map's landmarks, which count alone once they agree (`by_map`). `anchor` (2, 2): a
-    place in the frame of the keyframes, and in the map. `lost`: images in a row without motion; `seen`: images with
-    motion; `unscaled`: keyframes without scale.
+    place in the frame of the keyframes, and in the map. `lost`: images in a row without motion; `seen`: one has
+    shown motion; `unscaled`: keyframes without scale.
     """
 
     keyframes: Keyframes = field(
@@ -56,7 +56,7 @@ class VisualOdometryState(State):
     by_map: bool = False
     anchor: Array | None = None
     lost: int = 0
-    seen: int = 0
+    seen: bool = False
     unscaled: int = 0
 
 
@@ -107,7 +107,7 @@ class VisualOdometry(Stage):
         if found is None:
             seen = self._lost(ctx, state, motion, usual, features.bearings, descriptors)
         else:
-            lost, state.lost, state.seen, state.pose = state.lost, 0, state.seen + 1, found.pose
+            lost, state.lost, state.seen, state.pose = state.lost, 0, True, found.pose
             unit = 1.0 if found.scaled else state.speed_ratio * state.length
             if not found.scaled:
                 last = state.keyframes.poses[-1, :2]

@@ -29,7 +29,9 @@ def made() -> TopologicalMap:
 def compared(features: LocalFeatures, map: TopologicalMap, moments: GlobalDescriptor = GREY) -> VisualDistances:
     stage, context = VisualDistance(), Context("match")
     stage.setup(context)
-    return stage.step(context, features=features, descriptor=moments, map=map).distances
+    found = stage.step(context, features=features, descriptor=moments, map=map).distances
+    assert context.counts.get("nothing_in_common", 0) == np.isinf(found.distances).all()
+    return found
 
 
 def test_the_place_where_a_robot_stands_is_the_nearest_and_says_how_it_is_turned(made: TopologicalMap) -> None:

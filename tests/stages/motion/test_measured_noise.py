@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.odometry_noise_model import OdometryNoiseModel
 from omninav.stages.motion.rotation_translation_rotation import MeasuredNoise
 from omninav.stages.values.landmarks import LandmarkFix
-from omninav.stages.values.pose import BridgedMotion, Motion
+from omninav.stages.values.pose import BridgedMotion, Motion, UncertainMotion
 
 STATED = OdometryNoiseModel()
 
@@ -53,3 +54,31 @@ def test_unsure_poses_and_bridged_motions_say_nothing_of_odometry():
     measured.move(bridged, STATED.model(bridged))
     measured.compare(fix(np.zeros(3)))
     assert measured.applied(stated).sigmas == stated.sigmas
+
+
+@pytest.mark.parametrize(
+    ("way", "away", "before", "squares", "stretches"),
+    [
+        # Errors of 0.5 rad and 0.5 m: (0.25 - 0.01) / 0.5 of the turn, (0.25 - 0.06) / 0.08 of the length.
+        (0.7, 1.0, 3.0, [3.48, 5.375], 4.0),
+        (0.7, 9.0, 3.0, [3.48, 19.0], 4.0),  # carried
+        (0.7, 1.0, 100.0, [99.48, 101.375], 100.0),  # the oldest are forgotten
+        (0.5, 1.0, 3.0, [3.48, 5.375], 4.0),
+        (0.48, 1.0, 3.0, [3.0, 3.0], 3.0),  # too short, and too long a way
+        (5.0, 1.0, 3.0, [3.0, 3.0], 3.0),
+    ],
+)
+def test_a_stretch_counts_by_its_errors_beyond_those_of_landmarks(way, away, before, squares, stretches):
+    measured, start = MeasuredNoise(squares=np.full(2, before), stretches=before), np.array([1.0, 2.0, 0.1])
+    measured.compare(fix(start))
+    for x, turn in ((0.3, math.pi / 2), (0.4, 0.0)):
+        measured.move(Motion(x, 0.0, turn), UncertainMotion((0.0, -way / 2, turn), (0.3, 0.2, 0.4)))
+    there = start + (0.8 * away, 0.6 * away, math.pi / 2 + 0.5)
+    exact = np.array([[0.02, 0.001, 0.0], [0.001, 0.04, 0.0], [0.0, 0.0, 0.005]])
+    measured.compare(replace(fix(there, 0.95), covariances=exact[None]))
+    assert (measured.squares, measured.stretches) == (pytest.approx(squares), pytest.approx(stretches))
+    assert measured.anchor.tolist() == (start if way < 0.5 else there).tolist()
+    assert (measured.driven > 0.0) is (way < 0.5)  # from there on
+    scaled = measured.applied(UncertainMotion((0.0, 1.0, 0.0), (0.3, 0.2, 0.4)))
+    turn, length = np.sqrt(np.array(squares) / stretches)
+    assert scaled.sigmas == pytest.approx((0.3 * turn, 0.2 * length, 0.4 * turn))
