@@ -109,6 +109,7 @@ def test_a_pixel_looks_where_the_model_says(
 
 def test_elevations_are_those_of_the_edges_of_what_is_seen() -> None:
     assert FISHEYE.elevations == pytest.approx((QUARTER, QUARTER - 230.0 / 140.0))
+    assert PAIR.elevations == (QUARTER, -QUARTER)
     assert ORDINARY.elevations is None
     assert not ORDINARY.project(unit_vectors(0.5 + math.pi, 0.0))[1]  # what lies behind
     assert UNKNOWN.elevations == pytest.approx((25 * math.pi / 120, -25 * math.pi / 120))  # of square pixels

@@ -5,6 +5,7 @@ import pytest
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.cylindrical import Cylindrical
+from omninav.stages.camera.donut import Donut
 from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.model import MODELS, Camera, camera_models, require_elevations, require_sight, seen_at
 from omninav.stages.camera.rays import angles, normalised, turned, unit_vectors
@@ -72,8 +73,10 @@ def test_a_ring_turned_inside_out_is_refused() -> None:
 def test_a_camera_that_sees_next_to_nothing_or_a_part_of_its_circle_is_refused() -> None:
     require_sight(Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0))
     require_sight(Fisheye(640, 480, 140.0, 180.0, 241.0, 230.0))  # cut at the left
-    with pytest.raises(BadInput, match=r"a fisheye camera of 640 x 480 pixels sees 0 % of all directions"):
-        require_sight(Fisheye(640, 480, 140.0, -400.0, 241.0, 230.0))
+    require_sight(Donut(640, 480))  # its ring is still to be found
+    for x, radius, percent in ((-400.0, 230.0, "0"), (318.0, 9.8, "0.095")):  # of a cone of 4 degrees
+        with pytest.raises(BadInput, match=rf"fisheye camera of 640 x 480 pixels sees {percent} % of all directions"):
+            require_sight(Fisheye(640, 480, 140.0, x, 241.0, radius))
     with pytest.raises(BadInput, match=r"the ring around \(0, 241\) an image of 640 x 480 shows 50 % of all azimuths"):
         require_sight(Fisheye(640, 480, 140.0, 0.0, 241.0, 230.0, 40.0))
 

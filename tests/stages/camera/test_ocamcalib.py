@@ -48,3 +48,5 @@ def test_a_polynomial_that_bends_the_other_way_or_is_no_list_of_numbers_is_refus
         parse_camera(write_camera(LENS).replace("- -170.0", "- 170.0"), "camera.yaml")
     with pytest.raises(UnreadableRecording, match=r"'ocamcalib\.polynomial' must hold numbers, not a list"):
         parse_camera(write_camera(LENS).replace("- -170.0", "- [1, 2]"), "camera.yaml")
+    with pytest.raises(ValueError, match=r"'ocamcalib\.c' must be above d \* e"):
+        OCamCalib(640, 480, (-170.0, 0.0), 240.0, 320.0, 230.0, 0.0, 0.25, 0.5, 0.5)

@@ -11,7 +11,9 @@ PIXELS = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (480, 640, 3
 
 
 def test_of_a_lens_only_the_disc_is_kept_and_points_move_with_it() -> None:
-    small = thumbnail(PIXELS, Fisheye(640, 480, 140.0, 319.0, 239.0, 200.0), 101)
+    lens = Fisheye(640, 480, 140.0, 319.0, 239.0, 200.0)
+    assert (thumbnail(PIXELS, lens, 2000).pixels == PIXELS[39:440, 119:520]).all()
+    small = thumbnail(PIXELS, lens, 101)
     assert small.corner == (119, 39)
     assert small.pixels.shape == (101, 101, 3)
     assert small.points(np.array([[319.0, 239.0], [119.0, 39.0]])) == pytest.approx(

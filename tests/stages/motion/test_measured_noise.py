@@ -73,7 +73,7 @@ def test_a_stretch_counts_by_its_errors_beyond_those_of_landmarks(way, away, bef
     measured.compare(fix(start))
     for x, turn in ((0.3, math.pi / 2), (0.4, 0.0)):
         measured.move(Motion(x, 0.0, turn), UncertainMotion((0.0, -way / 2, turn), (0.3, 0.2, 0.4)))
-    there = start + (0.8 * away, 0.6 * away, math.pi / 2 + 0.5)
+    there = np.add(start, (0.8 * away, 0.6 * away, math.pi / 2 + 0.5))
     exact = np.array([[0.02, 0.001, 0.0], [0.001, 0.04, 0.0], [0.0, 0.0, 0.005]])
     measured.compare(replace(fix(there, 0.95), covariances=exact[None]))
     assert (measured.squares, measured.stretches) == (pytest.approx(squares), pytest.approx(stretches))

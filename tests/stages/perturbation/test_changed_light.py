@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.pipeline import BadInput, Context
+from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.perturbation.changed_light import ChangedLight, changed_light
 from omninav.stages.values.image import Image, Panorama, column_azimuths
@@ -26,9 +26,8 @@ def test_gamma_gain_and_colour():
 
 def test_light_from_the_left_is_brightest_there():
     view = ChangedLight(side=0.5).step(CTX, Panorama(GREY)).panorama.pixels[0, :, 0]
-    assert abs(int(view.argmax()) - 90) <= 12  # columns run clockwise from behind, so the left is a quarter in
-    assert view.max() == 150
-    assert view.min() == 50
+    quarter = np.sin(2 * np.pi * (np.arange(360) + 0.5) / 360)  # columns run clockwise from behind
+    assert view.tolist() == np.rint(100 + 50 * quarter).tolist()
 
 
 def test_an_image_is_lit_as_its_camera_looks():
@@ -37,3 +36,12 @@ def test_an_image_is_lit_as_its_camera_looks():
     assert abs(int(view[0, :, 0].argmax()) - 90) <= 12
     with pytest.raises(BadInput, match="an image needs its camera"):
         ChangedLight().step(CTX, image=Image(GREY))
+
+
+def test_light_that_falls_on_no_image_is_refused_at_the_first_one():
+    ctx = Context("perturbation")
+    ctx.tick = Tick(0, 0, first_of_log=True)
+    with pytest.raises(BadInput, match="wired to no image"):
+        ChangedLight().step(ctx)
+    ctx.tick = Tick(1, 1)
+    assert ChangedLight().step(ctx).panorama is None

@@ -7,13 +7,15 @@ from omninav.pipeline import Context
 from omninav.stages.perturbation.lost_features import LostFeatures
 from omninav.stages.perturbation.lost_tracks import LoseTracks
 from omninav.stages.values.homing import LOST, TRACKED, TrackedFeatures
-from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 
 
 def view(number: int) -> LocalFeatures:
     rows = np.arange(number, dtype=np.float64)
     three = np.repeat(rows[:, None], 3, axis=1)
-    return LocalFeatures(three, three[:, :2], np.zeros((number, 8), np.uint8), three.astype(np.float32), rows)
+    looks, points = np.zeros((number, 10), np.float32), np.zeros((number, 2, 2))
+    columns = VerticalSegments(rows, three[:, :2], looks, rows.astype(np.float32), points)
+    return LocalFeatures(three, three[:, :2], np.zeros((number, 8), np.uint8), three.astype(np.float32), rows, columns)
 
 
 def tracked(number: int) -> TrackedFeatures:
@@ -24,7 +26,8 @@ def tracked(number: int) -> TrackedFeatures:
 def test_a_share_of_features_is_taken_away_and_the_rest_keeps_its_order() -> None:
     ctx = Context("lost", np.random.default_rng(0))
     left, again = (LostFeatures(share=1 / 3).step(ctx, view(3000)).features for _ in range(2))
-    assert len(left) == pytest.approx(2000, abs=100)
+    assert (len(left), len(left.columns)) == pytest.approx((2000, 2000), abs=100)
+    assert (np.diff(left.columns.azimuths) > 0).all()
     assert (np.diff(left.sizes) > 0).all()
     assert np.array_equal(left.bearings[:, 0], left.sizes)
     assert not np.array_equal(again.sizes[:50], left.sizes[:50])

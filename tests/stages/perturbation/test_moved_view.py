@@ -37,7 +37,7 @@ def test_a_pixel_goes_where_it_is_moved(how: dict[str, float], where: tuple[int,
 
 def test_what_comes_from_outside_and_what_is_left_out_is_black_and_unseen() -> None:
     seen = moved(shift=0.25).seen
-    assert seen is not None
+    assert seen.shape == (1, 41, 81)
     assert not seen[0, :, :20].any()
     assert seen[0, :, 21:].all()
     half = moved(part=0.5)

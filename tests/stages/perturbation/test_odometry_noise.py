@@ -54,6 +54,7 @@ def test_levels_rise_from_none_to_the_papers_largest_over_the_two_it_prints():
     assert LEVELS[-1] == (20, 20, 20)
     assert (10, 5, 5) in LEVELS
     assert (np.diff(np.array(LEVELS), axis=0) >= 0).all()
+    assert np.sum(LEVELS, axis=0).tolist() == [82, 68, 68]
 
 
 def test_the_stage_draws_from_the_runs_generator_and_level_0_changes_nothing():
