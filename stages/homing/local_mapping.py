@@ -367,7 +367,7 @@ class LocalMapping(Stage):
         chosen = found.inliers & wide & np.isfinite(places).all(axis=1)
         if np.count_nonzero(chosen) < 3:  # the views are almost the same, and all features are far away
             chosen = found.inliers
-            places = first / math.sin(math.radians(max(MIN_PARALLAX_DEG, 0.5)))
+            places = first / math.sin(math.radians(MIN_PARALLAX_DEG))
         unit, metres = 1.0, 0.0
         if len(old):
             scale = max(old.distance(), 1e-3)

@@ -9,6 +9,7 @@ from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound
 from omninav.pipeline.graph.pushed import push
+from omninav.pipeline.graph.registry import entries
 from toys import graph_of_toys
 
 
@@ -322,6 +323,12 @@ def test_a_target_that_is_no_stage_is_refused_and_never_called(target: str):
         build({"nodes": {"x": {"_target_": target}}, "wires": {}})
     assert [problem.where for problem in found.value.problems] == ["nodes.x._target_"]
     assert not toys.NotAStage.called
+
+
+def test_a_target_that_is_nearly_a_stage_is_told_that_one():
+    name = next(entry.target for entry in entries() if not entry.problem)
+    with pytest.raises(ProblemsFound, match=f"did you mean '{name}'"):
+        build({"nodes": {"x": {"_target_": f"{name}s"}}, "wires": {}})
 
 
 def test_a_node_can_be_taken_out():

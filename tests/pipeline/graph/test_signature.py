@@ -189,9 +189,10 @@ def test_the_default_of_an_output_says_that_it_may_be_absent():
         class Out(Outputs):
             number: toys.Number | None
             other: toys.Number | None = None
-            always: toys.Number
+            always: toys.Number | toys.Word
 
         def step(self, ctx: Context) -> Out:
             return self.Out(number=None, always=toys.Number(1.0))
 
     assert [port.optional for port in signature(Sometimes).outputs.values()] == [True, True, False]
+    assert not any(port.truth for port in signature(Sometimes).outputs.values())

@@ -39,6 +39,13 @@ def test_aliases_and_merges_are_followed_and_dates_stay_texts() -> None:
     assert parse_yaml("", "file") is None
 
 
+def test_values_that_an_alias_repeats_count_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.pipeline.graph.small_files.MAX_VALUES", 7)
+    assert parse_yaml("[&a [1], &b [2], *b]", "file") == [[1], [2], [2]]
+    with pytest.raises(BadInput, match="more than 7 values"):
+        parse_yaml("[&a [1], &b [2], *b, 3]", "file")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -92,6 +92,7 @@ CYLINDER = Cylindrical(720, 150, 360.0, elevation_top=1.2, elevation_bottom=-0.2
         (PAIR, (479.5, 159.5), math.pi, 0.0),
         (PAIR, (479.5 + 0.5 * PAIR_PX, 159.5), math.pi - 0.5, 0.0),  # left of the robot
         (Donut(640, 480, 320.0, 240.0, 40.0, 200.0, "counter_clockwise", yaw=0.1), (320.0, 120.0), QUARTER + 0.1, 0.0),
+        (Donut(640, 480, 320.0, 240.0, 50.0, 190.0), (392.0, 336.0), math.atan2(96.0, 72.0), 0.0),
         (STRIP, (359.5, 74.5), 0.0, 0.5),  # rows are elevations
         (CYLINDER, (359.5, 74.5), 0.0, math.atan((math.tan(1.2) + math.tan(-0.2)) / 2)),  # their tangents
         (Cylindrical(360, 20, 180.0), (89.5, 9.5), QUARTER, 0.0),

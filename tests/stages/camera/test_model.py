@@ -70,6 +70,11 @@ def test_a_ring_turned_inside_out_is_refused() -> None:
         Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0, 240.0)
 
 
+def test_pixels_are_shown_from_the_middle_of_the_first_to_that_of_the_last() -> None:
+    edges = np.array([[0.0, 0.0], [119.0, 24.0], [-0.1, 9.0], [9.0, -0.1], [119.1, 9.0], [9.0, 24.1]])
+    assert Cylindrical(120, 25, 60.0).shows(edges).tolist() == [True, True, False, False, False, False]
+
+
 def test_a_camera_that_sees_next_to_nothing_or_a_part_of_its_circle_is_refused() -> None:
     require_sight(Fisheye(640, 480, 140.0, 318.0, 241.0, 230.0))
     require_sight(Fisheye(640, 480, 140.0, 180.0, 241.0, 230.0))  # cut at the left

@@ -31,6 +31,7 @@ def test_a_parabolic_mirror_has_a_polynomial_of_two_terms(azimuth: float, elevat
 def test_a_lens_looks_up_in_the_middle_and_a_mirror_down() -> None:
     middle = np.array([318.0, 241.0])
     assert LENS.unproject(middle)[0] == pytest.approx((0.0, 0.0, 1.0))
+    assert LENS.project(np.array([0.0, 0.0, 1.0]))[0] == pytest.approx(middle)
     assert (LENS.elevations or (0.0,))[0] == pytest.approx(math.pi / 2, abs=0.05)
     assert MIRROR.unproject(np.array([319.5, 239.5]))[0] == pytest.approx((0.0, 0.0, -1.0))
 

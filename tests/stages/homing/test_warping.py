@@ -8,10 +8,21 @@ import pytest
 from turned_robot import CAMERA, look
 
 from omninav.pipeline import BadInput, Context, Tick
+from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.homing.column_table import ColumnTable
 from omninav.stages.homing.first_image import FirstImage
-from omninav.stages.homing.min_warping import DEPTH_RATIOS, Columns, places_of_columns, warped
+from omninav.stages.homing.min_warping import (
+    DEPTH_RATIOS,
+    LOG_STEP,
+    MAX_SHIFT,
+    Columns,
+    averaged_beside,
+    column_distances,
+    likelihood_ratios,
+    places_of_columns,
+    warped,
+)
 from omninav.stages.homing.warping import MinWarping, MinWarpingState
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Image
@@ -49,6 +60,8 @@ def test_it_is_nearer_where_less_of_the_way_is_left():
     assert vectors[1] is not None
     assert vectors[1].depth_ratio < vectors[0].depth_ratio
     assert vectors[1].ratio == pytest.approx(vectors[1].depth_ratio / vectors[0].depth_ratio)
+    back = stage.step(ctx, state, seen((4.8, 4.6, 0.4)), replace(LOST, number=4), seen((4.2, 4.6, 0.4)), CAMERA).vector
+    assert (back.direction, back.turn, back.ratio) == pytest.approx((math.pi - 0.4, 0.0, 1.0), abs=math.radians(10))
 
 
 @pytest.mark.parametrize(
@@ -84,6 +97,22 @@ def test_a_compass_limits_the_turn():
     assert (beyond.state, abs(beyond.turn) <= math.radians(60)) == ("new", True)
 
 
+def test_columns_differ_by_the_mean_square_of_the_rows_that_both_show_and_those_beside_count_too():
+    rng = np.random.default_rng(0)
+    views = [Columns(*(rng.random((5, rows, 3)).astype(np.float32) for rows in (8, 4))) for _ in range(2)]
+    found = column_distances(*views)
+    assert column_distances(*views[::-1]).transpose(1, 0, 2)[..., ::-1] == pytest.approx(found, abs=1e-6)
+    for shift in (0, 2, 6):  # below the horizon there are not as many rows
+        gaps = [a[:, None, shift:] - b[:, : max(b.shape[1] - shift, 0)] for a, b in zip(*views, strict=True)]
+        off = np.square(np.concatenate(gaps, axis=2)).mean(axis=(2, 3))
+        assert found[..., MAX_SHIFT + shift] == pytest.approx(off, abs=1e-6)
+        beside = sum(np.roll(off, (step, step), (0, 1)) for step in (-1, 0, 1)) / 3
+        assert averaged_beside(found)[..., MAX_SHIFT + shift] == pytest.approx(beside, abs=1e-6)
+    assert np.isinf(found[..., 0]).all()
+    ratios = likelihood_ratios(np.array([[[0.0, np.inf]]], np.float32))
+    assert ratios == pytest.approx(np.array([[[2.0, 0.0]]]))
+
+
 def test_columns_are_seen_where_geometry_says():
     columns, planes = places_of_columns(360)
     row = int(np.flatnonzero(DEPTH_RATIOS == 0.52)[0])
@@ -102,6 +131,19 @@ def test_views_that_differ_by_a_turn_alone_give_the_turn():
     found = warped(Columns(above, nothing), Columns(np.roll(above, -40, axis=0), nothing))
     assert math.degrees(found.turn) == pytest.approx(80.0)
     assert found.depth_ratio < 0.05
+
+
+def test_columns_are_the_image_by_steps_of_the_logarithm_of_the_tangent_of_elevation():
+    up, down = math.radians(30.0), math.radians(10.0)
+    strip = Equirectangular(180, 90, 90.0, elevation_top=up, elevation_bottom=-down)
+    row, column = np.mgrid[:90, :180]
+    pixels = np.stack([column, 2 * row, 0 * row], axis=-1).astype(np.uint8)
+    for side, seen_rows, rows in zip((1.0, -1.0), ColumnTable(180).columns(pixels, strip), (31, 21), strict=True):
+        elevations = np.arctan(math.tan(math.radians(1.0)) * np.exp(LOG_STEP * np.arange(rows)))
+        assert seen_rows.shape == (180, rows, 3)
+        assert 255 * seen_rows[1:90, :, 0] == pytest.approx(np.repeat(89.5 - np.arange(1, 90), rows).reshape(89, -1))
+        there = 2.0 * ((up - side * elevations) * 90 / (up + down) - 0.5)
+        assert 255 * seen_rows[40, :, 1] == pytest.approx(there, abs=0.6)
 
 
 def test_a_camera_without_a_full_circle_is_refused():

@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.homing.first_view_path import FirstViewPath, FirstViewPathState
 from omninav.stages.homing.waypoint_images import WaypointImages, WaypointImagesState
-from omninav.stages.values.homing import HomingVector, ImagePath
+from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
 
 PATH = ImagePath(4, tuple(none_found() for _ in range(3)), ("a", "b", "c"))
 
@@ -32,6 +32,7 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
     assert first.target is not None
     assert (first.target.number, first.target.name, first.target.last) == (0, "a", False)
     assert first.features is PATH.views[0]
+    assert vars(first.progress) == vars(PathProgress(4, 0, 3, 0, False, False, False))
     assert path.step(vector(0, 0.21)).target.number == 0  # still far
     assert path.step(vector(0, 0.19)).target.name == "b"
     assert path.step(vector(0, 0.01)).target.name == "b"  # of the view before: says nothing of this one
@@ -111,6 +112,7 @@ def test_no_path_no_target() -> None:
     path = Path()
     assert path.step(path=None).target is None
     assert path.step(path=ImagePath(1, (), ())).progress is None
+    assert path.step(path=ImagePath(0, PATH.views, PATH.names)).target.number == 0
 
 
 def test_the_first_view_is_given_once_a_second_later() -> None:

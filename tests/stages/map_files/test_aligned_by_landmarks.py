@@ -1,19 +1,16 @@
 """Maps without a common frame, aligned by the landmarks that are in several of them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from landmark_tour import graph_of, mapped_room, room, seen_from, tour_poses, with_landmarks
 
-from omninav.pipeline import BadInput, Context
-from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.map_files.aligned_by_landmarks import aligned_by_landmarks
 from omninav.stages.map_files.references import joined_references
 from omninav.stages.sensor.landmark_pose import LandmarkPose, LandmarkPoseState
-from omninav.stages.tools.map_join import JoinMaps
 
 FRAME = np.array([4.0, -7.0, 2.5])
 
@@ -53,29 +50,3 @@ def test_in_a_joined_map_whose_landmarks_are_there_twice_an_image_is_found_as_in
         fix = LandmarkPose().step(Context("landmark_pose"), LandmarkPoseState(), seen_from(room(), pose), map).fix
         assert fix.inliers[0] > 100
         assert fix.poses[0] == pytest.approx(pose, abs=2e-3)
-
-
-def test_true_poses_of_two_frames_are_not_joined_unless_it_is_asked(tmp_path: Path) -> None:
-    here, there = mapped_room(), replace(mapped(tour_poses(0.45)), pose_source="truth")
-    files = [str(tmp_path / f"{name}.omap") for name in ("here", "there", "again")]
-    for file, map in zip(files, (here, there, here), strict=True):
-        write_artifact(Path(file), replace(map, pose_source="truth"), {"stages": {}, "name": file})
-    out = str(tmp_path / "both.omap")
-    with pytest.raises(BadInput, match=r"there\.omap: by landmarks .* m from where its true poses have it"):
-        JoinMaps(maps=tuple(files[:2]), out=out).run(Context("join"))
-    JoinMaps(maps=tuple(files[:2]), out=out, same_frame=True).run(Context("join"))
-    JoinMaps(maps=(files[0], files[2]), out=out).run(Context("join"))
-    with pytest.raises(BadInput, match=r"here\.omap: this map is given twice"):
-        JoinMaps(maps=(files[0], files[2], files[0]), out=out).run(Context("join"))
-
-
-@pytest.mark.parametrize(("order", "source"), [((0, 1), "estimate"), ((1, 0), "odometry")])
-def test_measured_poses_in_the_frame_of_true_ones_are_estimates(
-    tmp_path: Path, order: tuple[int, int], source: str
-) -> None:
-    out, maps = tmp_path / "both.omap", (mapped_room(), mapped(tour_poses(0.45)))
-    files = [str(tmp_path / f"{number}.omap") for number in order]
-    for file, number in zip(files, order, strict=True):
-        write_artifact(Path(file), maps[number], {"stages": {}})
-    JoinMaps(maps=tuple(files), out=str(out)).run(Context("join"))
-    assert read_artifact(out).pose_source == source

@@ -41,11 +41,17 @@ def test_a_map_made_of_others_says_what_their_files_agree_on_and_which_they_were
             target(str(tmp_path / wrong), read)
 
 
-@pytest.mark.parametrize(("given", "least", "most"), [(None, 1, None), ("a", 2, None), (["a", "b", "c"], 1, 2)])
-def test_too_few_or_too_many_maps_are_counted(given: list[str] | None, least: int, most: int | None) -> None:
-    number = 0 if given is None else len(given)
-    with pytest.raises(BadInput, match=f"maps: {number} files are given, expected "):
-        read_saved(given, least, most)
+@pytest.mark.parametrize(
+    ("given", "how", "said"),
+    [
+        (None, {}, "0 files are given, expected at least 1 map;"),
+        ("a", {"at_least": 2}, "1 files are given, expected at least 2 maps;"),
+        (["a", "b"], {"at_most": 1}, "2 files are given, expected 1 map;"),
+    ],
+)
+def test_too_few_or_too_many_maps_are_counted(given: list[str] | None, how: dict[str, int], said: str) -> None:
+    with pytest.raises(BadInput, match=f"maps: {said}"):
+        read_saved(given, **how)
 
 
 def test_points_follow_a_header_that_counts_them() -> None:

@@ -1,5 +1,6 @@
 """Saved maps are joined, thinned, cut and shown."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,13 @@ import pytest
 from landmark_tour import mapped_room
 from small_run import reference_graph
 
+from omninav.pipeline import BadInput, Context
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.map_files.references import thinned_references
+from omninav.stages.tools.map_join import JoinMaps
+from omninav.stages.tools.map_show import described
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.projection import Projection
 
@@ -48,6 +54,28 @@ def test_maps_are_joined_thinned_cut_and_shown(tmp_path: Path, capsys: pytest.Ca
     first = (tmp_path / "d.omap").read_bytes()
     assert main(["map", "thin", "c.omap", "spacing=2", "out=d.omap"]) == 0
     assert (tmp_path / "d.omap").read_bytes() == first
+
+
+def test_what_a_map_holds_is_said_in_numbers(tmp_path: Path) -> None:
+    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
+    file = map_of(tmp_path / "a.omap", 3, poses=poses)
+    assert list(described(file, read_artifact(file))) == [
+        ("map", f"{file} (ReferenceGraph, 0.00 MB)"),
+        ("references", "3, 2 edges between them"),
+        ("views", "histograms, 10 segments x 20, 0.0 MB"),
+        ("landmarks", "none; type landmarks=sift where a map is made"),
+        ("poses from", "truth"),
+        ("area", "1.0 x 2.0 m: x 0.0 to 1.0, y 0.0 to 2.0"),
+        ("spacing", "1.00 m to the nearest other (median), 2.00 m at most"),
+        ("features", "Colours, bins=4"),
+        ("variant", "made"),
+    ]
+    places = made_places.made_map([(0, 0), (1, 0)], {(0, 1): 3}, names=["a", ""])
+    assert list(described(file, places))[1:3] == [
+        ("places", "2 (1 names), 1 links, 3 path images"),
+        ("views", "5, of 1 patches on average"),
+    ]
+    assert [name for name, _ in described(file, made_places.made_map([(0, 0)], {}))][4:6] == ["area", "features"]
 
 
 def test_a_map_is_shown_with_its_landmarks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,3 +148,37 @@ def test_maps_that_do_not_join_are_refused_in_one_line(tmp_path: Path, capsys: p
     joined = read_artifact(tmp_path / "joined.omap")
     assert isinstance(joined, ReferenceGraph)
     assert joined.pose_source == "estimate"
+
+
+def elsewhere() -> ReferenceGraph:
+    """The room by every other of its references, in a frame of its own."""
+    map = thinned_references(mapped_room(), 1.1)
+    return replace(map.moved(between(np.array([4.0, -7.0, 2.5]), map.poses)), pose_source="odometry")
+
+
+def test_true_poses_of_two_frames_are_not_joined_unless_it_is_asked(tmp_path: Path) -> None:
+    here, there = mapped_room(), replace(elsewhere(), pose_source="truth")
+    files = [str(tmp_path / f"{name}.omap") for name in ("here", "there", "again")]
+    for file, map in zip(files, (here, there, here), strict=True):
+        write_artifact(Path(file), replace(map, pose_source="truth"), {"stages": {}, "name": file})
+    out = str(tmp_path / "both.omap")
+    with pytest.raises(BadInput, match=r"there\.omap: by landmarks .* m from where its true poses have it"):
+        JoinMaps(maps=tuple(files[:2]), out=out).run(Context("join"))
+    JoinMaps(maps=tuple(files[:2]), out=out, same_frame=True).run(Context("join"))
+    JoinMaps(maps=(files[0], files[2]), out=out).run(Context("join"))
+    with pytest.raises(BadInput, match=r"here\.omap: this map is given twice"):
+        JoinMaps(maps=(files[0], files[2], files[0]), out=out).run(Context("join"))
+
+
+@pytest.mark.parametrize(("order", "source"), [((0, 1), "estimate"), ((1, 0), "odometry")])
+def test_measured_poses_in_the_frame_of_true_ones_are_estimates(
+    tmp_path: Path, order: tuple[int, int], source: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, maps = tmp_path / "both.omap", (mapped_room(), elsewhere())
+    files = [str(tmp_path / f"{number}.omap") for number in order]
+    for file, number in zip(files, order, strict=True):
+        write_artifact(Path(file), maps[number], {"stages": {}})
+    JoinMaps(maps=tuple(files), out=str(out)).run(Context("join"))
+    assert read_artifact(out).pose_source == source
+    said = r"aligned by \d+ landmarks that are in several maps; moved by \d+\.\d\d m at most\n"
+    assert re.match(said, capsys.readouterr().out)

@@ -47,7 +47,7 @@ def folder(tmp_path):
 
 def test_a_video_shows_when_the_robot_is_lost(folder, capsys):
     MakeVideo(run_folder=str(folder), out=str(folder / "video.mp4"), begin=2.0, speed=2.0).run(Context("video"))
-    assert "9 images" in capsys.readouterr().out
+    assert "9 images, 4 s, 0.1 MB" in capsys.readouterr().out
     video = cv2.VideoCapture(str(folder / "video.mp4"))
     assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(2.0)
     frames = [video.read()[1] for _ in range(9)]
@@ -99,6 +99,15 @@ def test_an_occupied_cell_and_the_planned_route_are_drawn_where_they_lie(tmp_pat
     rows, columns = np.nonzero((floor.frame(0)[BAND:] == GREEN).all(axis=2))
     (left, row), (right, _) = floor.pixels(np.array([[0.0, 2.5], [3.0, 2.5]]))
     assert np.abs([columns.min() - left, columns.max() - right, rows.min() - row, rows.max() - row]).max() <= 2
+
+
+def test_no_way_is_drawn_to_where_the_robot_was_carried(tmp_path):
+    with written_log(tmp_path / "result.mcap") as log:
+        for k, x in enumerate((0.0, 0.5, 8.0, 8.5)):
+            write_scene(log, 100 + k, x, 0.0)
+    floor = Floor(list(scenes_in(LogReader(tmp_path / "result.mcap"))))
+    places = floor.pixels(np.array([[0.25, 0.0], [4.0, 0.0], [8.1, 0.0]]))
+    assert [bool((floor.frame(3)[BAND + y, x] < 100).all()) for x, y in places] == [True, False, True]
 
 
 @pytest.mark.parametrize(("seconds", "rate"), [(0.0, 1.0), (0.001, 120.0), (100.0, 1.0)])
