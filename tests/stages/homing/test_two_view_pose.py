@@ -7,6 +7,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.two_views.epipolar import shared_residuals
+from omninav.stages.homing.generate_and_select import generate_and_select
 from omninav.stages.homing.two_view_pose import TwoViewPose
 from omninav.stages.metrics.two_view_errors import TwoViewErrors
 from omninav.stages.source.two_views import TwoViews, TwoViewsState
@@ -67,6 +68,12 @@ def test_generate_and_select_solves_what_has_few_wrong_pairs_and_not_what_has_ma
         shares[wrong] = np.mean(right)
     assert shares[0.0] == 1.0
     assert shares[0.0] >= shares[0.05] > shares[0.5]
+
+
+def test_generate_and_select_solves_eight_pairs_and_no_fewer() -> None:
+    pairs = problems(problems=1)[0].pairs
+    found = [generate_and_select(pairs.first[:n], pairs.second[:n], math.radians(1.0)) for n in (7, 8)]
+    assert [each is None for each in found] == [True, False]
 
 
 def test_too_few_pairs_are_counted() -> None:

@@ -61,9 +61,11 @@ def test_unsure_poses_and_bridged_motions_say_nothing_of_odometry():
     [
         # Errors of 0.5 rad and 0.5 m: (0.25 - 0.01) / 0.5 of the turn, (0.25 - 0.06) / 0.08 of the length.
         (0.7, 1.0, 3.0, [3.48, 5.375], 4.0),
+        (0.7, 0.5, 3.0, [3.48, 3.0], 4.0),  # no farther off than landmarks may be
         (0.7, 9.0, 3.0, [3.48, 19.0], 4.0),  # carried
         (0.7, 1.0, 100.0, [99.48, 101.375], 100.0),  # the oldest are forgotten
         (0.5, 1.0, 3.0, [3.48, 5.375], 4.0),
+        (4.9, 1.0, 3.0, [3.48, 5.375], 4.0),
         (0.48, 1.0, 3.0, [3.0, 3.0], 3.0),  # too short, and too long a way
         (5.0, 1.0, 3.0, [3.0, 3.0], 3.0),
     ],

@@ -77,6 +77,13 @@ def test_a_wrong_turn_of_odometry_is_corrected_and_its_translation_turned_by_hal
     assert math.hypot(motion.x, motion.y) == pytest.approx(0.2)
 
 
+def test_a_turn_is_seen_ahead_and_behind_of_a_robot_that_drives_sideways():
+    after = panorama(0.2 * math.cos(0.3 + 1.2), 0.2 * math.sin(0.3 + 1.2), 0.3 + TURN)
+    for error in (0.0, 0.03):
+        motion = corrected(Motion(0.2 * math.cos(1.2), 0.2 * math.sin(1.2), TURN + error), after=after)
+        assert motion.turn == pytest.approx(TURN, abs=0.006)
+
+
 def test_a_visual_turn_far_from_the_measured_one_is_hardly_believed():
     assert corrected(Motion(0.2, 0.0, TURN + 0.3)).turn == pytest.approx(TURN + 0.3, abs=0.03)
 

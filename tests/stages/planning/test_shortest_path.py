@@ -128,7 +128,7 @@ def test_it_plans_once_it_is_sure_and_not_again(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(f"{MODULE}.LOCATE_TIMEOUT_S", 1.0)
     planner = Planner(3)
     first = planner.look(1, share=0.4)
-    assert (first.path, first.route.state) == (None, "locating")
+    assert (first.path, first.route.state, first.route.places.tolist()) == (None, "locating", [])
     second = planner.look(1, share=0.6)
     assert second.route.places.tolist() == [1, 0, 3]
     assert second.path.names == ("place 1", "on the way, image 60", "place 0, hall", "place 3")
