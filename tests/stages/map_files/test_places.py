@@ -5,7 +5,9 @@ import math
 
 import made_places
 import numpy as np
+import pytest
 
+from omninav.pipeline import BadInput
 from omninav.pipeline.graph.contents import violation
 from omninav.stages.map_files.places import cut_places, joined_places, thinned_places
 from omninav.stages.values.topological_map import TopologicalMap
@@ -38,6 +40,10 @@ def test_joined_places_keep_their_links_and_views() -> None:
     assert joined_places([map, dataclasses.replace(map, spread=2.0)], "truth").spread == math.sqrt((1 + 4) / 2)
     assert both.frames[len(map.views)] == map.frames.max() + 1
     assert both.orders[len(map.views)] == map.orders.max() + 2  # they are not neighbours
+    assert len(joined_places([map, cut_places(map, np.array([False, True, True]))], "truth")) == 5
+    short = dataclasses.replace(map.views, descriptors=map.views.descriptors[:, :64].copy())
+    with pytest.raises(BadInput, match="their descriptors have 64 and 128 numbers, expected one length"):
+        joined_places([map, dataclasses.replace(map, views=short)], "truth")
     none = cut_places(map, np.zeros(3, bool))
     assert [len(joined_places([none, *more], "truth").views) for more in ([], [none], [map])] == [0, 0, 9]
 
