@@ -65,7 +65,7 @@ def test_a_sample_is_all_that_is_near_and_an_even_choice_of_what_is_far(monkeypa
 
 def test_the_spacing_of_a_map_is_the_median_way_to_the_next_place():
     assert spacing(along_x(0.0, 1.0, 3.0, 3.0, 7.0, 7.0).means) == 1.5  # 1, 1, 2 and 4 m
-    assert spacing(along_x(2.0, 2.0).means) == 0.0
+    assert [spacing(along_x(2.0, x).means) for x in (2.0, 5.0)] == [0.0, 3.0]
 
 
 @pytest.mark.parametrize("match", [SelectiveMatch(headings=HEADINGS), Retrieval(headings=HEADINGS)])
