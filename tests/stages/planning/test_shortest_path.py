@@ -259,9 +259,10 @@ def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
     planner.look(1)
     planner.look(1, "lost", at=0)
     planner.look(1, "driving", at=0)
-    assert len(planner.state.failed_links) == 1
+    assert planner.state.failed_links.tolist() == [[1, 1]]
+    planner.state.failed_links, planner.state.failures = np.array([[1, 1], [2, 3]]), np.array([1, 2])
     planner.look(1, "driving", at=1)
-    assert not len(planner.state.failed_links)
+    assert (planner.state.failed_links.tolist(), planner.state.failures.tolist()) == ([[2, 3]], [2])
 
 
 def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost(monkeypatch: pytest.MonkeyPatch):
