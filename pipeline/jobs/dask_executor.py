@@ -2,6 +2,7 @@
 
 import logging
 import shutil
+import signal
 import sys
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -65,8 +66,11 @@ def slurm(settings: ExecutorSettings) -> DaskExecutor:
     """`executor=slurm`: each worker is a batch job of one core; one that dies is started again."""
     if shutil.which("sbatch") is None:
         raise BadInput("executor=slurm: there is no command 'sbatch' here; type this on a login node of the cluster")
+    on_interrupt = signal.getsignal(signal.SIGINT)
     from dask_jobqueue import SLURMCluster
 
+    if signal.getsignal(signal.SIGINT) is not on_interrupt:  # its import lets Ctrl-C end the program with code 0
+        signal.signal(signal.SIGINT, on_interrupt)
     options = own_options(settings, ("partition", "time", "account", "interface"))
     workers = settings.workers or 4
     memory = (settings.memory or JOB_MEMORY) + WORKER_MEMORY

@@ -236,6 +236,27 @@ def test_slurm_is_refused_at_once_where_its_command_is_missing(tmp_path: Path, m
         executor_of(ExecutorSettings("slurm"))
 
 
+@pytest.fixture
+def sbatch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A command `sbatch` that accepts a job which never begins, to be written over."""
+    pytest.importorskip("distributed", reason="pip install 'omninav[slurm]'")
+    pytest.importorskip("dask_jobqueue", reason="pip install 'omninav[slurm]'")
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    script = tmp_path / "sbatch"
+    script.write_text("#!/bin/sh\necho Submitted batch job 7\n")
+    script.chmod(0o755)
+    (tmp_path / "scancel").symlink_to("/bin/true")
+    return script
+
+
+def test_slurm_leaves_ctrl_c_as_it_was(sbatch: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:
+        monkeypatch.delitem(sys.modules, name)
+    before = signal.getsignal(signal.SIGINT)
+    executor_of(ExecutorSettings("slurm", workers=1)).shutdown()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
 def test_no_client_is_made_for_what_is_no_address(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
     monkeypatch.setattr("omninav.pipeline.jobs.dask_executor.Client", None)
