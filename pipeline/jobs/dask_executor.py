@@ -12,12 +12,14 @@ from typing import Any, TypeVar
 from distributed import Client
 from distributed.comm import get_address_host_port
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 
 from .executors import WORD, ExecutorSettings, own_options
 
 START_S = 60.0
 """Longest wait for a scheduler's answer, seconds."""
+SILENT_S = 10.0
+"""Longest wait for a first worker before a line says so, seconds."""
 WORKER_MEMORY = 1_000_000_000
 """Memory of a worker beside its job, bytes."""
 JOB_MEMORY = 4_000_000_000
@@ -51,7 +53,8 @@ class DaskExecutor(Executor):
         with suppress(Exception):
             self._client.close(timeout=5)
         if self._cluster is not None:
-            self._cluster.close(timeout=10)
+            with suppress(Exception):  # workers that were refused cannot be closed
+                self._cluster.close(timeout=10)
 
 
 def dask_cluster(settings: ExecutorSettings) -> DaskExecutor:
@@ -87,14 +90,35 @@ def slurm(settings: ExecutorSettings) -> DaskExecutor:
         account=options.get("account"),
         interface=options.get("interface"),
         log_directory=logs if WORD.fullmatch(logs) else None,
-        scheduler_options={"dashboard": False, "dashboard_address": None},
+        scheduler_options={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
     )
     try:
-        cluster.adapt(minimum=workers, maximum=workers)
-        return DaskExecutor(_client(cluster), cluster)
+        _submit(cluster, workers)
+        client = _client(cluster)
+        try:
+            client.wait_for_workers(1, timeout=SILENT_S)
+        except TimeoutError:
+            none = f"0 of {counted(workers, 'worker')} so far"
+            print(f"executor=slurm: waiting for Slurm, {none}; `squeue --me` says why", file=sys.stderr, flush=True)
+        return DaskExecutor(client, cluster)
     except BaseException:
-        cluster.close()
+        with suppress(Exception):
+            cluster.close()
         raise
+
+
+def _submit(cluster: Any, workers: int) -> None:
+    """Submit workers, and keep their number. Raises `BadInput` with the words of an `sbatch` that accepts none."""
+    cluster.scale(workers)
+    with suppress(RuntimeError, ValueError):  # raised or not, whichever of two tasks meets it
+        cluster.sync(lambda: cluster)
+    if not any(worker.job_id for worker in cluster.workers.values()):
+        try:
+            cluster.sync(next(iter(cluster.workers.values())).start)
+        except (RuntimeError, ValueError) as error:
+            words = str(error).rpartition("stderr:\n")[2]
+            raise BadInput(f"executor=slurm: sbatch starts no worker: {words}") from None
+    cluster.adapt(minimum=workers, maximum=workers)
 
 
 def _client(where: Any) -> Any:

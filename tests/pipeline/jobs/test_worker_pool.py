@@ -241,6 +241,7 @@ def sbatch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A command `sbatch` that accepts a job which never begins, to be written over."""
     pytest.importorskip("distributed", reason="pip install 'omninav[slurm]'")
     pytest.importorskip("dask_jobqueue", reason="pip install 'omninav[slurm]'")
+    monkeypatch.setattr("omninav.pipeline.jobs.dask_executor.SILENT_S", 0.1)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     script = tmp_path / "sbatch"
     script.write_text("#!/bin/sh\necho Submitted batch job 7\n")
@@ -255,6 +256,14 @@ def test_slurm_leaves_ctrl_c_as_it_was(sbatch: Path, monkeypatch: pytest.MonkeyP
     before = signal.getsignal(signal.SIGINT)
     executor_of(ExecutorSettings("slurm", workers=1)).shutdown()
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_slurm_says_why_it_starts_no_worker(sbatch: Path, capsys: pytest.CaptureFixture[str]):
+    executor_of(ExecutorSettings("slurm", workers=2)).shutdown()
+    assert "waiting for Slurm, 0 of 2 workers so far" in capsys.readouterr().err
+    sbatch.write_text("#!/bin/sh\necho sbatch: error: invalid partition >&2\nexit 1\n")
+    with pytest.raises(BadInput, match=r"sbatch starts no worker: sbatch: error: invalid partition$"):
+        executor_of(ExecutorSettings("slurm", workers=2))
 
 
 def test_no_client_is_made_for_what_is_no_address(monkeypatch: pytest.MonkeyPatch):
