@@ -28,6 +28,9 @@ class _Output(io.FileIO):
 
 def mend_streams() -> None:
     """Mends the outputs: silent where closed, "?" for what an encoding lacks, and no progress that stops a run."""
+    while (null := os.open(os.devnull, os.O_RDWR)) <= 2:  # else the next file or pipe to be opened gets its place
+        os.set_inheritable(null, True)
+    os.close(null)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

@@ -37,3 +37,9 @@ def test_a_run_whose_output_nobody_reads_goes_on(words: tuple[str, ...], tmp_pat
     manifests = list(tmp_path.glob("sweep/?/manifest.json" if words else "runs/latest/manifest.json"))
     states = [json.loads(file.read_text())["status"] for file in manifests]
     assert (ended.returncode, states) == (0, ["complete"] * (2 if words else 1))
+
+
+def test_jobs_run_where_standard_error_is_closed(tmp_path: Path, shared_cache: Path) -> None:
+    few = f"tour={TOUR} log={DRIVE} nodes.source.stop=4 +artifacts.map.nodes.source.stop=12 cache={shared_cache}"
+    command = f"exec '{sys.executable}' -m omninav -m {few} seed=0,1 executor=local hydra.sweep.dir=sweep 0<&- 2>&-"
+    assert subprocess.run(["sh", "-c", command], cwd=tmp_path, stdout=-3, timeout=300).returncode == 0
