@@ -5,7 +5,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,10 @@ class JobEnd:
     number: str = ""
     """Its number in the sweep."""
 
+    def spoilt(self, error: OSError) -> "JobEnd":
+        """The same end; where it was well, a failure to write what belongs to it."""
+        return replace(self, code=self.code or 2, error=self.error or str(as_bad_input(error)))
+
 
 def run_job(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run) -> float | None:
     """Run what a configuration describes, report how it ended, and return its objective, if one is named (see `_run`).
@@ -69,9 +73,14 @@ def run_job(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_ru
     In a sweep the other jobs continue; the exit code is left in a file. A job that fails returns None, which Optuna
     counts as a failed trial (NaN would end the whole sweep).
     """
-    end = ended(config, arguments, prepare)
+    end, page = ended(config, arguments, prepare), None
+    if end.sweep:
+        try:
+            page = write_page(Path(end.sweep))
+        except OSError as error:
+            end = end.spoilt(error)
     report_end(end)
-    leave_outcome(end, write_page(Path(end.sweep)) if end.sweep else None)
+    leave_outcome(end, page)
     return end.objective
 
 
@@ -111,9 +120,7 @@ def ended(config: Any, arguments: Sequence[str], prepare: Prepare = prepare_run)
         if folder is not None and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()  # Hydra has made it, and nothing has run
         return JobEnd(code, error, objective, trace)
-    end = JobEnd(code, error, objective, trace, str(sweep.sweep), sweep.number)
-    note_end(sweep, end)
-    return end
+    return note_end(sweep, JobEnd(code, error, objective, trace, str(sweep.sweep), sweep.number))
 
 
 def report_end(end: JobEnd) -> None:
@@ -200,13 +207,19 @@ def _left_in(folder: Path) -> dict[str, Any]:
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else {}
 
 
-def note_end(job: SweepJob, end: JobEnd) -> None:
-    """Put a job's end into its manifest, where its sweep's page finds it; not into that of another job."""
-    manifest = _left_in(job.folder) or {"status": "refused"}
-    if manifest.get("job", job.number) != job.number:
-        return
-    manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": end.error} if end.error else {})
-    write_json(job.folder / "manifest.json", manifest)
+def note_end(job: SweepJob, end: JobEnd) -> JobEnd:
+    """Put a job's end into its manifest, where its sweep's page finds it; not into that of another job.
+
+    Returns the end: a failure where it cannot be written.
+    """
+    try:
+        manifest = _left_in(job.folder) or {"status": "refused"}
+        if manifest.get("job", job.number) == job.number:
+            manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": end.error} if end.error else {})
+            write_json(job.folder / "manifest.json", manifest)
+    except OSError as error:
+        return end.spoilt(error)
+    return end
 
 
 def write_page(sweep: Path) -> Path:

@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,8 @@ def run_sweep(
             ends[job.name] = end = _end_of(job, outcome)
             report_end(end)
             progress.update(sweep.name, len(ends), len(jobs))
-            throttle(lambda: write_page(sweep))
+            with suppress(OSError):  # a full disk: the page is written again at the end
+                throttle(lambda: write_page(sweep))
 
         workers.run(jobs, on_end=on_end)
     page = write_page(sweep)
@@ -72,8 +74,7 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
     end = JobEnd(1, f"{outcome.error} (what it printed is in {LOGS}/{number}.log)", sweep=str(sweep), number=number)
     file = sweep / LOGS / f"{number}.folder"
     folder = Path(file.read_text(encoding="utf-8")) if file.is_file() else sweep / number
-    note_end(SweepJob(sweep, folder, number, tuple(job.given["overrides"])), end)
-    return end
+    return note_end(SweepJob(sweep, folder, number, tuple(job.given["overrides"])), end)
 
 
 def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:

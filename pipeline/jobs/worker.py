@@ -45,8 +45,9 @@ def main() -> None:
 
 
 def _listen(jobs: "queue.SimpleQueue[dict[str, Any]]") -> None:
-    for line in sys.stdin.buffer:
-        jobs.put(json.loads(line))
+    with open(0, "rb", closefd=False) as lines:  # a thread in sys.stdin makes an interpreter that ends abort
+        for line in lines:
+            jobs.put(json.loads(line))
     os._exit(1)
 
 
@@ -67,11 +68,13 @@ def _run(job: dict[str, Any]) -> dict[str, Any]:
             value = getattr(importlib.import_module(module), name)(job["given"], send)
         return {"value": json.loads(json.dumps(value, default=str))}
     except (Exception, SystemExit) as failed:
-        traceback.print_exc()
+        with suppress(OSError):  # a full disk
+            traceback.print_exc()
         return {"error": _in_one_line(failed)}
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for printed in (sys.stdout, sys.stderr):
+            with suppress(OSError):
+                printed.flush()
 
 
 def _in_one_line(error: BaseException) -> str:

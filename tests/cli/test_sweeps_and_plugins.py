@@ -59,6 +59,22 @@ def test_a_failing_job_is_named_at_once_and_the_others_finish(swept):
     assert "Traceback" in (sweep / "1" / "run.log").read_text()
 
 
+@pytest.mark.parametrize(
+    ("taken", "words", "complete"), [("1", ("executor=local", "executor.workers=1"), 2), ("sweep.html/folder", (), 3)]
+)
+def test_the_others_finish_where_a_jobs_end_cannot_be_written(
+    omninav, shared_cache: Path, tmp_path: Path, taken: str, words: tuple[str, ...], complete: int
+):
+    at = tmp_path / "sweep" / taken
+    at.parent.mkdir(parents=True)
+    at.touch()
+    ended = omninav("-m", "seed=0,1,2", *SHORT, *words, f"cache={shared_cache}", "hydra.sweep.dir=sweep")
+    assert ended.returncode in (1, 2)
+    assert f"sweep/{taken.partition('/')[0]}" in ended.stderr
+    assert "Error executing job" not in ended.stderr  # words of Hydra
+    assert [m["status"] for m in manifests(tmp_path / "sweep")] == ["complete"] * complete
+
+
 def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
     omninav, omninav_process, swept, shared_cache: Path, tmp_path: Path
 ):

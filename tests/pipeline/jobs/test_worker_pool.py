@@ -49,6 +49,16 @@ def test_a_job_that_fails_or_dies_is_reported_and_the_others_finish(tmp_path: Pa
     assert {path.suffix for path in tmp_path.iterdir()} == {".log", ""}
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_jobs_end_as_they_do_elsewhere_where_their_logs_meet_a_full_disk(tmp_path: Path):
+    jobs = [job(name, tmp_path) for name in ("fail once", "fail again")]
+    for each in jobs:
+        each.log.symlink_to("/dev/full")
+    with WorkerPool(ExecutorSettings(workers=1), tmp_path) as workers:
+        outcomes = workers.run(jobs)
+    assert [outcome.error for outcome in outcomes.values()] == ["ValueError: no such number"] * 2
+
+
 def test_a_job_that_takes_too_much_memory_is_ended_and_named_with_what_it_took(tmp_path: Path):
     greedy = job("take", tmp_path, megabytes=300, seconds=60, mark=str(tmp_path / "mark"))
     with WorkerPool(ExecutorSettings(workers=1, memory=200_000_000), tmp_path) as workers:
