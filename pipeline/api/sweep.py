@@ -1,8 +1,8 @@
 """Sweeps: many runs of settings in all combinations, and what came of them as tables."""
 
-import io
 import os
 import sys
+import threading
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -79,14 +79,28 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     try:
         with ALONE, ExitStack() as quiet:
             if not progress:
-                quiet.enter_context(redirect_stdout(io.StringIO()))
-                quiet.enter_context(redirect_stderr(io.StringIO()))
+                quiet.enter_context(redirect_stdout(_Quiet(sys.stdout)))
+                quiet.enter_context(redirect_stderr(_Quiet(sys.stderr)))
             command(["-m", *arguments_of(words, fixed), *swept, *place], on_sweep=made.append)
     finally:
         sys.argv = before  # the manifests of jobs record it
     if not made:
         raise BadInput(f"{' '.join(words):.80}: a flag that shows something runs no sweep; leave it out")
     return Sweep(made[0])
+
+
+class _Quiet:
+    """A stream without what the thread that makes it writes: others print meanwhile."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream, self._thread = stream, threading.get_ident()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> Any:
+        """Write what another thread writes."""
+        return len(text) if threading.get_ident() == self._thread else self._stream.write(text)
 
 
 def _values(name: str, values: list[Any] | tuple[Any, ...] | range) -> str:

@@ -1,4 +1,5 @@
 import sys
+import threading
 
 import pytest
 from conftest import DRIVE, TOUR
@@ -27,6 +28,19 @@ def test_a_sweep_is_one_table_with_seeds_and_one_with_means_and_intervals(sweep)
     assert means.set_index("match")["position_error_m.median"].to_dict() == pytest.approx(figures.to_dict())
     assert [run.metrics["frames"] for run in sweep.runs] == jobs["frames"].tolist()
     assert "Means over seeds" in sweep.report.read_text()
+
+
+def test_a_quiet_sweep_leaves_alone_what_others_print(sweep, monkeypatch, capsys):
+    def printing(words, on_sweep):
+        print("own")
+        other = threading.Thread(target=lambda: print("another's"))
+        other.start()
+        other.join()
+        on_sweep(sweep.folder)
+
+    monkeypatch.setattr("omninav.pipeline.api.sweep.command", printing)
+    omninav.sweep("plain_matching", seed=[0], progress=False)
+    assert capsys.readouterr().out == "another's\n"
 
 
 def test_a_sweep_is_opened_reported_and_compared_by_its_folder(sweep, capsys):
