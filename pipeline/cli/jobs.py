@@ -168,7 +168,8 @@ def no_run_in(folder: Path) -> Path:
     """The folder itself. Raises `BadInput` where there is a run in it, or a file, which a run might overwrite."""
     if (folder / "manifest.json").exists():
         raise BadInput(f"{folder}: there is a run in it; `omninav resume` continues it, hydra.run.dir=… names another")
-    files = sorted(file.name for file in folder.glob("[!.]*") if file.is_file()) if folder.is_dir() else []
+    ours = ("config.yaml", "graph.svg", "graph.mmd") if (folder / ".lock").is_file() else ()  # of one that never began
+    files = sorted({file.name for file in folder.glob("[!.]*") if file.is_file()}.difference(ours))
     if files:
         raise BadInput(f"{folder}: it holds {', '.join(files[:3])}, which a run might overwrite; name an empty folder")
     return folder

@@ -66,6 +66,19 @@ def test_a_full_disk_that_names_no_file_names_the_runs_folder(tmp_path: Path, mo
         omninav.run("plain_matching", folder=tmp_path / "run", **words)
 
 
+def test_what_a_run_leaves_that_never_began_is_in_nobodys_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(graph: object) -> str:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    words = {"tour": TOUR, "log": DRIVE, "cache": None, "nodes.source.stop": 3, "progress": False}
+    monkeypatch.setattr("omninav.pipeline.run.run_folder.svg", full)
+    with pytest.raises(omninav.BadInput, match="No space left on device"):
+        omninav.run("plain_matching", folder=tmp_path / "run", **words)
+    assert (tmp_path / "run" / "config.yaml").is_file()
+    monkeypatch.undo()
+    assert omninav.run("plain_matching", folder=tmp_path / "run", **words).status == "complete"
+
+
 def test_an_error_of_the_cache_that_is_no_full_disk_is_one(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="no such"), Cache(tmp_path).unless_full():
         raise OSError(errno.EIO, "no such")
