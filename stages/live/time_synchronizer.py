@@ -396,14 +396,16 @@ class TimeSynchronizer:
 
     def _follows(self, stamp: int) -> bool:
         """Tells whether an image comes after the last one used; or its clock was set back for good."""
+        track = self.drive.odometry
+        behind = 0.0 if track is None or track.last is None else (track.last - stamp) / 1e9
+        if behind <= MAX_BEHIND_S:
+            self.status.note("clock", "")
         if self.last_stamp is None or stamp > self.last_stamp:
             return True
         if self._earlier is None or stamp < self._earlier:
             self._earlier = stamp
         if stamp - self._earlier < EXCURSION_S * 1e9:
             return False
-        track = self.drive.odometry
-        behind = 0.0 if track is None or track.last is None else (track.last - stamp) / 1e9
         if behind > MAX_BEHIND_S:
             self.status.note(
                 "clock",

@@ -371,15 +371,17 @@ def test_a_run_without_a_tick_says_what_was_left_out_though_the_robot_fell_silen
 
 def test_a_camera_s_clock_that_alone_is_set_back_is_noted(wire: Wire, tmp_path: Path):
     drive, messages = Drive(tmp_path), said()
-    later = messages[len(messages) // 2 :]
-    drive.feed(wire, [*messages[: len(messages) // 2], *map(set_back, later)])
+    half, end = len(messages) // 2, len(messages) * 3 // 4
+    drive.feed(wire, [*messages[:half], *map(set_back, messages[half:end])])
     assert "images are 5." in wire.status.troubles["clock"]
     assert drive.synchronizer.counts["backward_stamp"] > 0
+    drive.feed(wire, [set_back(each, IMAGE, ODOMETRY) for each in messages[end:]])
+    assert "clock" not in wire.status.troubles  # of odometry too
 
 
-def set_back(message: RawMessage) -> RawMessage:
-    """An image whose stamp is 5 s earlier."""
-    if message.topic != IMAGE:
+def set_back(message: RawMessage, *topics: str) -> RawMessage:
+    """A message whose stamp is 5 s earlier where it is of these topics, of images without any."""
+    if message.topic not in (topics or (IMAGE,)):
         return message
     seconds = int.from_bytes(message.data[4:8], "little") - 5
     return message._replace(data=message.data[:4] + seconds.to_bytes(4, "little") + message.data[8:])
