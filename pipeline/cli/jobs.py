@@ -156,9 +156,17 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prep
             run, metrics = resume(folder, progress)  # the sweep was stopped and is typed again, or this job has died
         else:
             run = start(prepared, argv, folder, _hydra_files(config))
-            metrics = execute(run, prepared, progress)
+            try:
+                metrics = execute(run, prepared, progress)
+            except KeyboardInterrupt:
+                if run.manifest["status"] != "complete":
+                    raise
+                metrics = read_metrics(run.folder)
     if sweep is None:
-        show_results(run.folder, metrics, run.manifest)
+        try:
+            show_results(run.folder, metrics, run.manifest)
+        except KeyboardInterrupt:  # too late to stop anything
+            show_results(run.folder, metrics, run.manifest)
     else:
         show_report(run.folder)
     return objective_of(metrics, settings["objective"]) if settings.get("objective") else None

@@ -58,8 +58,10 @@ def running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | No
         try:
             yield from _running(run, prepared, display)
         except KeyboardInterrupt:
-            _fail(run, "interrupted", "stopped by the user")
-            raise Interrupted(run.folder) from None
+            if run.manifest["status"] != "complete":
+                _fail(run, "interrupted", "stopped by the user")
+                raise Interrupted(run.folder) from None
+            run.save()
         except (StageFailed, BadInput) as error:
             _fail(run, "failed", str(error))
             raise

@@ -1,6 +1,7 @@
 """Ctrl-C: the run to resume is named, and no other one."""
 
 import importlib
+import pkgutil
 from operator import attrgetter
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.files import read_json
 from omninav.pipeline.run.run_folder import RunFolder
 
 from .test_hydra_folders import VARIANT
@@ -45,6 +47,17 @@ def test_before_its_folder_is_whole_nothing_is_named_and_nothing_left(
     assert main(RUN) == 130
     assert capsys.readouterr().err.splitlines()[-1] == "stopped before it had begun"
     assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["latest", "of_yesterday"]
+
+
+@pytest.mark.parametrize(
+    "last", ["run.execution.Engine.close", "run.execution.read_metrics", "cli.terminal.read_timing"]
+)
+def test_once_it_is_complete_its_results_are_shown(last: str, monkeypatch: pytest.MonkeyPatch, capsys):
+    found, stops = pkgutil.resolve_name(f"omninav.pipeline.{last}"), [stop]
+    monkeypatch.setattr(f"omninav.pipeline.{last}", lambda *given: (stops.pop() if stops else found)(*given))
+    assert main(RUN) == 0
+    assert "report: runs/" in capsys.readouterr().out
+    assert (read_json(Path("runs/latest/manifest.json"))["status"], stops) == ("complete", [])
 
 
 def test_a_command_that_is_no_run_names_none(monkeypatch: pytest.MonkeyPatch, capsys):
