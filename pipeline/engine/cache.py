@@ -1,7 +1,7 @@
 """The cache: results as files, by the hash of everything that made them."""
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,9 @@ class Cache:
     def find(self, key: str, suffix: str) -> tuple[Path, Any] | None:
         """The result with this key, and its notes; None where there is none, or no whole one."""
         path, entry = self.path(key, suffix), self._entry(key, suffix)
-        if not path.is_file() or not entry.is_file():  # without its entry it was never finished
-            return None
         try:
+            if not path.is_file() or not entry.is_file():  # without its entry it was never finished
+                return None
             stated = decode(unseal(entry.read_bytes(), str(entry)))
             if stated["key"] != key:
                 raise BadEncoding(f"{path} was made for another key")
@@ -41,7 +41,9 @@ class Cache:
             return path, stated["notes"]
         except (BadEncoding, LookupError, TypeError) as error:
             self.discard(key, suffix, str(error))
-            return None
+        except PermissionError:  # somebody else's
+            pass
+        return None
 
     @contextmanager
     def keep(self, key: str, suffix: str, notes: Any = None) -> Iterator[Path]:
@@ -55,9 +57,11 @@ class Cache:
 
     @contextmanager
     def unless_full(self) -> Iterator[None]:
-        """Around code that stores a result: a full disk is reported, and does not fail the run."""
+        """Around code that stores a result: a full disk, or one not ours, is reported, and does not fail the run."""
         try:
             yield
+        except PermissionError as error:
+            report_damage(f"cache: {self.folder}: {error.strerror}; results are not kept there: type cache=FOLDER")
         except OSError as error:
             if error.errno not in DISK:
                 raise
@@ -68,12 +72,17 @@ class Cache:
     def discard(self, key: str, suffix: str, why: str) -> None:
         """Throw a result away, and report why."""
         report_damage(f"{why}; it is thrown away and made again")
-        for file in (self._entry(key, suffix), self.path(key, suffix)):
-            file.unlink(missing_ok=True)
+        with self.unless_full():
+            for file in (self._entry(key, suffix), self.path(key, suffix)):
+                file.unlink(missing_ok=True)
 
-    def lock(self, key: str) -> AbstractContextManager[None]:
+    @contextmanager
+    def lock(self, key: str) -> Iterator[None]:
         """Lock an entry while its result is being computed; others that need it wait."""
-        return locked(self.path(key, ".lock"))
+        with ExitStack() as held:
+            with self.unless_full():
+                held.enter_context(locked(self.path(key, ".lock")))
+            yield
 
     def _entry(self, key: str, suffix: str) -> Path:
         return self.path(key, f"{suffix}.entry")

@@ -48,6 +48,22 @@ def test_a_full_cache_is_said_and_the_run_goes_on(
     assert "No space left on device; results are not kept there: free some space, or type cache=FOLDER" in said
 
 
+def test_a_cache_that_one_may_not_write_is_said_once_and_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(path: Path, *given: object) -> object:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    words = {"tour": TOUR, "log": DRIVE, "cache": tmp_path / "cache", "nodes.source.stop": 3, "progress": False}
+    omninav.run("plain_matching", folder=tmp_path / "first", **words)
+    for name in ("locked", "whole_file", "write_whole"):
+        monkeypatch.setattr(f"omninav.pipeline.engine.cache.{name}", refused)
+    run = omninav.run("plain_matching", "match=l2", folder=tmp_path / "run", **words)
+    assert run.manifest["artifacts"]["map"]["reason"].startswith("found")
+    said = f"cache: {tmp_path}/cache: Permission denied; results are not kept there: type cache=FOLDER"
+    assert capsys.readouterr().err.splitlines().count(said) == 1
+
+
 def test_a_copy_to_a_full_disk_names_the_file_that_it_makes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     copied = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run/prefix.sequence", None, str(tmp_path / "a.prefix"))
     with Cache(tmp_path).unless_full():
