@@ -47,7 +47,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     part.unlink(missing_ok=True)  # a link of that name would be written through
     _remove_left_over(path)
     try:
-        with named(path):
+        with named(path, part):
             yield part
             os.replace(part, path)
     finally:
@@ -55,12 +55,13 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def named(path: Path) -> Iterator[None]:
-    """Give an error of the block the name of its file where it has none: a full disk names no file."""
+def named(path: Path, part: Path | None = None) -> Iterator[None]:
+    """Give an error of the block its file's name where it has none (of a full disk), or that of the file's `part`."""
     try:
         yield
     except OSError as error:
-        error.filename = error.filename or str(path)
+        if error.filename is None or (part is not None and str(error.filename).startswith(str(part))):
+            error.filename = str(path)
         raise
 
 

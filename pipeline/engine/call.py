@@ -166,7 +166,7 @@ class Call:
         except Exception as another:
             message = f"{place}: {type(error).__name__}, whose text cannot be had ({type(another).__name__})"
         if isinstance(error, OSError) and error.errno in DISK:
-            return BadInput(f"{message}; {HINTS[error.errno]}")
+            return BadInput(f"{message}; {HINTS[error.errno]}; `omninav resume` continues the run")
         return StageFailed(message)
 
     def _place(self) -> str:

@@ -70,8 +70,8 @@ def cut(value: Any) -> str:
 
 
 HINTS = {
-    errno.ENOSPC: "free some space; `omninav resume` continues a run that had begun",
-    errno.EDQUOT: "free some space; `omninav resume` continues a run that had begun",
+    errno.ENOSPC: "free some space",
+    errno.EDQUOT: "free some space",
     errno.EFBIG: "a file may not grow so large; raise the limit (`ulimit -f`), or name another disk",
     errno.EROFS: "nothing can be written there; name another place, of a run: runs=FOLDER cache=FOLDER/.cache",
     errno.EACCES: "it cannot be read or written by you; name another (for runs, type runs=FOLDER)",
@@ -98,7 +98,7 @@ def as_bad_input(error: BaseException) -> BadInput | None:
         if error.strerror != os.strerror(number):  # words of ours on what to do
             return BadInput(f"{where}{error.strerror or error}")
         hint = HINTS.get(number, "name another" if where else "the system does not name the file")
-        return BadInput(f"{where}{error.strerror}; {hint}")
+        return BadInput("; ".join([f"{where}{error.strerror}", hint, *getattr(error, "__notes__", ())]))
     if isinstance(error, MemoryError):
         return BadInput("there is no memory left; close other programs, or raise the limit (`ulimit -v`)")
     yaml, omegaconf = sys.modules.get("yaml"), sys.modules.get("omegaconf.errors")  # who met their errors has them

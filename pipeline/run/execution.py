@@ -3,6 +3,7 @@
 import json
 import logging
 import os
+import shlex
 import shutil
 import traceback
 from collections.abc import Iterator
@@ -66,8 +67,9 @@ def running(run: RunFolder, prepared: PreparedRun, display: ProgressDisplay | No
             _fail(run, "failed", str(error))
             raise
         except Exception as error:
-            if isinstance(error, OSError) and error.errno in DISK and error.filename is None:
-                error.filename = str(run.folder)  # writing to an open file names none
+            if isinstance(error, OSError) and error.errno in DISK:
+                error.filename = error.filename or str(run.folder)  # writing to an open file names none
+                error.add_note(f"`omninav resume {shlex.quote(str(run.folder))}` continues the run")
             _fail(run, "failed", f"{type(error).__name__}: {error}")
             raise
 

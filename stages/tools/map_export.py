@@ -9,7 +9,7 @@ from typing import Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Tool, user_path, write_whole
+from omninav.pipeline import BadInput, Bounds, Context, Tool, named, user_path, write_whole
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.map_files.point_cloud import ply
@@ -69,7 +69,8 @@ class ExportMap(Tool):
                 except Undecodable as error:
                     raise BadInput(f"{file}: image {row} cannot be decoded: {error}") from None
                 encoded = cv2.imencode(".png", self._cut(image))[1]
-                (part / f"{number}.png").write_bytes(encoded.tobytes())
+                with named(folder, part):
+                    (part / f"{number}.png").write_bytes(encoded.tobytes())
             os.replace(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)

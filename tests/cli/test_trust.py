@@ -251,6 +251,7 @@ def test_a_folder_that_cannot_be_used_is_one_line(
     assert main(["doctor"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"runs/here: {said}")
+    assert "resume" not in line
 
 
 def test_a_working_directory_that_is_gone_is_one_line(

@@ -1,11 +1,14 @@
 """Files appear whole or not at all."""
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-from omninav.pipeline.files import write_whole
+import pytest
+
+from omninav.pipeline.files import whole_file, write_whole
 
 
 def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_path: Path) -> None:
@@ -21,6 +24,12 @@ def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_
     assert not left.exists()
     assert all(file.exists() for file in others)
     assert (tmp_path / "out.mcap").read_bytes() == b"whole"
+
+
+def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path: Path) -> None:
+    for name in (None, "part"):
+        with pytest.raises(OSError, match=rf"'{tmp_path}/map\.omap'$"), whole_file(tmp_path / "map.omap") as part:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), name and str(part))
 
 
 def test_what_no_text_can_hold_is_written_as_its_number(tmp_path: Path) -> None:

@@ -73,13 +73,18 @@ def test_a_copy_to_a_full_disk_names_the_file_that_it_makes(tmp_path: Path, caps
 
 
 def test_a_full_disk_that_names_no_file_names_the_runs_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(engine: Engine) -> bool:
+    def full(*_: object) -> bool:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Engine, "tick", full)
     words = {"tour": TOUR, "log": DRIVE, "cache": None, "nodes.source.stop": 3, "progress": False}
-    with pytest.raises(omninav.BadInput, match=f"{tmp_path}/run: No space left on device; free some space"):
+    said = "No space left on device; free some space; `omninav resume"
+    with pytest.raises(omninav.BadInput, match=f"{tmp_path}/run: {said} {tmp_path}/run` continues the run"):
         omninav.run("plain_matching", folder=tmp_path / "run", **words)
+    monkeypatch.undo()
+    monkeypatch.setattr("omninav.stages.match.selective.SelectiveMatch.compare", full)
+    with pytest.raises(omninav.BadInput, match=rf"stage 'match' .*{said}` continues the run"):
+        omninav.run("plain_matching", folder=tmp_path / "another", **words)
 
 
 def test_what_a_run_leaves_that_never_began_is_in_nobodys_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,7 @@
 """Maps as folders of images, and what is refused."""
 
+import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,6 +53,16 @@ def test_images_are_numbered_in_the_order_of_the_tour(tmp_path: Path, capsys: py
     assert written(out) == [0, 1, 2, 3, 4, 5]
     assert "images of 6 of 6 views, 0.png to 5.png" in capsys.readouterr().out
     assert [path.name for path in out.parent.iterdir()] == ["topomap"]
+
+
+def test_a_full_disk_is_said_with_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def fill(path: Path, content: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    map = saved(tmp_path)
+    monkeypatch.setattr(Path, "write_bytes", fill)
+    with pytest.raises(OSError, match=rf"No space left on device: '{tmp_path}/out'$"):
+        ExportMap(maps=map, out=str(tmp_path / "out")).run(CTX)
 
 
 def test_images_are_spaced_and_missing_ones_are_passed_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
