@@ -189,7 +189,7 @@ def run(
     `BadInput`, or `StageFailed` where a stage raised.
     """
     made = configured(words, settings)
-    place = None if folder is None else no_run_in(Path(folder))
+    place = None if folder is None else no_run_in(Path(folder), "folder")
     begun = start(made.prepared, ["omninav", *made.words], place)
     with Progress() as shown:
         execute(begun, made.prepared, shown if progress else None)

@@ -218,7 +218,7 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
             raise
         why = f"{found.problems[0].where}: {found.problems[0].what}"
         raise BadInput(f"{' '.join(typed):.80}: nothing can be pushed into it ({why}); use omninav.run") from None
-    place = None if folder is None else no_run_in(Path(folder))
+    place = None if folder is None else no_run_in(Path(folder), "folder")
     return Session(start(made.prepared, ["omninav", *made.words], place), made.prepared)
 
 

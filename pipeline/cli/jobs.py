@@ -172,10 +172,13 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None, prepare: Prep
     return objective_of(metrics, settings["objective"]) if settings.get("objective") else None
 
 
-def no_run_in(folder: Path) -> Path:
-    """The folder itself. Raises `BadInput` where there is a run in it, or a file, which a run might overwrite."""
+def no_run_in(folder: Path, setting: str = "hydra.run.dir") -> Path:
+    """The folder itself. Raises `BadInput` where there is a run in it, or a file, which a run might overwrite.
+
+    `setting`: names the folder.
+    """
     if (folder / "manifest.json").exists():
-        raise BadInput(f"{folder}: there is a run in it; `omninav resume` continues it, hydra.run.dir=… names another")
+        raise BadInput(f"{folder}: there is a run in it; `omninav resume` continues it, {setting}=… names another")
     ours = ("config.yaml", "graph.svg", "graph.mmd") if (folder / ".lock").is_file() else ()  # of one that never began
     files = sorted({file.name for file in folder.glob("[!.]*") if file.is_file()}.difference(ours))
     if files:

@@ -80,7 +80,8 @@ def prepare_run(config: Mapping[str, Any]) -> PreparedRun:
     load_stages(config)
     seed = config.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        problems.append(Problem("seed", f"{seed!r}, expected a whole number >= 0", "type seed=0"))
+        whole = int(seed) if isinstance(seed, float) and seed >= 0 and seed.is_integer() else 0
+        problems.append(Problem("seed", f"{seed!r}, expected a whole number >= 0", f"type seed={whole}"))
     for name, spec in specs.items():
         try:
             alike = (one.whole for one in artifacts if one.whole is not None and specs[one.name].graph == spec.graph)

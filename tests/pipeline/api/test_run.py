@@ -53,8 +53,10 @@ def test_what_is_not_there_is_said_with_what_to_type(run, tmp_path):
         run.metrics["position_eror_m"]
     with pytest.raises(omninav.BadInput, match="not a run folder"):
         omninav.open_run(tmp_path)
-    with pytest.raises(omninav.BadInput, match="there is a run in it"):
+    with pytest.raises(omninav.BadInput, match="there is a run in it; `omninav resume` continues it, folder=… names"):
         omninav.run("plain_matching", tour=TOUR, log=DRIVE, folder=run.folder)
+    with pytest.raises(omninav.ProblemsFound, match=r"seed: 2\.0, expected a whole number >= 0\n +type seed=2$"):
+        omninav.run("plain_matching", tour=TOUR, log=DRIVE, seed=2.0)
 
 
 def test_a_folder_that_is_none_is_bad_input_with_what_to_do(tmp_path):
