@@ -93,8 +93,8 @@ class MixtureInMap(GrowingPrior, Stage):
             mean, covariance, _ = moments(map.means, map.covariances, map.weights)
             covariance[2, :2] = covariance[:2, 2] = 0.0
             covariance[2, 2] = np.pi**2 / 3.0
-            covariance = floored(covariance, (INITIAL_SIGMA_M, INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG))))
         else:
             mean, covariance = known[0].copy(), np.diag(known[1] ** 2)
             mean[2] = wrap(mean[2])
+        covariance = floored(covariance, (INITIAL_SIGMA_M, INITIAL_SIGMA_M, float(np.radians(INITIAL_SIGMA_DEG))))
         return self.Out(belief=GaussianMixture(mean[None], covariance[None], np.ones(1)))

@@ -93,6 +93,12 @@ def test_who_asks_to_start_again_says_where_or_means_anywhere_in_the_map(prior: 
     assert spread == pytest.approx([25.01**0.5, 0.1, np.pi / 3**0.5], rel=0.1)
 
 
+def test_a_start_that_is_stated_as_exact_has_a_covariance_all_the_same() -> None:
+    for ports in ({}, {"restart": Reinitialise((1.0, 2.0, 0.5, 0.0, 0.0))}):  # as a message whose covariance is not set
+        _, spread = moments_of(MixtureInMap(at=(1.0, 2.0, 0.5, 0.1, 0.0)), ViewMixtures.empty(), **ports)
+        assert spread == pytest.approx([0.01 if ports else 0.1] * 2 + [np.radians(0.5)])
+
+
 @pytest.mark.parametrize("prior", PRIORS)
 def test_headings_of_a_start_are_within_half_a_turn(prior: type) -> None:
     belief = prior(at=(0.0, 0.0, 4.0, 0.1, 0.1)).step(at_tick(first=True), ViewMixtures.empty(), None).belief
