@@ -9,6 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.probability.particles import effective_size, is_narrow, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.commands import Reinitialise
 
 KLD_ERROR = 0.05
 """Kullback-Leibler distance allowed with `adapt: kld` (Fox 2001)."""
@@ -49,8 +50,8 @@ class ImportanceResampling(Stage):
     are resampled with all others. Weights are those of one mixture throughout; only the allocation of particles
     differs.
 
-    Where a log begins with a belief that may be anywhere, a few thousand particles leave most places out, and it would
-    settle on one that looks alike: half of it goes to the poses that the first image suggests.
+    Where a log or a `restart` begins with a belief that may be anywhere, a few thousand particles leave most places
+    out, and it would settle on one that looks alike: half of it goes to the poses that the first image suggests.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -68,7 +69,14 @@ class ImportanceResampling(Stage):
     class Out(Outputs):
         belief: Particles
 
-    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        particles: Particles,
+        likelihood: Likelihood,
+        proposals: Particles | None,
+        restart: Reinitialise | None = None,
+    ) -> Out:
         poses, weighted = particles.poses, particles.weights * likelihood.values
         total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):
@@ -77,7 +85,8 @@ class ImportanceResampling(Stage):
         moved = self.kidnapping_probability * likelihood.novelty
         if moved > 0.0:
             moved = max(moved, likelihood.carried)
-        if ctx.tick.first_of_log and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
+        begins = ctx.tick.first_of_log or restart is not None
+        if begins and moved > 0.0 and not is_narrow(poses, particles.weights, NARROW_M):
             moved = LEFT_OUT
         if proposals is not None and likelihood.mean_likelihood is not None:
             new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))

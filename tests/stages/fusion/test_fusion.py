@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from made_beliefs import along_x, even, scattered_around
 
+import omninav
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
 from omninav.stages.fusion.uniform_recovery import UniformRecovery
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.commands import Reinitialise
 
 THERE = even(np.full((50, 3), 77.0))
 """Proposed poses, far from the belief."""
@@ -82,18 +84,24 @@ def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> 
 
 
 @pytest.mark.parametrize(("spread", "share"), [(0.5, 1e-7), (20.0, 0.5)])
-def test_half_of_a_first_belief_that_may_be_anywhere_goes_to_what_the_image_suggests(
+def test_half_of_a_first_belief_and_of_one_that_starts_again_anywhere_goes_to_what_the_image_suggests(
     spread: float, share: float
 ) -> None:
     # Bayes by hand: half of it, or the kidnapping probability, where the image is as likely there as in the belief.
     ctx, stage = Context("fusion", np.random.default_rng(0)), ImportanceResampling()
-    for first, expected in ((True, share), (False, 1e-7)):
+    for first, restart, expected in ((True, None, share), (False, Reinitialise(), share), (False, None, 1e-7)):
         ctx.tick = Tick(0, 0, first_of_log=first)
-        out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE).belief
+        out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE, restart).belief
         assert share_there(out) == pytest.approx(expected, rel=1e-3)
     ctx.tick, stage = Tick(0, 0, first_of_log=True), ImportanceResampling(kidnapping_probability=0.0)
     out = stage.step(ctx, belief(5000, spread=spread), Likelihood(np.ones(5000), 1.0), THERE).belief
     assert share_there(out) == 0.0
+
+
+def test_who_asks_a_running_filter_to_start_again_is_heard_by_all_that_begin_a_log() -> None:
+    wires = omninav.compose("omninav").settings["wires"]
+    asked = {node for node, ports in wires.items() if "restart" in ports}
+    assert asked >= {"prior", "fusion", "landmark_update", "monitor"}
 
 
 def test_a_robot_that_stands_is_kidnapped_less_often_and_one_whose_view_breaks_off_more_often() -> None:
