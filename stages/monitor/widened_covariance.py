@@ -1,35 +1,43 @@
 """Widens the covariance of an estimate to the errors that were measured."""
 
 import math
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Annotated
 
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.arrays import Array
-from omninav.stages.geometry.plane.se2 import wrap_angle
+from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.track import Track
+
+from .consistency import consistency
 
 DRIFT_M = (0.1, 0.05)
 """Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""
 MAX_SQUARES = 16.0
 """Largest squared Mahalanobis distance from the estimate at which a pose by landmarks agrees with it; 99.9 % of
 correct poses are within it (chi-square, 3 degrees of freedom)."""
+JUMP = (0.5, math.radians(10.0))
+"""Distance (m; the map's length scale where that is more) and turn (rad) from where odometry leads the last estimate,
+beyond which the next one does not go on from it."""
 AGREES = 0.9
 """Smallest probability of a pose by landmarks that agrees with the estimate."""
 
 
 class WidenCovarianceState(State):
-    """Metres driven since landmarks gave the pose that was estimated."""
+    """Metres driven since landmarks gave the pose that was estimated, and the last estimate (3,)."""
 
     driven_m: float = math.inf
+    estimate: Array = field(default_factory=lambda: np.zeros(3))
 
 
 class WidenCovariance(Stage):
@@ -39,9 +47,9 @@ class WidenCovariance(Stage):
     that is off by a share of the appearance length scale, which no particle shows. So that share of the map's length
     scale, squared, is added to both variances of the position. While the estimate is more probably wrong than right,
     the robot may be anywhere in the map: the covariance is that of the map's references about the estimate, and of any
-    heading. Where landmarks gave the pose, no share is added; from there on, odometry's drift since that pose
-    is, until it exceeds the share. The variances of the nearest reference's own pose are added always: where odometry
-    measured the map, it is bent, which neither landmarks nor particles show.
+    heading. Where landmarks gave the pose, no share is added; from there on, odometry's drift since that pose is, until
+    it exceeds the share, the estimate jumps or the robot was carried. The variances of the nearest reference's own pose
+    are added always: where odometry measured the map, it is bent, which neither landmarks nor particles show.
     Evaluation and choice of the share: docs/experiments/confidence.md.
     """
 
@@ -65,9 +73,16 @@ class WidenCovariance(Stage):
         state: WidenCovarianceState,
         fix: LandmarkFix | None = None,
         motion: Motion | None = None,
+        restart: Reinitialise | None = None,
+        track: Track | None = None,
     ) -> Out:
-        state.driven_m = math.inf if ctx.tick.first_of_log else state.driven_m
-        state.driven_m += 0.0 if motion is None else math.hypot(motion.x, motion.y)
+        if motion is not None:
+            state.driven_m += math.hypot(motion.x, motion.y)
+            state.estimate = compose(state.estimate, np.array((motion.x, motion.y, motion.turn)))
+        before, state.estimate = state.estimate, np.array(pose_row(estimate.pose))
+        jumped = consistency(before[None], state.estimate, max(JUMP[0], length_scale.metres), JUMP[1])[0] <= 0.5
+        if ctx.tick.first_of_log or restart is not None or (track is not None and track.carried) or jumped:
+            state.driven_m = math.inf
         if fix is not None and is_the_estimate(fix, estimate):
             state.driven_m = 0.0
         drift = DRIFT_M[0] ** 2 * state.driven_m + (DRIFT_M[1] * state.driven_m) ** 2

@@ -11,10 +11,12 @@ import omninav
 from omninav.pipeline import Context, Tick
 from omninav.stages.monitor.widened_covariance import WidenCovariance, WidenCovarianceState
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.commands import Reinitialise
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.track import Track
 
 MAP = graph_of(np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]))
 OWN = np.diag((0.01, 0.02, 0.003))
@@ -81,10 +83,40 @@ def test_a_pose_by_landmarks_keeps_its_own_covariance_until_odometry_has_drifted
     assert variance(away, 0.99, 0.2) == pytest.approx(1e-4 + 0.09)  # landmarks that say another pose
     assert variance(there, 0.89, 0.2) == pytest.approx(1e-4 + 0.09)  # too few to be sure of
     assert variance(there, 0.91, 0.2) == pytest.approx(1e-4)
-    assert variance(None, 0.0, 1.0) == pytest.approx(1e-4 + 0.01 + 0.0025)
+    assert [variance(None, 0.0, 0.2) for _ in range(5)][-1] == pytest.approx(1e-4 + 0.01 + 0.0025)
     assert variance(None, 0.0, 0.0, first=True) == pytest.approx(1e-4 + 0.09)
     assert variance(there, 0.99, 0.0) == pytest.approx(1e-4)
-    assert variance(None, 0.0, 50.0) == pytest.approx(1e-4 + 0.09)
+    assert [variance(None, 0.0, 0.5) for _ in range(20)][-1] == pytest.approx(1e-4 + 0.09)
+
+
+ON = {"x": 0.2, "turn": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("then", "share"),
+    [
+        (ON, False),
+        (ON | {"x": 1.0}, False),
+        (ON | {"x": 1.1}, True),
+        (ON | {"turn": 0.4}, True),
+        (ON | {"track": Track(True)}, False),
+        (ON | {"track": Track(True, carried=True)}, True),
+        (ON | {"restart": Reinitialise()}, True),
+    ],
+)
+def test_where_the_estimate_does_not_go_on_from_a_pose_by_landmarks_the_way_since_says_nothing(then, share):
+    stage, state = WidenCovariance(), WidenCovarianceState()
+
+    def variance(x, turn=0.1, fix=None, **ports):
+        pose = Pose(x, 0.0, 3.0 + turn)
+        estimate, step = PoseEstimate(pose, 1e-4 * np.eye(3), 0.9, pose), Motion(-0.2, 0.0, 0.1)
+        told = (PoseConfidence(0.9), LengthScale(0.8), MAP, state, fix, step)
+        return stage.step(Context("wide"), estimate, *told, **ports).estimate.covariance[0, 0]
+
+    sure = LandmarkFix(np.array([[0.0, 0.0, 3.1]]), 1e-4 * np.eye(3)[None], np.array([50]), np.array([0.95]), 60)
+    assert variance(0.0, fix=sure) == pytest.approx(1e-4)
+    assert variance(**then) == pytest.approx(1e-4 + (0.48**2 if share else 0.01 * 0.2 + 0.0001))
+    assert (variance(0.4, turn=0.3) > 0.1) == share  # nor is it sure again at the next image
 
 
 def test_the_nearest_references_own_errors_are_added_where_the_map_knows_them():
