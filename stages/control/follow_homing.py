@@ -87,6 +87,8 @@ class FollowHoming(Stage):
         stalled: DrivingStatus | None = None,
         wander: Command | None = None,
     ) -> Out:
+        if tick.first_of_log:  # its clock may be behind that of the one before
+            state.lost_since = state.blocked_since = state.sought_since = None
         if progress is not None and progress.arrived:
             return self._stand("arrived", "")
         if vector is None:

@@ -124,6 +124,8 @@ class RoadmapPlanner(Stage):
         point: GoalPoint | None = None,
     ) -> Out:
         """Give the vector to drive along; `status`: of the tick before, `point` a new goal of a robot that runs."""
+        if tick.first_of_log:  # its clock may be behind that of the one before
+            state.lost_since, state.near_since, state.retry = None, None, 0
         if point is not None:
             self._set_out(state, map, np.array([point.x, point.y, math.nan]))
             state.rivals, state.doubtful, state.asked = np.zeros((0, 3)), False, state.asked + 1

@@ -99,6 +99,8 @@ class ShortestPathPlanner(Stage):
         `image`: how far the goal's image is from each place, where the goal is one. `point`: where a running robot is
         asked to go instead; it goes to the place whose medoid is nearest to it.
         """
+        if tick.first_of_log:  # its clock may be behind that of the one before
+            state.waiting_since = None
         if point is not None:
             medoids = map.poses[map.places][:, :2]
             state.asked = int(np.argmin(np.hypot(*(medoids - (point.x, point.y)).T)))

@@ -44,10 +44,15 @@ class Robot:
     def __init__(self, wanders=False, **how) -> None:
         self.monitor, self.follow, self.wanders = StallMonitor(), FollowHoming(**how), wanders
         self.monitored, self.followed, self.wandered = StallMonitorState(), FollowHomingState(), WallAvoiderState()
-        self.ticks = 0
+        self.ticks, self.clock = 0, 10**15
+
+    def begin_log(self) -> None:
+        """Begin a new log, as where the clock was set back: by almost all of the time since 1970."""
+        self.ticks, self.clock = 0, 5 * 10**9
 
     def drive(self, vector, at=None, ring=None) -> FollowHoming.Out:
-        tick, ctx = Tick(self.ticks, 10**15 + self.ticks * 200_000_000), Context("control")
+        stamp, ctx = self.clock + self.ticks * 200_000_000, Context("control")
+        tick = Tick(self.ticks, stamp, first_of_log=self.ticks == 0)
         self.ticks += 1
         stalled = wander = None
         if ring is not None:
@@ -119,6 +124,22 @@ def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
     assert drive(vector(), progress(), closed).status.why == "waiting for a way through"
     assert out.status.why == "nothing is free for 0.8 m towards the target"
     assert robot.drive(vector(), progress(), scan()).command.speed == 0.4
+
+
+@pytest.mark.parametrize(
+    ("said", "ring", "state"),
+    [
+        (vector(), scan((-180.0, 180.0, 0.4)), "blocked"),
+        (lost(metres=1.0), scan(), "lost"),
+        (vector(state="doubtful"), scan(), "lost"),
+    ],
+)
+def test_whose_clock_is_set_back_waits_no_longer_than_another(said: HomingVector, ring: Scan, state: str) -> None:
+    robot, states = Robot(), []
+    for ticks in (1, 27):
+        states = [robot.drive(said, progress(), ring).status.state for _ in range(ticks)]
+        robot.begin_log()
+    assert (states[0], states[-1]) == ("driving", state)
 
 
 def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long_and_tries_again_after_a_while(

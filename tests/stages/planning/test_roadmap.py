@@ -301,10 +301,12 @@ class Line:
         self.plan, self.point = RoadmapPlannerState(), GoalPoint(x, 0.0)
         self.map = graph_of(np.column_stack([np.arange(0.0, 6.5, 0.5), np.zeros((13, 2))]))
 
-    def at(self, x: float, seconds: float = 0.0, confidence: float = 0.5, y: float = 0.0, **how) -> RoadmapPlanner.Out:
+    def at(
+        self, x: float, seconds: float = 0.0, confidence: float = 0.5, y: float = 0.0, first: bool = False, **how
+    ) -> RoadmapPlanner.Out:
         pose, point, self.point = Pose(x, y, 0.3), self.point, None
         known = PoseEstimate(pose, np.eye(3), 1.0, pose), PoseConfidence(confidence)
-        tick = Tick(0, int(seconds * 1e9))
+        tick = Tick(0, int(seconds * 1e9), first_of_log=first)
         return RoadmapPlanner().step(Context("planning"), self.plan, tick, self.map, *known, point=point, **how)
 
 
@@ -347,6 +349,19 @@ def test_it_goes_to_points_within_five_metres_of_the_map_and_has_arrived_after_t
     outs = [line.at(x, s) for x, s in ((5.91, 0), (5.89, 5), (5.91, 9), (5.91, 18.9), (5.91, 19))]
     assert [out.route.state for out in outs] == ["under way"] * 4 + ["arrived"]
     assert vars(outs[-1].progress) == vars(PathProgress(0, 1, 1, 1, True, False, True))
+
+
+def test_times_of_a_log_are_no_times_of_the_next_one() -> None:
+    line = Line(6.0)
+    line.at(1.0, seconds=1e6, status=BLOCKED)
+    assert line.plan.extra.max() == 10.0
+    line.at(1.0, first=True, status=BLOCKED)  # the clock was set back: it does not wait until it is as late again
+    assert line.plan.extra.max() == 100.0
+    line.at(1.0, seconds=10.0, confidence=0.4)
+    assert line.at(1.0, seconds=1e6, confidence=0.4, first=True).route.state == "locating"
+    line.point = GoalPoint(6.0, 0.0)
+    line.at(5.95, seconds=1e6 + 1.0)
+    assert line.at(5.95, seconds=2e6, first=True).route.state != "arrived"
 
 
 def test_a_way_counts_longer_beside_where_it_was_blocked_and_ten_times_as_much_the_second_time() -> None:

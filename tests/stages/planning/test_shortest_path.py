@@ -50,7 +50,7 @@ class Planner:
 
     def look(self, belief: PlaceBelief | int, status=None, at: int | None = None, share=0.9, point=None):
         """The route of a robot that believes itself at a place, and drives, or does not, to the view `at` of it."""
-        tick = Tick(0, 200_000_000 * self.ticks)
+        tick = Tick(0, 200_000_000 * (self.ticks % 1000), first_of_log=self.ticks % 1000 == 0)
         self.ticks += 1
         belief = believed(belief, share) if isinstance(belief, int) else belief
         why = "a chair" if status == "blocked" else "too few matches"
@@ -140,6 +140,14 @@ def test_even_if_it_is_sure_it_looks_for_a_moment(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(f"{MODULE}.SETTLE_S", SETTLE_S)
     planner = Planner(3)
     assert planned(planner.look(1) for _ in range(6)) == [*5 * [False], True]
+
+
+def test_whose_clock_is_set_back_looks_no_longer():
+    planner = Planner(3)
+    planner.ticks = 900
+    assert not any(planned(planner.look(2, share=0.3) for _ in range(10)))
+    planner.ticks = 1000
+    assert planned(planner.look(2, share=0.3) for _ in range(26)) == [*25 * [False], True]
 
 
 def test_who_looks_long_enough_goes_by_the_most_probable_place():
