@@ -41,7 +41,7 @@ class StallMonitor(Stage):
 
     What is in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
     soon as it has another target, or after `DETOUR_S`, so that it tries again if nobody plans again. The time in which
-    the target is lost does not count.
+    the target is lost or the range finder is silent does not count.
     """
 
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
@@ -59,12 +59,12 @@ class StallMonitor(Stage):
         ctx: Context,
         state: StallMonitorState,
         tick: Tick,
-        scan: Scan,
+        scan: Scan | None = None,
         vector: HomingVector | None = None,
         progress: PathProgress | None = None,
     ) -> Out:
-        elapsed, state.stamp = tick.stamp - state.stamp, tick.stamp
-        if vector is None or (progress is not None and (progress.docking or progress.arrived)):
+        elapsed, state.stamp = 0 if tick.first_of_log else tick.stamp - state.stamp, tick.stamp
+        if scan is None or vector is None or (progress is not None and (progress.docking or progress.arrived)):
             return self.Out()
         if vector.number != state.target or state.blocked >= DETOUR_S * 1e9:
             state.target, state.closest = vector.number, math.inf

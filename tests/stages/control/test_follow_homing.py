@@ -54,10 +54,8 @@ class Robot:
         stamp, ctx = self.clock + self.ticks * 200_000_000, Context("control")
         tick = Tick(self.ticks, stamp, first_of_log=self.ticks == 0)
         self.ticks += 1
-        stalled = wander = None
-        if ring is not None:
-            stalled = self.monitor.step(ctx, self.monitored, tick, ring, vector, at).status
-            wander = WallAvoider().step(ctx, ring, self.wandered).command if self.wanders else None
+        stalled = self.monitor.step(ctx, self.monitored, tick, ring, vector, at).status
+        wander = WallAvoider().step(ctx, ring, self.wandered).command if self.wanders and ring is not None else None
         return self.follow.step(ctx, self.followed, tick, vector, at, ring, stalled, wander)
 
 
@@ -263,6 +261,15 @@ def test_time_in_which_the_target_is_lost_does_not_count_as_stalled(monkeypatch:
         robot.drive(lost(), progress(), scan())
     said = [robot.drive(vector(), progress(), scan()).status.state for _ in range(13)]
     assert said == ["driving"] * 10 + ["blocked"] * 3
+
+
+def test_neither_does_time_in_which_it_stands_without_a_scan_nor_that_between_two_logs() -> None:
+    robot = Robot()
+    for ring in (scan(), *200 * [None], *140 * [scan()]):  # silent for 40 s, and 28 s on the way
+        assert robot.drive(vector(), progress(), ring).status.state == "driving"
+    robot.begin_log()
+    said = [robot.drive(vector(), progress(), scan()).status.state for _ in range(12)]
+    assert said == ["driving"] * 11 + ["blocked"]
 
 
 @pytest.mark.parametrize(("side", "speed"), [(0.26, 0.0), (0.28, 0.2), (0.34, 0.2), (0.36, 0.4)])
