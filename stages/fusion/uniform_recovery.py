@@ -19,8 +19,7 @@ class UniformRecovery(Stage):
     Wolf, Burgard & Burkhardt 2005, sections III and VI-C: random particles let a lost or kidnapped robot recover. They
     are drawn from the `proposals` by weight and take the place of resampled ones, so that the number stays (erratum
     47). With `sensor=visibility` they are uniform over the free space with all headings, as in the paper. Resampling is
-    systematic; all weights are equal afterwards. Raises BadInput where random particles are wanted and there are no
-    proposals.
+    systematic; all weights are equal afterwards.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
