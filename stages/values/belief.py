@@ -42,7 +42,7 @@ class Belief(Value):
 class Particles(Belief):
     """Weighted samples of the pose. `poses`: (N, 3) x, y (m), heading (rad), map frame. `weights`: (N,), sum 1.
 
-    The last `recovery_particles` of them are hypotheses of a kidnapped robot: they are kept, however small their
+    The last `recovery_particles` of them are hypotheses of a kidnapped robot: images keep them, however small their
     weights, until enough evidence for them has accumulated.
     """
 
