@@ -32,7 +32,7 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.track import Track
 
-from .consistency import consistency, log_odds_of_right
+from .consistency import consistency, goes_on, log_odds_of_right
 
 MAX_IMAGES = 500
 """Images that are remembered, of a robot that stops or moves slowly."""
@@ -201,7 +201,7 @@ class ConfidenceMonitor(Stage):
         pose = np.array(pose_row(estimate.pose))
         gate, radians, new = max(self.within_m, length_scale.metres), math.radians(self.within_deg), 0.0
         leads, seen = None, features is None or len(features) >= MIN_SEEN
-        jumped = len(recent.estimates) > 0 and consistency(recent.estimates[-1:], pose, gate, radians)[0] <= 0.5
+        jumped = len(recent.estimates) > 0 and not goes_on(recent.estimates[-1], pose, gate, radians)
         if similarities is not None and similarities.values.size and seen:
             novelty = 1.0 if likelihood is None else likelihood.novelty
             leads = leads_of_best(similarities, map, pose, ELSEWHERE * gate)

@@ -17,6 +17,11 @@ def consistency(places: Array, pose: Array, metres: float, radians: float) -> Ar
     return share
 
 
+def goes_on(before: Array, pose: Array, metres: float, radians: float) -> bool:
+    """Tells whether an estimate (3,) is where odometry leads the last one, `before` (3,)."""
+    return bool(consistency(before[None], pose, metres, radians)[0] > 0.5)
+
+
 def log_odds_of_right(
     agreeing: Array, disagreeing: Array, novelties: Array, when_wrong: float, strength: float, kidnapping: float
 ) -> float:

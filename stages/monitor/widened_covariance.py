@@ -19,7 +19,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.track import Track
 
-from .consistency import consistency
+from .consistency import goes_on
 
 DRIFT_M = (0.1, 0.05)
 """Standard deviation of odometry's position since the last pose by landmarks, m: per root of a metre, and per metre."""
@@ -80,8 +80,8 @@ class WidenCovariance(Stage):
             state.driven_m += math.hypot(motion.x, motion.y)
             state.estimate = compose(state.estimate, np.array((motion.x, motion.y, motion.turn)))
         before, state.estimate = state.estimate, np.array(pose_row(estimate.pose))
-        jumped = consistency(before[None], state.estimate, max(JUMP[0], length_scale.metres), JUMP[1])[0] <= 0.5
-        if ctx.tick.first_of_log or restart is not None or (track is not None and track.carried) or jumped:
+        follows = goes_on(before, state.estimate, max(JUMP[0], length_scale.metres), JUMP[1])
+        if ctx.tick.first_of_log or restart is not None or (track is not None and track.carried) or not follows:
             state.driven_m = math.inf
         if fix is not None and is_the_estimate(fix, estimate):
             state.driven_m = 0.0
