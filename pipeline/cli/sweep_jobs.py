@@ -73,7 +73,7 @@ def _end_of(job: Job, outcome: Outcome) -> JobEnd:
     sweep, number = Path(job.given["sweep"]), job.name
     end = JobEnd(1, f"{outcome.error} (what it printed is in {LOGS}/{number}.log)", sweep=str(sweep), number=number)
     file = sweep / LOGS / f"{number}.folder"
-    folder = Path(file.read_text(encoding="utf-8")) if file.is_file() else sweep / number
+    folder = Path((file.is_file() and file.read_text(encoding="utf-8")) or sweep / number)  # empty on a full disk
     return note_end(SweepJob(sweep, folder, number, tuple(job.given["overrides"])), end)
 
 

@@ -10,6 +10,9 @@ import pytest
 import yaml
 from conftest import Command
 
+from omninav.pipeline.cli.sweep_jobs import LOGS, _end_of
+from omninav.pipeline.jobs.job import Job, Outcome
+
 ROOT = Path(__file__).resolve().parents[2]
 EDGES = ROOT / "examples" / "edges"
 SHORT = ("landmarks=none", "nodes.source.stop=12")  # of tour and drive, where a result is not looked at
@@ -73,6 +76,14 @@ def test_the_others_finish_where_a_jobs_end_cannot_be_written(
     assert f"sweep/{taken.partition('/')[0]}" in ended.stderr
     assert "Error executing job" not in ended.stderr  # words of Hydra
     assert [m["status"] for m in manifests(tmp_path / "sweep")] == ["complete"] * complete
+
+
+def test_a_job_whose_folder_a_full_disk_did_not_take_ends_in_its_sweep(tmp_path: Path):
+    (tmp_path / LOGS).mkdir()
+    (tmp_path / LOGS / "2.folder").touch()
+    job = Job("2", "module:name", {"sweep": str(tmp_path), "overrides": ["seed=2"]}, tmp_path / LOGS / "2.log")
+    _end_of(job, Outcome("no space"))
+    assert [m["job"] for m in manifests(tmp_path)] == ["2"]
 
 
 def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
