@@ -76,13 +76,15 @@ class WidenCovariance(Stage):
         restart: Reinitialise | None = None,
         track: Track | None = None,
     ) -> Out:
-        if motion is not None:
-            state.driven_m += math.hypot(motion.x, motion.y)
-            state.estimate = compose(state.estimate, np.array((motion.x, motion.y, motion.turn)))
-        before, state.estimate = state.estimate, np.array(pose_row(estimate.pose))
-        follows = goes_on(before, state.estimate, max(JUMP[0], length_scale.metres), JUMP[1])
-        if ctx.tick.first_of_log or restart is not None or (track is not None and track.carried) or not follows:
-            state.driven_m = math.inf
+        before, pose = state.estimate, np.array(pose_row(estimate.pose))
+        if math.isfinite(state.driven_m):
+            if motion is not None:
+                state.driven_m += math.hypot(motion.x, motion.y)
+                before = compose(before, np.array((motion.x, motion.y, motion.turn)))
+            begins = ctx.tick.first_of_log or restart is not None or (track is not None and track.carried)
+            if begins or not goes_on(before, pose, max(JUMP[0], length_scale.metres), JUMP[1]):
+                state.driven_m = math.inf
+        state.estimate = pose
         if fix is not None and is_the_estimate(fix, estimate):
             state.driven_m = 0.0
         drift = DRIFT_M[0] ** 2 * state.driven_m + (DRIFT_M[1] * state.driven_m) ** 2
@@ -92,10 +94,10 @@ class WidenCovariance(Stage):
         covariance[1, 1] += variance
         sigmas = None if map.landmarks is None else map.landmarks.pose_sigmas
         if sigmas is not None and len(sigmas):
-            away = map.poses[: len(sigmas), :2] - [estimate.pose.x, estimate.pose.y]  # later ones are learned since
+            away = map.poses[: len(sigmas), :2] - pose[:2]  # later ones are learned since
             covariance += np.diag(sigmas[np.argmin((away**2).sum(axis=1))] ** 2)
         if confidence.of_mode < self.min_confidence:
-            covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
+            covariance = covariance + map_covariance(pose, map)
         return self.Out(estimate=replace(estimate, covariance=covariance))
 
 
