@@ -275,15 +275,14 @@ def by_landmarks(
     wrong = (1.0 - sure) * (agreeing / PLACES_ALIKE + elsewhere) / (agreeing + elsewhere)
     by_chance = max(wrong, OUTLIER_PROBABILITY)
     told = math.log((agreeing + by_chance) / (elsewhere + by_chance))
-    # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
-    counted = novelty if told > 0.0 else NEW_WITHOUT * novelty
     bound = math.log(1.0 / KIDNAPPING_PROBABILITY)
     if sure < 0.5:  # however many agree: one wall misleads all images that show it
         told = min(told, max(0.0, bound - kept))
-    unbound = kept + sure * (min(max(kept, -bound), bound) - kept)
+    limited = kept + sure * (min(max(kept, -bound), bound) - kept)
+    # What misleads an image misleads the next one as well; a belief that agrees came from other evidence too.
     if told > 0.0:
-        return max(unbound + counted * told, kept + sure * (told - kept)), sure
-    return unbound + (sure + (1.0 - sure) * counted) * told, sure
+        return max(limited + novelty * told, kept + sure * (told - kept)), sure
+    return limited + (sure + (1.0 - sure) * NEW_WITHOUT * novelty) * told, sure
 
 
 def share_found(distance: float) -> float:

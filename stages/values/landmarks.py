@@ -19,12 +19,12 @@ DESCRIPTOR_SCALE = 512.0
 class Landmarks(Value):
     """Points of the world that several references of a map see, with what they look like, and the references' words.
 
-    `points` (L, 3): x, y (m) in the map frame, z (m) above the camera's projection centre. `descriptors` (L, D)
-    uint8: the mean of each point's descriptors as `stored_descriptors` makes them. Of reference r the points that it
-    sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a bearing, as the map's
-    own images miss its points. `words`: the visual words of the references, by which candidates are found.
-    `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of others.
-    `camera`: the text of the `camera.yaml` that fits the map's images, empty where it is as it was described.
+    `points` (L, 3), float32 in older maps: x, y (m) in the map frame, z (m) above the camera's projection centre.
+    `descriptors` (L, D) uint8: the mean of each point's descriptors as `stored_descriptors` makes them. Of reference r
+    the points that it sees are `seen[starts[r]]` to `seen[starts[r + 1]]` (S,). `sigma_rad`: standard deviation of a
+    bearing, as the map's own images miss its points. `words`: the visual words of the references, by which candidates
+    are found. `found_rate`: the share of the map's own images, each left out, whose pose is found by the landmarks of
+    others. `camera`: the text of the `camera.yaml` that fits the map's images, empty where it is as it was described.
     `variance_factor`: by which the squares of the errors of these images' poses exceed what their bearings imply.
     `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description states and as
     its images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
