@@ -192,17 +192,17 @@ class OtherEnd:
         """Have it publish CDR on a topic that it has advertised."""
         self.order("publish", topic, data=base64.b64encode(data).decode())
 
-    def said(self, key: str, value: object = None) -> dict[str, Any]:
+    def said(self, key: str, value: object = None, within: float = WAIT_S) -> dict[str, Any]:
         """The next thing that it says with that key, and that value where one is given."""
-        until = time.monotonic() + WAIT_S
+        until = time.monotonic() + within
         while True:
             said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
             if key in said and value in (None, said[key]):
                 return said
 
-    def wait(self, key: str) -> Any:
+    def wait(self, key: str, within: float = WAIT_S) -> Any:
         """The next thing that it says with that key."""
-        return self.said(key)[key]
+        return self.said(key, within=within)[key]
 
     def hear(self, topic: str) -> bytes:
         """The next message that it hears on a topic."""
