@@ -175,6 +175,16 @@ class Camera(Value, ABC):
         return float(found.max()), float(found.min())
 
     @property
+    def mirrored(self) -> bool:
+        """Tells whether images show the world mirrored, as under a mirror."""
+        x, y = (side * (np.arange(SIGHT_PIXELS) + 0.5) / SIGHT_PIXELS for side in (self.width, self.height_px))
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        ray, right, below = (self.unproject(pixels + step)[0] for step in ([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]))
+        with np.errstate(invalid="ignore"):
+            towards = (ray * np.cross(right, below)).sum(axis=-1)
+        return bool(np.nanmean(np.sign(towards)) < 0.0) if np.isfinite(towards).any() else False
+
+    @property
     def elevations_known(self) -> bool:
         """Tells whether elevations are measured; else azimuths are right, and elevations a guess."""
         return True
@@ -236,6 +246,8 @@ def seen_at(camera: Camera, rays: Array) -> Array:
     return np.where(shown[..., None], pixels, np.nan)
 
 
+SIGHT_PIXELS = 16
+"""Pixels along each side of an image at which a camera is asked whether right and below are as the eye sees them."""
 SIGHT_STEPS, MIN_SIGHT, MIN_AZIMUTHS = (144, 73), 0.001, 0.75
 """Numbers of azimuths and elevations at which a camera is asked what it sees; smallest share of the sphere that it sees
 (7 by 7 degrees), and of all azimuths that a ring shows."""

@@ -51,6 +51,8 @@ class RotationReducedSift(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Make the detector; without the precise form it finds fine points a quarter of a pixel off."""
+        self._camera: Camera | None = None
+        self._mirrored = False
         # Features that turn by themselves are found and described in one pass: some more, since edges take away.
         most = 2 * self.max_features if self.orientation == "own" else 0
         self._sift = cv2.SIFT.create(
@@ -79,7 +81,10 @@ class RotationReducedSift(Stage):
         colours = disc_colours(pixels, seen, points, COLOUR_RADIUS * sizes)
         points = read.original(points - (seam, 0))
         sizes *= np.float32(read.scale.mean())
-        features = LocalFeatures(read.bearings(points), points, descriptors.astype(np.uint8), colours, sizes)
+        if camera is not self._camera:
+            self._camera, self._mirrored = camera, read.camera.mirrored
+        bearings, rows = read.bearings(points), descriptors.astype(np.uint8)
+        features = LocalFeatures(bearings, points, rows, colours, sizes, mirrored=self._mirrored)
         shown = np.isfinite(features.bearings).all(axis=1)  # beyond the mirror's edge there is nothing to see
         return self.Out(features=features.chosen(np.flatnonzero(shown)))
 

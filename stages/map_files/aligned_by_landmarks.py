@@ -34,7 +34,8 @@ def aligned_by_landmarks(maps: Sequence[ReferenceGraph], rng: np.random.Generato
     given = [map.landmarks for map in maps if map.landmarks is not None]
     if len(given) < len(maps):
         return None
-    points, looks = zip(*map(_compared, given), strict=True)
+    mirrored = next((each.mirrored for each in given if each.mirrored is not None), None)
+    points, looks = zip(*(_compared(each.as_mirrored(mirrored)) for each in given), strict=True)
     motions: dict[int, Array] = {0: np.zeros(3)}
     tried: dict[tuple[int, int], tuple[int, Array]] = {}
     agreeing = 0

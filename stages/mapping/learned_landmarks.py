@@ -124,6 +124,7 @@ class LearnLandmarks(Stage):
             described_delay,
             described_delay + late,
             _sigmas(adjusted, poses, mount),
+            any(each.mirrored for each in kept_features if each is not None),
         )
         ctx.fact("landmarks", len(landmarks))
         if not len(landmarks):

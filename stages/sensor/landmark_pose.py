@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
-from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
@@ -124,9 +125,12 @@ class LandmarkPose(Stage):
         def expected(camera_poses: Array) -> Array:
             return landmarks_to_expect(landmarks, map.poses, robot_poses(camera_poses, mount), metres_of(length_scale))
 
-        descriptors = root_descriptors(features.descriptors)
+        looks = features.descriptors
+        if landmarks.mirrored not in (None, features.mirrored):
+            looks = mirrored_sift(looks)
+        descriptors = root_descriptors(looks)
         best: LandmarkFix | None = None
-        for candidates in self._candidates(features, landmarks.words, map, near):
+        for candidates in self._candidates(looks, landmarks.words, map, near):
             rows = landmarks.seen_by(candidates)
             fix = self._fix(descriptors, features.bearings, landmarks, rows, state.shown, expected)
             if fix is not None and (best is None or fix.probabilities[0] > best.probabilities[0]):
@@ -200,10 +204,10 @@ class LandmarkPose(Stage):
         )
 
     def _candidates(
-        self, features: LocalFeatures, words: VisualWords, map: ReferenceGraph, near: Particles | None
+        self, looks: Bytes, words: VisualWords, map: ReferenceGraph, near: Particles | None
     ) -> Iterator[Ints]:
         """References to look for landmarks in, and more of them if those were not enough."""
-        similarities = words.similarities(features.descriptors[:WORD_FEATURES])
+        similarities = words.similarities(looks[:WORD_FEATURES])
         best = np.argsort(-similarities, kind="stable") if similarities.any() else np.empty(0, np.int64)
         closest = np.empty(0, np.int64)
         if near is not None:

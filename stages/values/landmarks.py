@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Covariances, RowsOf, Shape, Starts, Value
+from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.arrays import Array, Bools, Bytes, Floats, Ints
 from omninav.stages.geometry.runs import chosen_runs
 
@@ -29,7 +30,8 @@ class Landmarks(Value):
     `described`, `mount` (3,): where the tour's camera sat on its robot (m, m, rad), as its description states and as
     its images show; `described_delay_s`, `delay_s`: the same of how much later than taken its images were stamped (s).
     `pose_sigmas` (R, 3): standard deviations of the references' poses in the map frame (m, m, rad), 0 where they were
-    given and the images confirm them; None where nothing was adjusted.
+    given and the images confirm them; None where nothing was adjusted. `mirrored`: descriptors are of images that show
+    the world mirrored; None, as in older maps: as the images of whoever uses it.
     """
 
     points: Annotated[Array | Floats, Shape("L", 3)]
@@ -46,6 +48,7 @@ class Landmarks(Value):
     described_delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
     delay_s: Annotated[float, Bounds(ge=-100, le=100)] = 0.0
     pose_sigmas: Annotated[Array | None, Shape("R", 3), Bounds(ge=0, le=1e9)] = None
+    mirrored: bool | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -105,6 +108,13 @@ class Landmarks(Value):
             words=self.words.of_views(own),
             pose_sigmas=sigmas,
         )
+
+    def as_mirrored(self, mirrored: bool | None) -> "Landmarks":
+        """The same with descriptors of images that show the world mirrored or, with False, as it is."""
+        if mirrored is None or self.mirrored in (None, mirrored):
+            return self
+        words = replace(self.words, centres=mirrored_sift(self.words.centres))
+        return replace(self, descriptors=mirrored_sift(self.descriptors), words=words, mirrored=mirrored)
 
     def moved(self, before: Array, after: Array) -> "Landmarks":
         """Each point moved as the references that see it are, from their poses `before` (R, 3) to those `after` (R, 3):

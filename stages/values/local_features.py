@@ -53,7 +53,8 @@ class LocalFeatures(Value):
     and rows (pixels, integers are centres) in the image they were found in. `descriptors` (N, D) uint8, compared by
     Euclidean distance. `colours` (N, 3) float32: correlations of red with green, red with blue, green with blue over
     the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25 in docs/papers.md). `sizes` (N,): diameters
-    (pixels). `columns`: the second kind of features (section 3.3); None: not looked for.
+    (pixels). `columns`: the second kind of features (section 3.3); None: not looked for. `mirrored`: the image showed
+    the world mirrored, which `mirrored_sift` undoes.
     """
 
     bearings: Annotated[Array, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
@@ -62,6 +63,7 @@ class LocalFeatures(Value):
     colours: Annotated[Floats, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
     sizes: Annotated[Floats, Shape("N"), Bounds(ge=0)]
     columns: VerticalSegments | None = None
+    mirrored: bool = False
 
     def __len__(self) -> int:
         return len(self.bearings)
