@@ -43,6 +43,11 @@ class DualFisheye(Camera, projection="dual_fisheye"):
         return cls(width, height, focal, width / 4 - 0.5, middle, 3 * width / 4 - 0.5, middle, radius)
 
     @property
+    def upright(self) -> bool:
+        """Upright lines are bent, and turned by the roll."""
+        return False
+
+    @property
     def elevations(self) -> tuple[float, float]:
         """The whole sphere."""
         return math.pi / 2, -math.pi / 2

@@ -132,8 +132,13 @@ class Camera(Value, ABC):
 
     @property
     def ring(self) -> Ring | None:
-        """The ring of the image that shows the world; None where columns, and not radii, are upright lines."""
+        """The ring of the image that shows the world, whose radii are upright lines; None where it has none."""
         return None
+
+    @property
+    def upright(self) -> bool:
+        """Tells whether columns of the image are upright lines, or taken for them."""
+        return self.ring is None
 
     @property
     def mount(self) -> Array:

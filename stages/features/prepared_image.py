@@ -9,15 +9,19 @@ import numpy as np
 from omninav.pipeline import BadInput
 from omninav.stages.camera.equirectangular import camera_behind
 from omninav.stages.camera.model import Camera, Ring
+from omninav.stages.camera.rays import angles, unit_vectors
 from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.image import Image, Panorama, Pixels
+
+SMALL_ANGLE = 1e-4
+"""Step of elevation by which it is found which way is up at a pixel, rad."""
 
 
 class PreparedImage(NamedTuple):
     """An image made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
 
     `scale` (2,): columns and rows of the original per column and row of this one. `ring`: of a mirror image, in these
-    pixels; None: columns are upright. `camera`: of the original.
+    pixels, if it has one. `camera`: of the original.
     """
 
     pixels: Pixels
@@ -39,6 +43,22 @@ class PreparedImage(NamedTuple):
         """Points (..., 2) of this image in pixels of the original."""
         return (points + 0.5) * self.scale - 0.5
 
+    def upward(self, points: Array) -> Array:
+        """The way up at points (N, 2) of this image, degrees clockwise from the right: (N,)."""
+        if self.ring is not None:
+            right, down = (points - (self.ring.centre_x, self.ring.centre_y)).T
+        elif self.camera.upright:
+            return np.full(len(points), 270.0)
+        else:
+            azimuths, elevations = angles(self.bearings(self.original(points)))
+            below, above = (
+                self.camera.project(unit_vectors(azimuths, elevations + step))[0]
+                for step in (-SMALL_ANGLE, SMALL_ANGLE)
+            )
+            right, down = np.nan_to_num((above - below) / self.scale).T
+        up: Array = np.degrees(np.arctan2(down, right)) % 360.0
+        return up
+
 
 def prepared_image(image: Image | Panorama, camera: Camera | None, max_pixels: int) -> PreparedImage:
     """Make an image ready; one of more than `max_pixels` pixels is made smaller.
@@ -55,12 +75,14 @@ def prepared_image(image: Image | Panorama, camera: Camera | None, max_pixels: i
         size = round(columns / shrink), round(rows / shrink)
         scale = np.array([columns / size[0], rows / size[1]])
         pixels = cast(Pixels, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA))
-    if ring is None:
-        seen = np.ones(pixels.shape[:2], np.bool_)
-    else:
+    read = PreparedImage(pixels, np.ones(pixels.shape[:2], np.bool_), scale, None, seen_by)
+    rows_read, columns_read = np.ogrid[: pixels.shape[0], : pixels.shape[1]]
+    if ring is not None:
         x, y = (np.array([ring.centre_x, ring.centre_y]) + 0.5) / scale - 0.5
         mean = float(scale.mean())
         ring = Ring(float(x), float(y), ring.inner / mean, ring.outer / mean)
-        rows_read, columns_read = np.ogrid[: pixels.shape[0], : pixels.shape[1]]
-        seen = ring.holds(columns_read, rows_read)
-    return PreparedImage(pixels, seen, scale, ring, seen_by)
+        return read._replace(seen=ring.holds(columns_read, rows_read), ring=ring)
+    if not seen_by.upright:
+        grid = np.stack(np.broadcast_arrays(columns_read, rows_read), axis=-1)
+        return read._replace(seen=seen_by.shows(read.original(grid)))
+    return read

@@ -27,9 +27,9 @@ class RotationReducedSift(Stage):
     """SIFT keypoints with a known orientation, as a robot on a floor stays upright, and the colours of each patch.
 
     Goedemé et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
-    the radius in a mirror image and up the column in a panorama or strip. Features closer to a mirror's edges than
-    their own diameter are left out. Colours (equation 1, erratum 25 in docs/papers.md) are those of a disc around each
-    feature. Raises BadInput for an image without a camera.
+    the radius in a mirror image, up the column in a panorama or strip, else along the vertical as the camera shows it.
+    Features closer to a mirror's edges than their own diameter are left out. Colours (equation 1, erratum 25 in
+    docs/papers.md) are those of a disc around each feature. Raises BadInput for an image without a camera.
     """
 
     orientation: Literal["reduced", "own"] = "reduced"
@@ -71,7 +71,7 @@ class RotationReducedSift(Stage):
             pixels = np.concatenate([pixels[:, -seam:], pixels, pixels[:, :seam]], axis=1)
             seen = np.ones(pixels.shape[:2], np.bool_)
         grey = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
-        mask = None if read.ring is None else seen.astype(np.uint8)
+        mask = None if read.camera.upright else seen.astype(np.uint8)
         found = self._strongest(self._detected(grey, mask), read, seam)
         if not found:
             return self.Out(features=none_found())
@@ -114,18 +114,16 @@ class RotationReducedSift(Stage):
             order = order[np.append(True, (places[1:] != places[:-1]).any(axis=1))]
         x, y, size = rows[order, 1], rows[order, 2], rows[order, 3]
         if read.ring is not None:
-            right, down = x - read.ring.centre_x, y - read.ring.centre_y
-            radius = np.hypot(right, down)
+            radius = np.hypot(x - read.ring.centre_x, y - read.ring.centre_y)
             inside = (radius - read.ring.inner >= size) & (read.ring.outer - radius >= size)
-            angles = np.degrees(np.arctan2(down, right)) % 360.0
         else:
             inside = (x - seam >= -0.5) & (x - seam < read.pixels.shape[1] - 0.5)
-            angles = np.full(len(x), 270.0)
         kept = np.flatnonzero(inside)[: self.max_features]
         strongest = [found[order[row]] for row in kept]
         if self.orientation == "reduced":
-            for row, point in zip(kept, strongest, strict=True):
-                point.angle = float(angles[row])
+            angles = read.upward(np.column_stack([x - seam, y])[kept])
+            for angle, point in zip(angles, strongest, strict=True):
+                point.angle = float(angle)
         return strongest
 
 

@@ -1,9 +1,12 @@
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 from turned_robot import CAMERA, look
 
+from omninav.stages.camera.dual_fisheye import DualFisheye
+from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.features.prepared_image import prepared_image
 from omninav.stages.values.image import Image, Panorama
 
@@ -34,3 +37,17 @@ def test_a_small_image_stays_as_it_is() -> None:
     assert read.scale.tolist() == [1.0, 1.0]
     points = np.array([[3.0, 4.5]])
     assert (read.original(points) == points).all()
+
+
+def test_in_two_fisheyes_side_by_side_up_is_where_the_camera_shows_it_and_what_they_do_not_show_is_not_seen() -> None:
+    camera = dataclasses.replace(DualFisheye.of_size(640, 320), ahead_roll=0.3)
+    read = prepared_image(Image(np.zeros((320, 640, 3), np.uint8)), camera, 160 * 320)
+    rays = unit_vectors(np.radians([0.0, 60.0, -60.0, 0.0]), np.radians([0.0, 40.0, 40.0, -40.0]))
+    points = (camera.project(rays)[0] + 0.5) / read.scale - 0.5
+    # Straight ahead, up is the roll off the column; a meridian leans towards the lens's axis where it is above it.
+    off = (read.upward(points) - (270.0 + math.degrees(0.3)) + 180.0) % 360.0 - 180.0
+    assert off[[0, 3]] == pytest.approx(0.0, abs=1e-3)
+    assert off[1] == pytest.approx(-off[2])
+    assert off[1] > 20.0
+    assert (read.seen == camera.mask()[::2, ::2]).mean() > 0.99
+    assert not read.seen[:, [0, -1]].any()

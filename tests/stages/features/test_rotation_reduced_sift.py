@@ -10,9 +10,12 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context, Stage
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.dual_fisheye import DualFisheye
+from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.model import Camera
 from omninav.stages.features.affine_sift import AffineSift
 from omninav.stages.features.rotation_reduced_sift import EDGE_RATIO, RotationReducedSift
+from omninav.stages.unwarp.table import remap_table
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -61,6 +64,23 @@ def test_with_own_orientation_a_turned_robot_sees_the_same_patches_too(turn: flo
     off = turned_off(one, other, turn)[2]
     assert (off < math.radians(0.5)).sum() > 150
     assert (off < math.radians(0.5)).mean() > 0.7
+
+
+@pytest.mark.parametrize(("orientation", "right"), [("reduced", 190), ("own", 150)])
+def test_two_fisheyes_side_by_side_see_the_same_patches_from_a_turned_robot(orientation: str, right: int) -> None:
+    camera = DualFisheye.of_size(960, 480)
+    sphere = Equirectangular(1024, 512, 512.0, elevation_top=math.pi / 2, elevation_bottom=-math.pi / 2)
+    world = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 255, (512, 1024, 3)).astype(np.uint8), (0, 0), 4.0)
+    world = cv2.normalize(world, None, 0, 255, cv2.NORM_MINMAX)
+
+    def view(turn: float) -> LocalFeatures:
+        rays = dataclasses.replace(camera, yaw=turn).unproject(camera.grid())[0]
+        image = Image(remap_table(sphere, rays)[0].remap(world))
+        return found(image, camera, orientation=orientation, max_pixels=10**6)
+
+    one, other = view(0.0), view(0.8)
+    assert camera.shows(one.points).all()
+    assert (turned_off(one, other, 0.8)[2] < math.radians(0.5)).sum() > right
 
 
 def test_the_radius_stands_in_for_the_orientation_that_is_not_measured() -> None:
