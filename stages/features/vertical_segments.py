@@ -9,6 +9,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.appearance.feature_matching import spreads
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.values.image import Image, Panorama, Pixels
@@ -30,7 +31,7 @@ MIN_LENGTH_PX = 8.0
 AZIMUTH_SIGMA_DEG = 3.0
 """Difference in azimuth that counts as one in the distance of two segments, degrees."""
 LINES = 360
-"""Radii of a mirror image along which segments are searched."""
+"""Radii of a mirror image, or azimuths of two fisheyes, along which segments are searched."""
 MARGIN = 0.2
 """Share of its length by which a segment is widened at both ends for its colours."""
 
@@ -207,11 +208,11 @@ def prototypes(
 class FindVerticalSegments(Stage):
     """Vertical lines between two edges, described by their colours and their profile.
 
-    Goedemé et al. 2007, section 3.3: along every radius of a mirror image, or every column of a panorama, each two
-    neighbouring gradient maxima bound a segment; its descriptor holds three colour correlations over the widened
-    segment and "the seven first coefficients" of the 8-point cosine transform of its profile, the brightness among
-    them: they are called invariant to the light, and are not (erratum 25a in docs/papers.md). Similar neighbours become
-    one (`prototypes`). Raises BadInput for an image without a camera.
+    Goedemé et al. 2007, section 3.3: along every radius of a mirror image, or every column of a panorama, to which two
+    fisheyes are unwarped, each two neighbouring gradient maxima bound a segment; its descriptor holds three colour
+    correlations over the widened segment and "the seven first coefficients" of the 8-point cosine transform of its
+    profile, the brightness among them: they are called invariant to the light, and are not (erratum 25a in
+    docs/papers.md). Similar neighbours become one (`prototypes`). Raises BadInput for an image without a camera.
     """
 
     max_segments: Annotated[int, Bounds(ge=1)] = 200
@@ -246,18 +247,22 @@ class FindVerticalSegments(Stage):
 
     def _upright(self, read: PreparedImage) -> tuple[Pixels, bool]:
         """The image with its upright lines as columns, the outer end of a radius at the top."""
-        if read.ring is None:
+        if read.camera.upright:
             return read.pixels, read.circle
-        lines, rows = np.meshgrid(np.arange(LINES), np.arange(int(read.ring.outer - read.ring.inner) + 1))
+        length = LINES // 2 if read.ring is None else int(read.ring.outer - read.ring.inner) + 1
+        lines, rows = np.meshgrid(np.arange(LINES), np.arange(length))
         points = self._back(np.stack([lines, rows], axis=-1).astype(np.float64), read).astype(np.float32)
         upright = cv2.remap(read.pixels, points[..., 0], points[..., 1], cv2.INTER_LINEAR)
         return cast(Pixels, upright), True
 
     def _back(self, points: Array, read: PreparedImage) -> Array:
         """Points (..., 2) of the upright image as points of the image that was read."""
-        if read.ring is None:
+        if read.camera.upright:
             return points
         angle = 2.0 * math.pi * points[..., 0] / LINES
+        if read.ring is None:  # half a circle from the zenith down
+            rays = unit_vectors(-angle, math.pi / 2 - 2.0 * math.pi * (points[..., 1] + 0.5) / LINES)
+            return (read.camera.project(rays)[0] + 0.5) / read.scale - 0.5
         radius = read.ring.outer - points[..., 1]
         around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         middle = np.array([read.ring.centre_x, read.ring.centre_y])

@@ -9,6 +9,9 @@ from scipy import fft
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
+from omninav.stages.camera.dual_fisheye import DualFisheye
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import angles
 from omninav.stages.features.global_colours import GlobalColours
 from omninav.stages.features.vertical_segments import FindVerticalSegments, ImageSegments, prototypes, segments_of
 from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
@@ -16,10 +19,10 @@ from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import VerticalSegments
 
 
-def found(picture: Image | Panorama, **parameters: object) -> VerticalSegments:
+def found(picture: Image | Panorama, camera: Camera = CAMERA, **parameters: object) -> VerticalSegments:
     stage, context = FindVerticalSegments(**parameters), Context("columns")
     stage.setup(context)
-    columns = stage.step(context, image=picture, camera=CAMERA).vertical_segments
+    columns = stage.step(context, image=picture, camera=camera).vertical_segments
     assert isinstance(columns, VerticalSegments)
     return columns
 
@@ -99,6 +102,23 @@ def test_both_ends_are_given_as_bearings_the_upper_first(kind: str) -> None:
     assert (columns.elevations[:, 0] > columns.elevations[:, 1]).all()
     assert np.arctan2(bearings[:, 0, 1], bearings[:, 0, 0]) == pytest.approx(columns.azimuths)
     assert (np.diff(columns.weights) <= 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        DualFisheye(640, 320, 96.0, 158.0, 161.0, 482.0, 159.0, 156.0, 0.4, -2.0, yaw=0.7),
+    ],
+    ids=lambda camera: camera.projection,
+)
+def test_segments_are_upright_and_their_upper_end_is_above_the_lower_one(camera: Camera) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (camera.height_px, camera.width, 3)).astype(np.uint8)
+    columns = found(Image(cv2.GaussianBlur(noise, (0, 0), 3.0)), camera)
+    assert len(columns) == 200
+    azimuths, elevations = angles(camera.unproject(columns.points)[0])
+    assert np.abs(wrapped(azimuths - columns.azimuths[:, None])).max() < 1e-6
+    assert elevations == pytest.approx(columns.elevations)
+    assert (elevations[:, 0] > elevations[:, 1]).all()
 
 
 def test_neighbours_that_look_alike_become_the_one_in_their_middle() -> None:
