@@ -141,6 +141,15 @@ class Camera(Value, ABC):
         return self.ring is None
 
     @property
+    def looks_up(self) -> bool:
+        """Tells whether the inside of the ring is above its outside, as of a lens that looks up."""
+        if (ring := self.ring) is None:
+            return False
+        radii = np.linspace(ring.inner, ring.outer, SIGHT_PIXELS)
+        rays = self.unproject(np.stack([ring.centre_x + radii, np.full_like(radii, ring.centre_y)], axis=-1))[0]
+        return bool(np.nansum(np.diff(rays[:, 2])) < 0.0)
+
+    @property
     def mount(self) -> Array:
         """The described pose of the camera on the robot (3,): x, y (m), yaw (rad)."""
         return np.array([self.position_x or 0.0, self.position_y or 0.0, self.yaw])

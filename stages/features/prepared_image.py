@@ -46,7 +46,8 @@ class PreparedImage(NamedTuple):
     def upward(self, points: Array) -> Array:
         """The way up at points (N, 2) of this image, degrees clockwise from the right: (N,)."""
         if self.ring is not None:
-            right, down = (points - (self.ring.centre_x, self.ring.centre_y)).T
+            outward = points - (self.ring.centre_x, self.ring.centre_y)
+            right, down = (-outward if self.camera.looks_up else outward).T
         elif self.camera.upright:
             return np.full(len(points), 270.0)
         else:

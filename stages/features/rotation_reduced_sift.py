@@ -27,7 +27,8 @@ class RotationReducedSift(Stage):
     """SIFT keypoints with a known orientation, as a robot on a floor stays upright, and the colours of each patch.
 
     Goedemé et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
-    the radius in a mirror image, up the column in a panorama or strip, else along the vertical as the camera shows it.
+    the radius in a mirror image, inwards in that of a lens that looks up, up the column in a panorama or strip, else
+    along the vertical as the camera shows it.
     Features closer to a mirror's edges than their own diameter are left out. Colours (equation 1, erratum 25 in
     docs/papers.md) are those of a disc around each feature. Raises BadInput for an image without a camera.
     """

@@ -246,7 +246,7 @@ class FindVerticalSegments(Stage):
         )
 
     def _upright(self, read: PreparedImage) -> tuple[Pixels, bool]:
-        """The image with its upright lines as columns, the outer end of a radius at the top."""
+        """The image with its upright lines as columns, the upper end of a radius at the top."""
         if read.camera.upright:
             return read.pixels, read.circle
         length = LINES // 2 if read.ring is None else int(read.ring.outer - read.ring.inner) + 1
@@ -263,7 +263,7 @@ class FindVerticalSegments(Stage):
         if read.ring is None:  # half a circle from the zenith down
             rays = unit_vectors(-angle, math.pi / 2 - 2.0 * math.pi * (points[..., 1] + 0.5) / LINES)
             return (read.camera.project(rays)[0] + 0.5) / read.scale - 0.5
-        radius = read.ring.outer - points[..., 1]
+        radius = read.ring.inner + points[..., 1] if read.camera.looks_up else read.ring.outer - points[..., 1]
         around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         middle = np.array([read.ring.centre_x, read.ring.centre_y])
         back: Array = middle + radius[..., None] * around

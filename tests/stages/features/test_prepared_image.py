@@ -7,6 +7,7 @@ from turned_robot import CAMERA, look
 
 from omninav.stages.camera.dual_fisheye import DualFisheye
 from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.camera.unified import Unified
 from omninav.stages.features.prepared_image import prepared_image
 from omninav.stages.values.image import Image, Panorama
 
@@ -37,6 +38,13 @@ def test_a_small_image_stays_as_it_is() -> None:
     assert read.scale.tolist() == [1.0, 1.0]
     points = np.array([[3.0, 4.5]])
     assert (read.original(points) == points).all()
+
+
+@pytest.mark.parametrize(("looks", "up"), [("down", [0.0, 90.0]), ("up", [180.0, 270.0])])
+def test_up_is_outwards_under_a_mirror_and_inwards_through_a_lens_that_looks_up(looks: str, up: list[float]) -> None:
+    camera = Unified(320, 240, 145.0, 145.0, 160.0, 120.0, 0.9, (-0.1, 0.0, 0.0, 0.0), looks=looks, yaw=0.3)
+    read = prepared_image(Image(np.zeros((240, 320, 3), np.uint8)), camera, 10**6)
+    assert read.upward(np.array([[200.0, 120.0], [160.0, 160.0]])) == pytest.approx(np.array(up))
 
 
 def test_in_two_fisheyes_side_by_side_up_is_where_the_camera_shows_it_and_what_they_do_not_show_is_not_seen() -> None:

@@ -10,7 +10,9 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
 from omninav.stages.camera.dual_fisheye import DualFisheye
+from omninav.stages.camera.fisheye import Fisheye
 from omninav.stages.camera.model import Camera
+from omninav.stages.camera.ocamcalib import OCamCalib
 from omninav.stages.camera.rays import angles
 from omninav.stages.features.global_colours import GlobalColours
 from omninav.stages.features.vertical_segments import FindVerticalSegments, ImageSegments, prototypes, segments_of
@@ -108,6 +110,8 @@ def test_both_ends_are_given_as_bearings_the_upper_first(kind: str) -> None:
     "camera",
     [
         DualFisheye(640, 320, 96.0, 158.0, 161.0, 482.0, 159.0, 156.0, 0.4, -2.0, yaw=0.7),
+        Fisheye(320, 320, 100.0, 159.5, 159.5, 155.0, 20.0),
+        OCamCalib(640, 480, (-140.0, 0.0, 4.0e-3), 239.5, 319.5, 236.0, 34.0, looks="down", yaw=0.3),
     ],
     ids=lambda camera: camera.projection,
 )
