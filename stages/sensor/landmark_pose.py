@@ -16,7 +16,7 @@ from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
-from omninav.stages.geometry.plane.se2 import compose, turned
+from omninav.stages.geometry.plane.se2 import compose, power, turned
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.landmarks import LandmarkFix, Landmarks, restored_descriptors
@@ -149,7 +149,7 @@ class LandmarkPose(Stage):
             return self.Out(fix=replace(best, poses=poses, covariances=covariances))
         moved = np.array([motion.x, motion.y, motion.turn])
         if late:
-            poses = compose(poses, min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS) * moved)
+            poses = compose(poses, power(moved, min(max(late / seconds, -MAX_MOTIONS), MAX_MOTIONS)))
         if not isinstance(motion, AssumedMotion):  # seen motion has the same stamps
             if best.probabilities[0] >= SURE:
                 jitter = state.jitter = jitter.seen(poses[0], covariances[0], moved, seconds)

@@ -43,6 +43,15 @@ def between(start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
     return _poses(cos * dx + sin * dy, -sin * dx + cos * dy, wrap(end[..., 2] - start[..., 2]))
 
 
+def power(motion: npt.ArrayLike, share: float) -> Array:
+    """A share of motions (..., 3) at a constant speed and rate of turn, or a multiple of them; 1 is all of each."""
+    motion = np.asarray(motion, dtype=np.float64)
+    turn = share * motion[..., 2]
+    length = share * np.sinc(turn / math.tau) / np.sinc(motion[..., 2] / math.tau)
+    cos, sin = (length * of((turn - motion[..., 2]) / 2.0) for of in (np.cos, np.sin))
+    return _poses(cos * motion[..., 0] - sin * motion[..., 1], sin * motion[..., 0] + cos * motion[..., 1], wrap(turn))
+
+
 def turned(vectors: Array, angles: Array | float) -> Array:
     """Vectors (..., 3) turned about z, counter-clockwise by angles (...,), rad."""
     cos, sin = np.cos(angles), np.sin(angles)

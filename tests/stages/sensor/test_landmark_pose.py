@@ -240,7 +240,11 @@ def test_the_pose_is_that_of_the_robot_where_the_camera_sits_beside_its_axis() -
 
 def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion() -> None:
     camera = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5, delay=0.1)
-    plain, seen, motion = mapped_room(), seen_from(room(), FIRST), Motion(0.4, 0.0, 0.2)
+
+    def arc(turn: float) -> np.ndarray:
+        return np.array([2.0 * math.sin(turn), 2.0 * (1.0 - math.cos(turn)), turn])
+
+    plain, seen, motion = mapped_room(), seen_from(room(), FIRST), Motion(*arc(0.2))
     map = replace(plain, landmarks=replace(plain.landmarks, described_delay_s=0.1, delay_s=0.35))
     state, ctx = LandmarkPoseState(), Context("landmark_pose")
 
@@ -249,8 +253,8 @@ def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion()
         return LandmarkPose().step(ctx, state, seen, map, camera=camera, motion=motion).fix.poses[0]
 
     assert at(0) == pytest.approx(FIRST, abs=1e-3)  # nothing tells the time of its motion
-    assert at(10**9) == pytest.approx(compose(FIRST, [0.1, 0.0, 0.05]), abs=1e-3)
-    assert at(3 * 10**9) == pytest.approx(compose(FIRST, [0.05, 0.0, 0.025]), abs=1e-3)
+    assert at(10**9) == pytest.approx(compose(FIRST, arc(0.05)), abs=1e-3)
+    assert at(3 * 10**9) == pytest.approx(compose(FIRST, arc(0.025)), abs=1e-3)
     assert at(4 * 10**9, replace(camera, delay=0.35)) == pytest.approx(FIRST, abs=1e-3)
 
 
