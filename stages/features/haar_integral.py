@@ -186,7 +186,7 @@ class HaarIntegral(UnderGreyWorld, Stage):
         ]
         wrap, (rows, columns) = self.borders == "wrap", pixels.shape[:2]
         edges = segment_edges(columns, segments)
-        described = np.empty((segments, len(kernels), binning.length))
+        described, distances = np.empty((segments, len(kernels), binning.length)), np.zeros(segments)
         for k, kernel in enumerate(kernels):
             if kernel.margin >= min(rows, columns):
                 raise BadInput(
@@ -207,5 +207,7 @@ class HaarIntegral(UnderGreyWorld, Stage):
                     column = ctx.rng.integers(first, end, self.samples)
                     part = kernel.means_at(image, row, column), usable[row, column]
                     described[j, k], error = binning.shares(*part)
-                    errors.append(error)
+                    distances[j] = np.hypot(distances[j], error)
+        if self.integration == "monte_carlo":
+            errors.extend(distances / len(self.kernels))
         return (described / len(self.kernels)).reshape(segments, -1).astype(np.float32)

@@ -168,10 +168,13 @@ def test_bins_keep_mass_and_mean(values: list[tuple[float, float, float]], bins:
         assert float(along @ middles) == pytest.approx(float(inside[:, c].mean()), abs=1e-6)
 
 
-def test_the_said_error_of_random_integration_is_the_one_it_has() -> None:
+@pytest.mark.parametrize(
+    "several", [{}, {"kernels": ((3.0, 4.0), (0.0, 8.0))}, {"kernels": ((3.0, 4.0),) * 2, "scales": (1.0, 1.5, 2.0)}]
+)
+def test_the_said_error_of_random_integration_is_the_one_it_has(several: dict[str, object]) -> None:
     pictures, ctx = window(cut(a_scene(), 60, 80)), Context("features", np.random.default_rng(5))
-    full = HaarIntegral().step(ctx, pictures).features.values
-    stage = HaarIntegral(integration="monte_carlo", samples=200)
+    full = HaarIntegral(**several).step(ctx, pictures).features.values
+    stage = HaarIntegral(integration="monte_carlo", samples=200, **several)
     gaps, said = [], []
     for _ in range(300):
         out = stage.step(ctx, pictures)
