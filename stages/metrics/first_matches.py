@@ -12,6 +12,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, PatchDistance, match_patches
 from omninav.stages.geometry.arrays import Array, Bools
+from omninav.stages.geometry.plane.mount import camera_step
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.triangulation import angles_between
 from omninav.stages.values.depths import Depths
@@ -126,7 +127,8 @@ class FirstMatches(MetricStage):
         return self.Out(metrics=Metrics({"matches": found}, SPECS, ("matches.all.right_share",)))
 
     def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> JudgedMatches:
-        x, y, turn = (float(number) for number in between(one.pose, other.pose))
+        moved_robot = between(one.pose, other.pose)
+        x, y, turn = (moved_robot if lens is None else camera_step(moved_robot, lens.arm)).tolist()
         moved, features = (x, y, turn), 0
         kinds: list[tuple[Pairs, Callable[[Pairs], Bools]]] = []
         if self.by != "columns" and one.patches is not None and other.patches is not None:

@@ -97,6 +97,15 @@ def test_a_patch_is_right_up_to_two_degrees_from_where_its_partner_is_seen(degre
     assert found["all"]["by_chance"] == 0.0
 
 
+def test_the_camera_and_not_the_robots_middle_moves_from_one_view_to_the_other() -> None:
+    lens = dataclasses.replace(LENS, position_x=5.0)
+    one, other = sides(0.0), sides(1.0, 2, -90.0)
+    robot = [Pose(-5.0, 0.0, 0.0), Pose(1.0, -5.0, np.pi / 2)]
+    stage, seen = FirstMatches(), ([one[0], other[0]], (), [one[1], other[1]])
+    assert figures(stage, robot, *seen, [lens])["matches"]["all"]["right_share"] == 1.0
+    assert figures(stage, robot, *seen, [LENS])["matches"]["all"]["right_share"] == 0.0
+
+
 @pytest.mark.parametrize(("degrees", "share"), [(1.35, 1.0), (1.5, 0.0)])
 def test_without_depths_it_is_right_where_both_are_a_degree_from_one_plane(degrees: float, share: float) -> None:
     found = beside(degrees, axis=0, known=(False, False))
