@@ -19,6 +19,8 @@ MAX_COEFFICIENT = 100.0
 Coefficient = Annotated[float, Bounds(ge=-MAX_COEFFICIENT, le=MAX_COEFFICIENT)]
 NOTHING = 1e-12
 """Largest last coefficient of a polynomial that counts as none."""
+AZIMUTHS = 16
+"""Directions from the principal point in which it is found how far a model goes."""
 REAL = 1e-9
 """Largest imaginary part of a root that counts as real."""
 
@@ -54,7 +56,9 @@ class CalibratedLens(IntrinsicMatrix):
             x, y = self.centre_x, self.centre_y
             room = min(x, self.width - 1 - x, y, self.height_px - 1 - y, MAX_SIDE)
             radii = np.arange(1.0, max(2.0, room + 1.0))
-            known = self.unproject(np.stack([x + radii, np.full_like(radii, y)], axis=-1))[1]
+            around = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)[:, None]
+            rim = np.stack([x + radii * np.cos(around), y + radii * np.sin(around)], axis=-1)
+            known = self.unproject(rim)[1].all(axis=0)
             object.__setattr__(self, "outer_radius_px", float(radii[known].max(initial=1.0)))
         super().__post_init__()
 

@@ -72,6 +72,15 @@ def test_what_lies_beyond_the_model_is_not_shown_and_the_mask_ends_there(camera)
     assert not camera.unproject(np.array([camera.centre_x + camera.outer_radius_px + 15.0, camera.centre_y]))[1]
 
 
+def test_the_default_mask_ends_where_the_model_does_in_any_direction() -> None:
+    camera = KannalaBrandt(900, 900, 200.0, 170.0, 449.5, 449.5, (-0.08, 0.0, 0.0, 0.0))  # grows up to 2.04 rad alone
+    around = np.linspace(-np.pi, np.pi, 360)[:, None]
+    rim = 449.5 + camera.outer_radius_px * np.concatenate([np.cos(around), np.sin(around)], axis=1)
+    assert camera.unproject(rim)[1].all()
+    beyond = np.array([449.5, 449.5 + camera.outer_radius_px + 1.0])
+    assert not camera.unproject(beyond)[1]
+
+
 def test_a_ray_beyond_a_fold_of_tangential_distortion_is_not_shown() -> None:
     camera = Unified(640, 480, 300.0, 300.0, 320.0, 240.0, 0.8, (0.0, 0.0, 0.0, 0.1), outer_radius_px=235.0)
     azimuths, elevations = np.meshgrid(np.linspace(-np.pi, np.pi, 90), np.linspace(-1.0, 1.57, 120))
