@@ -11,8 +11,8 @@ Rows = TypeVar("Rows", Bytes, Floats)
 SIFT_SHAPE = (4, 4, 8)
 """Cells of a SIFT descriptor across and along its orientation, and directions of gradients in each."""
 FLIPPED = np.roll(np.arange(128).reshape(SIFT_SHAPE)[::-1, :, ::-1], 1, axis=2).ravel()
-"""Where each number of a SIFT descriptor is in that of the mirrored patch: cells on the other side of the orientation,
-and directions turned the other way."""
+"""Places of a SIFT descriptor's numbers in that of the mirrored patch: cells are on the other side of the orientation,
+and directions turn the other way."""
 
 
 def mirrored_sift(descriptors: Rows) -> Rows:
