@@ -51,6 +51,13 @@ SPHERES: list[Camera] = [
 each_camera = pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.projection)
 
 
+@each_camera
+def test_only_what_looks_down_into_a_mirror_or_counts_the_other_way_shows_the_world_mirrored(camera: Camera) -> None:
+    fields = vars(camera)
+    reflected = isinstance(camera, HyperbolicMirror | Donut) or fields.get("looks") == "down"
+    assert camera.mirrored == (reflected != (fields.get("sense") == "counter_clockwise"))
+
+
 @pytest.mark.parametrize("camera", CAMERAS + SPHERES, ids=lambda camera: camera.projection)
 @given(azimuth=st.floats(-math.pi, math.pi), elevation=st.floats(-1.55, 1.55))
 def test_a_ray_comes_back_from_its_pixel(camera: Camera, azimuth: float, elevation: float) -> None:

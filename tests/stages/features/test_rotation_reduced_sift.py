@@ -15,6 +15,7 @@ from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.model import Camera
 from omninav.stages.features.affine_sift import AffineSift
 from omninav.stages.features.rotation_reduced_sift import EDGE_RATIO, RotationReducedSift
+from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.unwarp.table import remap_table
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
@@ -81,6 +82,17 @@ def test_two_fisheyes_side_by_side_see_the_same_patches_from_a_turned_robot(orie
     one, other = view(0.0), view(0.8)
     assert camera.shows(one.points).all()
     assert (turned_off(one, other, 0.8)[2] < math.radians(0.5)).sum() > right
+
+
+@pytest.mark.parametrize("orientation", ["own", "reduced"])
+def test_patches_of_a_mirror_are_a_panoramas_once_they_are_mirrored(orientation: str) -> None:
+    kinds = ("mirror", "panorama")
+    under, panorama = (found(look(kind, 0.4), orientation=orientation, contrast=0.01, blur_px=1.0) for kind in kinds)
+    assert (under.mirrored, panorama.mirrored) == (True, False)
+    back = dataclasses.replace(under, descriptors=mirrored_sift(under.descriptors))
+    right, wrong = ((turned_off(each, panorama, 0.0)[2] < math.radians(1.0)).sum() for each in (back, under))
+    assert right > 60
+    assert right > 2 * wrong  # some patches are symmetric
 
 
 def test_the_radius_stands_in_for_the_orientation_that_is_not_measured() -> None:

@@ -32,6 +32,12 @@ def test_maps_are_put_where_their_common_landmarks_are_in_whatever_order_they_co
     assert np.abs(wrap(away[:, 2])).max() < np.radians(0.1)
 
 
+def test_a_mirrors_map_is_aligned_with_a_panoramas() -> None:
+    map = mapped_room()
+    reflected = replace(map, landmarks=map.landmarks.as_mirrored(True))
+    assert aligned_by_landmarks([map, reflected], np.random.default_rng(0)).closures == len(map.landmarks)
+
+
 def test_all_landmarks_of_a_map_agree_with_itself() -> None:
     found = aligned_by_landmarks([mapped_room()] * 3, np.random.default_rng(0))
     assert found.closures == 2 * len(mapped_room().landmarks)

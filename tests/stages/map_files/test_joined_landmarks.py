@@ -61,6 +61,16 @@ def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
     assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
 
 
+def test_maps_of_a_mirror_and_of_a_panorama_are_one_map() -> None:
+    one, other = mapped_room(), other_room()
+    reflected = replace(other, landmarks=other.landmarks.as_mirrored(True))
+    assert (reflected.landmarks.descriptors != other.landmarks.descriptors).any()
+    both, plain = joined_references([one, reflected], "truth"), joined_references([one, other], "truth")
+    assert (both.landmarks.mirrored, reflected.landmarks.mirrored) == (False, True)
+    assert (both.landmarks.descriptors == plain.landmarks.descriptors).all()
+    assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
+
+
 def test_parts_of_one_map_keep_their_words() -> None:
     map = mapped_room()
     left = map.poses[:, 0] < 5.0

@@ -11,6 +11,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.se2 import compose, wrap
@@ -84,6 +85,16 @@ def test_a_mirrored_image_and_one_of_another_room_have_no_pose() -> None:
     assert fix(replace(features, bearings=features.bearings * [1.0, -1.0, 1.0])) is None
     looks = np.random.default_rng(1).integers(0, 100, features.descriptors.shape).astype(np.uint8)
     assert fix(replace(features, descriptors=looks)) is None
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_landmarks_of_a_mirror_are_found_in_a_panorama_and_the_other_way_round(mirrored: bool) -> None:
+    features, map = seen_from(room(), FIRST), mapped_room()
+    seen = replace(features, descriptors=mirrored_sift(features.descriptors), mirrored=mirrored)
+    known = replace(map, landmarks=replace(map.landmarks, mirrored=not mirrored))
+    assert fix(seen, known).poses[0].tolist() == fix(features, map).poses[0].tolist()
+    for unsaid in (mirrored, None):  # older maps do not say which they are of
+        assert fix(seen, replace(map, landmarks=replace(map.landmarks, mirrored=unsaid))) is None
 
 
 def test_two_places_that_look_the_same_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
