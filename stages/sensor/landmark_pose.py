@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
+from omninav.stages.camera.self_calibration import AXIS, corrected
 from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
-from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Bytes, Ints
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose, matched, poses_of
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
 from omninav.stages.geometry.plane.point_cells import distinct
@@ -26,6 +27,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import AssumedMotion, Motion
 from omninav.stages.values.visual_words import VisualWords
 
+from .axis_beside import AxisBeside
 from .landmarks_shown import LandmarksShown, landmarks_to_expect
 from .stamp_jitter import StampJitter
 
@@ -51,6 +53,8 @@ SURE = 0.95
 SAID_JITTER_S, SAID_PROBABILITY = 0.025, 0.95
 """Standard deviation of stamps (s) and its probability from which on the run reports it: in sound drives up to 0.018 is
 found, since odometry is interpolated, or 0.028 with a probability of 0.8 for some images."""
+MIN_IMAGES = 25.0
+"""Images from which on the run reports that the axis is beside its description: the first show it too near."""
 MAX_MOTIONS = 5.0
 """Largest delay of images, in intervals between two: the motion over a shorter interval is mostly noise."""
 WITHOUT_LANDMARKS = (
@@ -68,6 +72,8 @@ class LandmarkPoseState(State):
     shown: LandmarksShown = field(default_factory=LandmarksShown)
     jitter: StampJitter = field(default_factory=StampJitter.unknown)
     told: bool = False
+    axis: AxisBeside = field(default_factory=AxisBeside)
+    told_axis: bool = False
 
 
 class LandmarkPose(Stage):
@@ -109,6 +115,7 @@ class LandmarkPose(Stage):
         seconds, state.stamp = (ctx.tick.stamp - state.stamp) / 1e9, ctx.tick.stamp
         if ctx.tick.first_of_log:
             state.jitter, state.told, state.shown = StampJitter.unknown(), False, LandmarksShown()
+            state.axis, state.told_axis = AxisBeside(), False
         jitter, state.jitter = state.jitter, state.jitter.interrupted()
         landmarks = map.landmarks
         if landmarks is None:
@@ -129,12 +136,17 @@ class LandmarkPose(Stage):
         if landmarks.mirrored not in (None, features.mirrored):
             looks = mirrored_sift(looks)
         descriptors = root_descriptors(looks)
+        bearings = state.axis.bearings(camera, features.points, features.bearings)
         best: LandmarkFix | None = None
+        seen, points = np.empty(0, np.int64), np.empty((0, 3))
         for candidates in self._candidates(looks, landmarks.words, map, near):
             rows = landmarks.seen_by(candidates)
-            fix = self._fix(descriptors, features.bearings, landmarks, rows, state.shown, expected)
+            known = landmarks.points[rows].astype(np.float64)
+            pairs = matched(descriptors, restored_descriptors(landmarks.descriptors[rows]), known)
+            known = known[pairs.second]
+            fix = self._fix(bearings[pairs.first], known, landmarks, state.shown, expected)
             if fix is not None and (best is None or fix.probabilities[0] > best.probabilities[0]):
-                best = fix
+                best, seen, points = fix, pairs.first, known
             if best is not None and best.probabilities[0] > 0.5:
                 break
         if best is None:
@@ -142,6 +154,13 @@ class LandmarkPose(Stage):
         state.shown = state.shown.seen(best.inliers[:1], expected(best.poses[:1]), float(best.probabilities[0]))
         if camera is None:
             return self.Out(fix=best)
+        if best.probabilities[0] >= SURE:
+            at, agreed = seen[best.agree == 0], best.agree == 0
+            variance = landmarks.variance_factor * landmarks.sigma_rad**2
+            state.axis = state.axis.seen(
+                camera, features.points[at], features.bearings[at], points[agreed], best.poses[0], variance
+            )
+            self._say_axis(ctx, state, camera)
         late = landmarks.late_by(camera.delay)
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
@@ -161,6 +180,18 @@ class LandmarkPose(Stage):
                 covariances = covariances + motions * along[:, :, None] * along[:, None, :]
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
+    def _say_axis(self, ctx: Context, state: LandmarkPoseState, camera: Camera) -> None:
+        beside = state.axis.distance()
+        if state.told_axis or not beside.any() or state.axis.images < MIN_IMAGES:
+            return
+        state.told_axis = True
+        moved = corrected(camera, AXIS, beside)
+        at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
+        ctx.warn(
+            f"the camera's axis is {math.hypot(*beside):.1f} px beside where camera.yaml has it, at {at}, as the map's "
+            "landmarks show: their poses allow for it, colours do not; put it into camera.yaml"
+        )
+
     def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
         if sigma < SAID_JITTER_S or state.told or state.jitter.probability() < SAID_PROBABILITY:
             return
@@ -172,18 +203,12 @@ class LandmarkPose(Stage):
 
     def _fix(
         self,
-        descriptors: Floats,
         bearings: Array,
+        points: Array,
         landmarks: Landmarks,
-        rows: Ints,
         shown: LandmarksShown,
         expected: Callable[[Array], Array],
     ) -> LandmarkFix | None:
-        theirs = restored_descriptors(landmarks.descriptors[rows])
-        points = landmarks.points[rows].astype(np.float64)
-        pairs = matched(descriptors, theirs, points)
-        bearings = np.ascontiguousarray(bearings[pairs.first])
-        points = points[pairs.second]
         found = poses_of(bearings, points, landmarks.sigma_rad, self.min_inliers)
         if not found:
             return None
