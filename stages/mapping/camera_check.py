@@ -82,11 +82,12 @@ class CameraCheck(NamedTuple):
         return with_tilt(adjustable(self.camera, self.pixels[features], self.fields))
 
     def levelled(self, views: LocalViews, corrections: Array) -> LocalViews:
-        """The views of the camera as it is described, but for its tilt."""
+        """The views of the camera with its axis where it is, and level; its yaw is as it is described."""
         if self.camera is None or not len(corrections):
             return views
-        by, yaw = self._named(corrections), self.yaw_beside(corrections)
-        return views.looking_along(turned(leaning(turned(views.bearings, yaw), by["roll"], by["pitch"]), -yaw))
+        by, yaw, moved = self._named(corrections), self.yaw_beside(corrections), self._moved(corrections)
+        bearings = views.bearings if moved is self.camera else self._seen_by(moved)
+        return views.looking_along(turned(leaning(turned(bearings, yaw), by["roll"], by["pitch"]), -yaw))
 
     def yaw_beside(self, corrections: Array) -> float:
         """Angle (rad) by which the camera is turned against its description, 0 where it is small."""
@@ -125,13 +126,11 @@ class CameraCheck(NamedTuple):
         if self.camera is not None and len(corrections):
             by = self._named(corrections)
             _say_tilt(ctx, math.degrees(by["roll"]), math.degrees(by["pitch"]))
-            moved = corrected(right, AXIS, np.array([by[name] for name in AXIS])) if AXIS.keys() <= by.keys() else right
-            if self._turned(moved) > MAX_AXIS:
-                right = moved
+            right = self._moved(corrections)
+            if right is not self.camera:
                 beside = math.hypot(by["centre_x"], by["centre_y"])
-                at = ", ".join(f"{getattr(moved, name):.1f}" for name in AXIS)
+                at = ", ".join(f"{getattr(right, name):.1f}" for name in AXIS)
                 parts.append(f"its axis is off by {beside:.1f} px, at {at}")
-        harm = "The map is less exact by it" if parts else "Landmarks allow for it, colours are compared less exactly"
         if mount[2]:
             right = replace(right, yaw=right.yaw + float(mount[2]))
             parts.append(f"it is turned by {math.degrees(mount[2]):.1f} degrees more, yaw {right.yaw:.3f}")
@@ -144,7 +143,7 @@ class CameraCheck(NamedTuple):
             parts.append(f"its images are stamped {abs(late_s):.2f} s too {'late' if late_s > 0.0 else 'early'}")
         if not parts:
             return ""
-        return _told(ctx, "; ".join(parts), harm, right)
+        return _told(ctx, "; ".join(parts), "Landmarks allow for it, colours are compared less exactly", right)
 
     def elevations_told(
         self, ctx: Context, camera: Camera | None, views: LocalViews, matches: PairMatches, poses: Array
@@ -165,10 +164,20 @@ class CameraCheck(NamedTuple):
     def _named(self, corrections: Array) -> dict[str, float]:
         return dict(zip((*self.fields, *TILT), corrections.tolist(), strict=True))
 
-    def _turned(self, other: Camera) -> float:
-        rays, looks = other.unproject(self.pixels)
-        cos = np.einsum("ij,ij->i", rays[looks], self.bearings[looks])
-        return float(np.median(np.arccos(np.clip(cos, -1.0, 1.0)))) if looks.any() else 0.0
+    def _moved(self, corrections: Array) -> Camera:
+        """The camera with its axis where the images show it, or as it is described where that moves bearings little."""
+        assert self.camera is not None
+        by = self._named(corrections)
+        if not AXIS.keys() <= by.keys():
+            return self.camera
+        moved = corrected(self.camera, AXIS, np.array([by[name] for name in AXIS]))
+        cos = np.einsum("ij,ij->i", self._seen_by(moved), self.bearings)
+        return moved if np.median(np.arccos(np.clip(cos, -1.0, 1.0))) > MAX_AXIS else self.camera
+
+    def _seen_by(self, camera: Camera) -> Array:
+        """Bearings (F, 3) of the features by another camera, as they were where it shows nothing."""
+        rays, looks = camera.unproject(self.pixels)
+        return np.where(looks[:, None], rays, self.bearings)
 
 
 def _say_tilt(ctx: Context, roll: float, pitch: float) -> None:

@@ -54,6 +54,9 @@ def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):
     assert (right.yaw, right.height) == (0.3, 0.9)
     assert "its axis is off by 3.0 px, at 319.5, 239.5" in ctx.warnings[0]
     assert check.metrics(found, np.zeros(3), 0.0)["camera"]["axis_beside_px"] == pytest.approx(2.98, abs=0.05)
+    views = LocalViews(np.array([0, len(pixels)]), check.bearings, np.empty((0, 128), np.uint8))
+    away, before = (np.abs(each.bearings - TRUE.unproject(pixels)[0]) for each in (check.levelled(views, found), views))
+    assert np.nanmax(away) < 0.1 * np.nanmax(before)
 
 
 def test_a_camera_that_is_turned_is_said(seen):

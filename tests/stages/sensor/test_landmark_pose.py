@@ -10,6 +10,7 @@ from made_words import NOTHING, features_of
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
@@ -247,6 +248,23 @@ def test_the_pose_is_that_of_the_robot_where_the_camera_sits_beside_its_axis() -
     # A camera that is described otherwise than the tour's sits where its own description says.
     other = of(replace(described, position_x=0.3), described=described.mount, mount=mount)
     assert other.poses[0] == pytest.approx(robot_poses(at.poses[0], np.array([0.3, 0.0, 0.0])))
+
+
+def test_the_pose_is_right_although_the_cameras_axis_is_beside_its_description_and_that_is_told_once() -> None:
+    real = HyperbolicMirror(1280, 960, 994.0, 994.0, 639.5, 479.5, 28.095, 23.4125, 68.0, 476.0)
+    described = replace(real, centre_x=645.5, centre_y=474.5)
+    state, ctx, away = LandmarkPoseState(), Context("landmark_pose"), []
+    for turn in np.linspace(0.0, 6.0, 40):
+        pose = FIRST + [0.3 * math.sin(turn), 0.3 * math.cos(turn), turn]
+        features = seen_from(room(), pose)
+        pixels, shown = real.project(features.bearings)
+        features = replace(features, points=pixels, bearings=described.unproject(pixels)[0]).chosen(shown)
+        poses = LandmarkPose().step(ctx, state, features, mapped_room(), camera=described).fix.poses
+        away.append(math.hypot(*(poses[0] - pose)[:2]))
+    assert max(away[-20:]) < 0.1 * away[0]
+    assert state.axis.distance() == pytest.approx([-6.0, 5.0], abs=0.1)
+    assert [each for each in ctx.warnings if "axis" in each] == [ctx.warnings[0]]
+    assert "7.8 px beside where camera.yaml has it, at 639.5, 479.5" in ctx.warnings[0]
 
 
 def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion() -> None:
