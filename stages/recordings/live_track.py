@@ -9,7 +9,7 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose, interpolate
 
-from .plausibility import EXCURSION_S, MotionLimits, possible_between, seconds_within
+from .plausibility import EXCURSION_S, SILENCE_S, MotionLimits, possible_between, seconds_within, silent
 
 KEPT_S = 30.0
 """Longest time back for which a pose can be asked."""
@@ -136,8 +136,19 @@ class LiveTrack:
 
     def _append(self, new: _Pose) -> None:
         self._known.append(_Pose(new.stamp, self._join(new.pose), None))
+        self._note_silence()
         while new.stamp - self._known[0].stamp > KEPT_S * 1e9 and len(self._known) > 2:
             self._known.popleft()
+
+    def _note_silence(self) -> None:
+        """Let the time before the newest pose be a gap where odometry was silent."""
+        if self._jumps or len(self._known) < 2 or self._known[-1].stamp - self._known[-2].stamp <= SILENCE_S * 1e9:
+            return
+        gap = self._known[-2].stamp, self._known[-1].stamp
+        stamps, poses = np.array([k.stamp for k in self._known]), np.stack([k.pose for k in self._known])
+        if gap not in self._gaps[-1:] and silent(stamps, poses)[-1]:
+            self._gaps.append(gap)
+            self._drop("odometry_silence", f"of {gap[1] / 1e9:.3f} s comes {(gap[1] - gap[0]) / 1e9:.1f} s late")
 
     def _drop_doubted(self) -> None:
         for one in self._doubted:

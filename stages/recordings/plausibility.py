@@ -19,6 +19,10 @@ EXCURSION_S = 1.0
 """Longest excursion that is bridged, seconds; a track that stays away longer has started again."""
 LOOK_BACK = 16
 """Stretches to which a track may be back."""
+SILENCE_S, SILENT_INTERVALS = 1.0, 10.0
+"""A track is silent between poses that are further apart than this (s), and than so many of its usual intervals."""
+STOOD = 0.1
+"""A robot that has moved by less over a silence (m, rad) stood: some drivers send odometry only while it moves."""
 MIN_STRETCH = 1.5
 """Poses that a stretch needs to be one: a pose alone tells of no motion."""
 
@@ -109,6 +113,15 @@ def without_jumps(stamps: Stamps, poses: Array, jumps: Ints) -> Array:
     shares = (stamps[jumps] - stamps[jumps - 1]) / (stamps[jumps - 1] - stamps[jumps - 2])
     steps[jumps - 1] = steps[jumps - 2] * np.minimum(shares, 1.0)[:, None]
     return np.concatenate([poses[:1], compose(poses[0], chain(steps))])
+
+
+def silent(stamps: Stamps, poses: Array) -> Bools:
+    """Tells between which poses (N, 3) and the next ones a track says nothing of a robot that moved: (N - 1,)."""
+    intervals = np.diff(stamps) / 1e9
+    longest = max(SILENCE_S, SILENT_INTERVALS * float(np.median(intervals))) if len(intervals) else SILENCE_S
+    moved = np.abs(between(poses[:-1], poses[1:])).max(axis=1)
+    nothing: Bools = (moved > STOOD) & (intervals > longest)
+    return nothing
 
 
 def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:

@@ -10,7 +10,7 @@ from omninav.pipeline.mcap.message import Record
 from omninav.stages.geometry.arrays import Array, Ints
 
 from .messages import TRANSFORMS_TYPES, pose_of
-from .plausibility import MotionLimits, believed, without_jumps
+from .plausibility import MotionLimits, believed, silent, without_jumps
 from .recording import UnreadableRecording
 from .stamps import Stamps
 from .topic_recording import Feed, in_order, require_stamps
@@ -74,7 +74,18 @@ class PoseTopic:
         if not jumps:
             self._drop(feed, name, "odometry_jump", stamps, poses, begun, limits)
             poses = without_jumps(stamps, poses, begun)
+            gaps = self._with_silences(feed, name, stamps, poses, gaps)
         return PoseTrack(stamps, poses, gaps)
+
+    def _with_silences(self, feed: Feed, name: str, stamps: Stamps, poses: Array, gaps: Stamps) -> Stamps:
+        """Gaps (G, 2) and the track's silences, which are counted, in their order."""
+        rows = np.flatnonzero(silent(stamps, poses))
+        rows = rows[~np.isin(stamps[rows], gaps[:, 0])]
+        silences = np.column_stack([stamps[rows], stamps[rows + 1]])
+        for begun, ended in silences:
+            where = f"{name}: {self.topic} is silent for {(ended - begun) / 1e9:.1f} s from {begun / 1e9:.3f} s on"
+            feed.drop("odometry_silence", f"{where}; the motion in it is uncertain")
+        return np.sort(np.concatenate([gaps, silences]), axis=0)
 
     def _drop(
         self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Ints, limits: MotionLimits

@@ -66,6 +66,15 @@ def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_
     assert track.unmeasured_s(9 * S) == pytest.approx(3.0)
 
 
+def test_a_silence_is_a_gap_once_whether_the_track_goes_on_or_was_reset():
+    for pause, shift in ((8.0, 0.0), (8.0, -1000.0), (20.0, 0.0)):
+        track = LiveTrack(MotionLimits(), jumps=False)
+        straight(track, np.arange(0.0, 5.05, 0.1))
+        straight(track, np.arange(5.0 + pause, 8.05 + pause, 0.1), x0=shift)
+        assert track.unmeasured_s(round((7 + pause) * S)) == pytest.approx(pause)
+        assert track.dropped == ({} if shift else {"odometry_silence": 1})
+
+
 def test_an_excursion_is_dropped_where_the_track_goes_on_as_before():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.arange(0.0, 2.0, 0.1))

@@ -122,6 +122,27 @@ def test_the_motion_across_a_gap_is_less_certain(tmp_path: Path) -> None:
     assert model.model(motions[8]).sigmas[0] ** 2 == pytest.approx(plain.sigmas[0] ** 2 + 0.05**2 / 2)
 
 
+@pytest.mark.parametrize("stands", [False, True])
+def test_motion_in_a_silence_of_odometry_is_less_certain_unless_the_robot_stood(stands: bool, tmp_path: Path) -> None:
+    quiet = range(60, 101)
+
+    def change(made: Made) -> list[Made]:
+        step = step_of(made)
+        if made.topic != ODOMETRY:
+            return [made]
+        still = posed(made, pose_at(60 * 0.05)) if stands and step >= 60 else made
+        return [] if step in quiet[1:-1] else [still]
+
+    path = write_mcap(tmp_path / "log.mcap", messages(change))
+    ctx = Context("source")
+    motions = [out.motion for out in ticks(LogSource(log=str(path)), ctx)]
+    bridged = [number for number, motion in enumerate(motions) if isinstance(motion, BridgedMotion)]
+    assert bridged == ([] if stands else [6, 7, 8, 9, 10])
+    assert ctx.counts == ({} if stands else {"odometry_silence": 1})
+    if not stands:
+        assert "/odom is silent for 2.0 s from 1700000003.000 s on" in ctx.details["odometry_silence"]
+
+
 def test_a_faster_robot_is_believed_where_its_limits_say_so(tmp_path: Path) -> None:
     fast = away(range(201), lambda step, *_: (step * 0.05 * 20.0, 0.0, 0.0))
     path = str(log_with(tmp_path / "log.mcap", fast))
