@@ -9,7 +9,16 @@ import numpy as np
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.plane.se2 import between, compose, interpolate
 
-from .plausibility import EXCURSION_S, SILENCE_S, MotionLimits, possible_between, seconds_within, silent
+from .plausibility import (
+    EXCURSION_S,
+    SILENCE_S,
+    SILENT_INTERVALS,
+    MotionLimits,
+    possible_between,
+    seconds_within,
+    silent,
+)
+from .stamps import TRUTH_MAX_GAP_S, longest_step_s
 
 KEPT_S = 30.0
 """Longest time back for which a pose can be asked."""
@@ -68,7 +77,8 @@ class LiveTrack:
         return self._believe_doubted()
 
     def at(self, stamp: int) -> Array | None:
-        """The pose (3,) at a stamp, interpolated; None where none is known on either side of it."""
+        """The pose (3,) at a stamp, interpolated; None where none is known on either side of it, or the truth between
+        them is silent or jumps."""
         after = next((k for k in range(len(self._known) - 1, -1, -1) if self._known[k].stamp <= stamp), None)
         if after is None:
             return None
@@ -78,9 +88,23 @@ class LiveTrack:
         if after + 1 == len(self._known):
             return None
         other = self._known[after + 1]
+        if self._jumps and not self._joined(one, other):
+            return None
         times = np.array([0, other.stamp - one.stamp]) / 1e9
         pose: Array = interpolate(times, np.stack([one.pose, other.pose]), np.array([stamp - one.stamp]) / 1e9)[0]
         return pose
+
+    def _joined(self, one: _Pose, other: _Pose) -> bool:
+        """Tells whether true poses between two known ones may be interpolated."""
+        possible = possible_between(one.pose, other.pose, (other.stamp - one.stamp) / 1e9, self._limits)
+        return possible and not self._silent(one, other, 2.0 * TRUTH_MAX_GAP_S, 2.0)
+
+    def _silent(self, one: _Pose, other: _Pose, seconds: float, intervals: float) -> bool:
+        """Tells whether a robot moved unseen between two poses, more than so many seconds and usual intervals apart."""
+        if other.stamp - one.stamp <= seconds * 1e9:
+            return False
+        longest = longest_step_s(np.array([known.stamp for known in self._known]), seconds, intervals)
+        return bool(silent(np.array([one.stamp, other.stamp]), np.stack([one.pose, other.pose]), longest)[0])
 
     def reported(self, pose: Array) -> Array:
         """A pose of the track in the frame of the newest messages that are believed: undoes what was joined."""
@@ -142,11 +166,11 @@ class LiveTrack:
 
     def _note_silence(self) -> None:
         """Let the time before the newest pose be a gap where odometry was silent."""
-        if self._jumps or len(self._known) < 2 or self._known[-1].stamp - self._known[-2].stamp <= SILENCE_S * 1e9:
+        if self._jumps or len(self._known) < 2:
             return
-        gap = self._known[-2].stamp, self._known[-1].stamp
-        stamps, poses = np.array([k.stamp for k in self._known]), np.stack([k.pose for k in self._known])
-        if gap not in self._gaps[-1:] and silent(stamps, poses)[-1]:
+        one, other = self._known[-2], self._known[-1]
+        gap = one.stamp, other.stamp
+        if gap not in self._gaps[-1:] and self._silent(one, other, SILENCE_S, SILENT_INTERVALS):
             self._gaps.append(gap)
             self._drop("odometry_silence", f"of {gap[1] / 1e9:.3f} s comes {(gap[1] - gap[0]) / 1e9:.1f} s late")
 

@@ -10,6 +10,7 @@ from omninav.stages.camera.model import Ring
 from .description import known_layouts
 from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
+from .stamps import TRUTH_MAX_GAP_S
 
 SHOWN_FILES = 3
 """Largest number of a folder's files that are named."""
@@ -27,15 +28,19 @@ def open_recording(
     layout_folders: Sequence[str] = (),
     limits: MotionLimits | None = None,
     rate: float | None = None,
+    truth_max_gap_s: float = TRUTH_MAX_GAP_S,
 ) -> Recording:
     """Open what `log` names: a file, a folder, or a layout and a folder (see each format's `open`).
 
     `camera`: a camera.yaml that replaces the recording's own, or a projection (equirectangular, …) of which the size of
     an image is enough; `layout_folders`: where else descriptions of folders of images are; `limits`: what the robot
-    can do; `rate`: images per second of a folder of images without times. Raises
-    `UnreadableRecording` (or another `BadInput`) with one line: file, what is wrong, what to type.
+    can do; `rate`: images per second of a folder of images without times; `truth_max_gap_s`: the largest time between
+    an image and a pose on the topic of true poses. Raises `UnreadableRecording` (or another `BadInput`) with one line:
+    file, what is wrong, what to type.
     """
-    options = OpenOptions(topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate)
+    options = OpenOptions(
+        topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate, truth_max_gap_s
+    )
     if log.startswith("camera:"):
         raise UnreadableRecording(
             f"log={log:.60}: a camera that is plugged in runs live: omninav live log={log:.60}; or is recorded first: "

@@ -20,9 +20,10 @@ EXCURSION_S = 1.0
 LOOK_BACK = 16
 """Stretches to which a track may be back."""
 SILENCE_S, SILENT_INTERVALS = 1.0, 10.0
-"""A track is silent between poses that are further apart than this (s), and than so many of its usual intervals."""
-STOOD = 0.1
-"""A robot that has moved by less over a silence (m, rad) stood: some drivers send odometry only while it moves."""
+"""Odometry is silent between poses further apart than this (s), and than so many of its usual intervals."""
+STOOD = 0.3
+"""Motion over a silence (m, rad) below which it hides nothing: some drivers and localisers speak only while robots
+move, AMCL by default every 0.25 m and 0.2 rad."""
 MIN_STRETCH = 1.5
 """Poses that a stretch needs to be one: a pose alone tells of no motion."""
 
@@ -115,12 +116,10 @@ def without_jumps(stamps: Stamps, poses: Array, jumps: Ints) -> Array:
     return np.concatenate([poses[:1], compose(poses[0], chain(steps))])
 
 
-def silent(stamps: Stamps, poses: Array) -> Bools:
-    """Tells between which poses (N, 3) and the next ones a track says nothing of a robot that moved: (N - 1,)."""
-    intervals = np.diff(stamps) / 1e9
-    longest = max(SILENCE_S, SILENT_INTERVALS * float(np.median(intervals))) if len(intervals) else SILENCE_S
+def silent(stamps: Stamps, poses: Array, longest_s: float) -> Bools:
+    """Tells between which poses (N, 3) and the next ones, later than `longest_s`, a robot moved unseen: (N - 1,)."""
     moved = np.abs(between(poses[:-1], poses[1:])).max(axis=1)
-    nothing: Bools = (moved > STOOD) & (intervals > longest)
+    nothing: Bools = (moved > STOOD) & (np.diff(stamps) > longest_s * 1e9)
     return nothing
 
 

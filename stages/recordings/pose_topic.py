@@ -10,9 +10,9 @@ from omninav.pipeline.mcap.message import Record
 from omninav.stages.geometry.arrays import Array, Ints
 
 from .messages import TRANSFORMS_TYPES, pose_of
-from .plausibility import MotionLimits, believed, silent, without_jumps
+from .plausibility import SILENCE_S, SILENT_INTERVALS, MotionLimits, believed, silent, without_jumps
 from .recording import UnreadableRecording
-from .stamps import Stamps
+from .stamps import Stamps, longest_step_s
 from .topic_recording import Feed, in_order, require_stamps
 
 MAX_STAMP = 2**63 - 1
@@ -23,7 +23,8 @@ MAX_FRAMES = 20
 
 
 class PoseTrack(NamedTuple):
-    """Poses (N, 3) at ascending stamps (N,) in ns; `gaps` (G, 2): stamps between which no measurement is believed."""
+    """Poses (N, 3) at ascending stamps (N,) in ns; `gaps` (G, 2): stamps between which no measurement is believed, or
+    those about each jump of a track that may jump."""
 
     stamps: Stamps
     poses: Array
@@ -71,7 +72,9 @@ class PoseTopic:
         if not len(rows):
             return None
         stamps, poses = stamps[rows], poses[rows]
-        if not jumps:
+        if jumps:
+            gaps = np.column_stack([stamps[begun - 1], stamps[begun]])
+        else:
             self._drop(feed, name, "odometry_jump", stamps, poses, begun, limits)
             poses = without_jumps(stamps, poses, begun)
             gaps = self._with_silences(feed, name, stamps, poses, gaps)
@@ -79,7 +82,7 @@ class PoseTopic:
 
     def _with_silences(self, feed: Feed, name: str, stamps: Stamps, poses: Array, gaps: Stamps) -> Stamps:
         """Gaps (G, 2) and the track's silences, which are counted, in their order."""
-        rows = np.flatnonzero(silent(stamps, poses))
+        rows = np.flatnonzero(silent(stamps, poses, longest_step_s(stamps, SILENCE_S, SILENT_INTERVALS)))
         rows = rows[~np.isin(stamps[rows], gaps[:, 0])]
         silences = np.column_stack([stamps[rows], stamps[rows + 1]])
         for begun, ended in silences:

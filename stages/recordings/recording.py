@@ -17,6 +17,7 @@ from omninav.stages.values.scan import Scan
 
 from .messages import is_blank
 from .plausibility import MotionLimits
+from .stamps import TRUTH_MAX_GAP_S
 
 
 class UnreadableRecording(BadInput):
@@ -106,6 +107,8 @@ class OpenOptions:
     """Limits of the robot's motion."""
     rate: float | None = None
     """Images per second of a folder of images without times."""
+    truth_max_gap_s: float = TRUTH_MAX_GAP_S
+    """Largest time between an image and a pose on the topic of true poses, unless these come more seldom."""
 
 
 FORMATS: list[type["Format"]] = []

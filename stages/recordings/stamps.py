@@ -11,10 +11,17 @@ from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.geometry.plane.se2 import interpolate
 
 Stamps = npt.NDArray[np.int64]
+TRUTH_MAX_GAP_S = 0.5
+"""Largest time between an image and a true pose, seconds: an indoor robot drives half a metre in it at most."""
 SAME_TIME_S = 0.001
 """Times of one moment differ by less than this, seconds: programs write them with six digits and more."""
 LONE_S = 3600.0
 """A record further than this from all others of its kind tells of a broken clock, not of a drive."""
+
+
+def longest_step_s(times: Stamps, seconds: float, intervals: float) -> float:
+    """Longest time (s) between two poses that is no gap: some seconds, or intervals as they usually are."""
+    return max(seconds, intervals * float(np.median(np.diff(times))) / 1e9) if len(times) > 1 else seconds
 
 
 def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:

@@ -11,17 +11,17 @@ import numpy as np
 from omninav.pipeline import nearest, shown
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
-from omninav.stages.geometry.arrays import Bools
+from omninav.stages.geometry.arrays import Array, Bools
 from omninav.stages.values.encoded_image import Undecodable
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .clock_changes import camera_clock_set, set_back
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPES, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
-from .plausibility import MotionLimits, seconds_within
+from .plausibility import MotionLimits, seconds_within, silent
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
 from .recording import OpenOptions, Topics, UnreadableRecording
-from .stamps import Stamps, poses_at, within
+from .stamps import Stamps, longest_step_s, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, message_of, require_stamps
 
@@ -110,13 +110,20 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         keep = _seen_within(feed, name, "odometry", stamps, odometry.stamps, topics.odometry)
     elif truth is not None:
         keep = _seen_within(feed, name, "truth", stamps, truth.stamps, topics.truth)
+    true = None
+    if truth is not None:
+        kind = "no_position" if odometry is None else "no_truth"
+        longest = longest_step_s(truth.stamps, 2.0 * options.truth_max_gap_s, 2.0)
+        true = _true_poses(feed, f"{name}: {topics.truth}", stamps, keep, truth, longest, kind)
+        keep &= (odometry is not None) | np.isfinite(true[:, 0])
+        true = true[keep]
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     recording = TopicRecording(
         name=name,
         camera=view,
         stamps=stamps,
         odometry=None if odometry is None else poses_at(odometry.stamps, odometry.poses, stamps),
-        truth=None if truth is None else poses_at(truth.stamps, truth.poses, stamps),
+        truth=true,
         unmeasured_s=None if odometry is None else seconds_within(odometry.gaps, stamps),
         feed=feed,
         images=frames,
@@ -298,6 +305,19 @@ def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps
             f"record both by one clock, or type topics.{role}=null to do without"
         )
     return keep
+
+
+def _true_poses(
+    feed: Feed, where: str, stamps: Stamps, keep: Bools, truth: PoseTrack, longest_s: float, kind: str
+) -> Array:
+    """True poses (N, 3) at images; NaN, and where they are to be kept counted as a `kind`, over silences and jumps."""
+    poses, times = poses_at(truth.stamps, truth.poses, stamps), truth.stamps
+    torn = np.append(silent(times, truth.poses, longest_s) | np.isin(times[:-1], truth.gaps[:, 0]), False)
+    unknown = torn[np.searchsorted(times, stamps) - 1] & ~np.isin(stamps, times)
+    poses[unknown] = np.nan
+    for stamp in stamps[unknown & keep]:
+        feed.drop(kind, f"{where} jumps or is silent about the image at {stamp / 1e9:.3f} s")
+    return poses
 
 
 def _first_size(name: str, feed: Feed, images: Sequence[Record]) -> tuple[int, int]:

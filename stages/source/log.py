@@ -82,7 +82,10 @@ class LogSource(Playback):
         if self.truth is not None and self._truth_file is None:
             topics = replace(topics, truth=self.truth)
         return [
-            open_recording(name, topics, self.camera, self.layout_folders, self.limits, self.rate_hz) for name in names
+            open_recording(
+                name, topics, self.camera, self.layout_folders, self.limits, self.rate_hz, self.truth_max_gap_s
+            )
+            for name in names
         ]
 
     def _begin(self, ctx: Context, part: LogPart) -> None:

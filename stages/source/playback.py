@@ -51,7 +51,7 @@ class Playback(Source, ABC):
     truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
     """The file's clock minus the log's: an image taken at t is looked up in the file at t + this."""
     truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
-    """Largest time between an image and a pose of the file, seconds."""
+    """Largest time between an image and a true pose, seconds; on a topic that is slower, its usual interval."""
     first: Annotated[int, Bounds(ge=0)] = 0
     """Number of the frame at which each log begins; 0: the first."""
     stop: Annotated[int, Bounds(ge=1)] | None = None

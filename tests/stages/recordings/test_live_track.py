@@ -75,6 +75,18 @@ def test_a_silence_is_a_gap_once_whether_the_track_goes_on_or_was_reset():
         assert track.dropped == ({} if shift else {"odometry_silence": 1})
 
 
+def test_nothing_is_true_in_a_silence_and_while_a_robot_is_carried_and_slow_truth_is_interpolated():
+    for pause, shift, known in ((2.0, 0.0, False), (0.1, 99.0, False), (0.9, 0.0, True)):
+        track = LiveTrack(MotionLimits(), jumps=True)
+        straight(track, np.arange(0.0, 5.05, 0.1))
+        straight(track, np.arange(5.0 + pause, 8.05 + pause, 0.1), x0=shift)
+        assert (track.at(round((5 + pause / 2) * S)) is not None) == known
+        assert track.at(round((5 + pause) * S)) == pytest.approx([5 + pause + shift, 0, 0])
+    track = LiveTrack(MotionLimits(), jumps=True)
+    straight(track, np.arange(0.0, 9.0, 3.0))
+    assert track.at(5 * S) == pytest.approx([5, 0, 0])
+
+
 def test_an_excursion_is_dropped_where_the_track_goes_on_as_before():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.arange(0.0, 2.0, 0.1))

@@ -108,6 +108,29 @@ def test_true_poses_may_jump_as_those_of_a_robot_that_is_carried(tmp_path: Path)
     assert recording.truth[-1, 0] > 40.0
 
 
+@pytest.mark.parametrize("without", ["", ODOMETRY])
+def test_nothing_is_true_in_a_silence_and_while_a_robot_is_carried(without: str, tmp_path: Path) -> None:
+    def change(made: Made) -> list[Made]:
+        step = step_of(made)
+        if made.topic != TRUTH:
+            return [] if made.topic == without else [made]
+        x, y, heading = pose_at(step * 0.05)
+        return [] if 60 < step < 100 else [posed(made, (x + 40.0, y, heading)) if step > 135 else made]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(change))))
+    lost = {6, 7, 8, 9, 13}  # the last is between two poses of a jump
+    if without:
+        assert recording.dropped == {"no_position": 5}
+        assert len(recording.truth) == FRAMES - 5
+    else:
+        assert recording.dropped == {"no_truth": 5}
+        assert set(np.flatnonzero(np.isnan(recording.truth[:, 0])).tolist()) == lost
+        assert (
+            "/ground_truth/pose jumps or is silent about the image at 1700000003.267 s" in recording.details["no_truth"]
+        )
+    assert np.isfinite(open_recording(recording.name, truth_max_gap_s=1.0).truth[7]).all()
+
+
 def test_the_motion_across_a_gap_is_less_certain(tmp_path: Path) -> None:
     path = log_with(tmp_path / "log.mcap", DAMAGES["1e4 m away"][0])
     ctx = Context("source")
