@@ -1,5 +1,6 @@
 """The source of a robot that runs now: one tick for the newest image that its odometry reaches."""
 
+import math
 import signal
 import threading
 import time
@@ -46,13 +47,13 @@ PATIENCE_S = 1.0
 
 class LiveSourceState(DeadReckoning):
     """Ticks made, logs begun (a clock that is set back begins one), and of the last tick the stamp (ns), the position
-    in the odometry's frame, and the seconds of odometry not believed. `first` and `ended`: stamps of the first tick,
+    in the odometry's frame, and the squared lengths (s^2) of its gaps. `first` and `ended`: stamps of the first tick,
     and of that at which the planned route ended (0: it has not)."""
 
     ticks: int = 0
     log: int = 0
     stamp: int = 0
-    unmeasured_s: float = 0.0
+    unmeasured_s2: float = 0.0
     first: int = 0
     ended: int = 0
 
@@ -69,9 +70,9 @@ class LiveSourceState(DeadReckoning):
         """Go on by a frame's odometry, `seconds` after the one before; gives the motion, None at the first of a log."""
         assert frame.odometry is not None  # an image that odometry does not reach is no tick
         before = np.array([self.x, self.y, self.heading])
-        unmeasured_s = abs(frame.unmeasured_s - self.unmeasured_s)
+        unmeasured_s = math.sqrt(abs(frame.unmeasured_s2 - self.unmeasured_s2))
         self.x, self.y, self.heading = frame.odometry.tolist()
-        self.unmeasured_s = frame.unmeasured_s
+        self.unmeasured_s2 = frame.unmeasured_s2
         return None if seconds is None else motion_of(between(before, frame.odometry), unmeasured_s)
 
 

@@ -100,7 +100,7 @@ class VisualOdometry(Stage):
             _begin(state, odometry, features.bearings, descriptors)
             return self.Out(odometry=odometry)
         _scale_by_map(state, fix, camera.arm)
-        guess = math.hypot(motion.x, motion.y) or motion.sigma_m
+        guess = math.hypot(motion.x, motion.y) or 4.0 * motion.sigma_m**2  # half a metre a second where speed is 0
         state.length += guess
         before, usual = state.pose, state.speed_ratio * guess
         found = tracked(state.keyframes, features.bearings, descriptors, ctx.rng)

@@ -64,7 +64,7 @@ class Frame(NamedTuple):
 
     odometry: Array | None
     reported_odometry: Array | None
-    unmeasured_s: float
+    unmeasured_s2: float
     truth: Array | None
     scan: Scan | None
     restart: Reinitialise | None
@@ -117,7 +117,7 @@ class OdometryBuffer:
         frame = Frame(
             odometry=odometry,
             reported_odometry=None if self.odometry is None or odometry is None else self.odometry.reported(odometry),
-            unmeasured_s=0.0 if self.odometry is None else self.odometry.unmeasured_s(stamp),
+            unmeasured_s2=0.0 if self.odometry is None else self.odometry.unmeasured_s2(stamp),
             truth=truth if truth is not None or self.truth is None else np.full(3, np.nan),
             scan=scan,
             restart=self._restart,
@@ -162,7 +162,7 @@ class LiveRecording(TopicRecording):
             stamps=np.array(stamps, dtype=np.int64),
             odometry=odometry,
             truth=None if drive.truth is None else np.array([frame.truth for frame in frames]).reshape(-1, 3),
-            unmeasured_s=np.array([frame.unmeasured_s for frame in frames]),
+            unmeasured_s2=np.array([frame.unmeasured_s2 for frame in frames]),
             feed=feed,
             images=images,
             files=files,

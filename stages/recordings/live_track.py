@@ -15,8 +15,8 @@ from .plausibility import (
     SILENT_INTERVALS,
     MotionLimits,
     possible_between,
-    seconds_within,
     silent,
+    squares_within,
 )
 from .stamps import TRUTH_MAX_GAP_S, longest_step_s
 
@@ -114,10 +114,10 @@ class LiveTrack:
         theirs: Array = compose(jumped, between(joined, pose))
         return theirs
 
-    def unmeasured_s(self, stamp: int) -> float:
-        """Seconds up to a stamp about which no measurement is believed."""
+    def unmeasured_s2(self, stamp: int) -> float:
+        """Squared lengths (s^2) up to a stamp of gaps in which no measurement is believed, summed."""
         gaps = np.array(self._gaps, np.int64).reshape(-1, 2)
-        return float(seconds_within(gaps, np.array([stamp], np.int64))[0])
+        return float(squares_within(gaps, np.array([stamp], np.int64))[0])
 
     def _follows(self, before: _Pose, after: _Pose, joined: bool) -> bool:
         seconds = (after.stamp - before.stamp) / 1e9

@@ -123,13 +123,14 @@ def silent(stamps: Stamps, poses: Array, longest_s: float) -> Bools:
     return nothing
 
 
-def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:
-    """Seconds of all `gaps` (G, 2) up to each of the stamps (N,): (N,)."""
-    lengths = np.append(0, np.cumsum(gaps[:, 1] - gaps[:, 0]))
-    begun = np.searchsorted(gaps[:, 0], stamps, side="right")
-    over = np.append(gaps[:, 1], 0)[begun - 1] - stamps
-    inside: Array = (lengths[begun] - np.where(begun > 0, np.maximum(over, 0), 0)) / 1e9
-    return inside
+def squares_within(gaps: Stamps, stamps: Stamps) -> Array:
+    """Squares (s^2) of the lengths of all `gaps` (G, 2) up to each of the stamps (N,), summed: (N,)."""
+    before = np.append(0.0, np.cumsum(((gaps[:, 1] - gaps[:, 0]) / 1e9) ** 2))
+    last = np.searchsorted(gaps[:, 0], stamps, side="right") - 1
+    begun, ended = np.append(gaps, [[0, 0]], axis=0)[last].T
+    within = np.where(last >= 0, np.minimum(stamps, ended) - begun, 0) / 1e9
+    squares: Array = before[np.maximum(last, 0)] + within**2
+    return squares
 
 
 def possible_between(before: Array, after: Array, seconds: float, limits: MotionLimits) -> bool:

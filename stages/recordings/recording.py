@@ -31,16 +31,16 @@ class Recording(Losses, ABC):
     nanoseconds, strictly ascending, of the frames that can be used as far as is known without decoding an image.
     `odometry`: (N, 3) odometry pose at each stamp in the odometry's own frame, or None. `truth`: (N, 3) true pose in
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
-    `details`: the first case of each kind in words. `unmeasured_s`: (N,) seconds of the way to each frame about which
-    no odometry is believed, or None where there are none. `assumed`: what nothing in it states and was assumed.
-    `warnings`: what one must know of it to judge results.
+    `details`: the first case of each kind in words. `unmeasured_s2`: (N,) squared lengths (s^2) up to each frame of
+    gaps in which no odometry is believed, summed, or None where there are none. `assumed`: what nothing in it states
+    and was assumed. `warnings`: what one must know of it to judge results.
     """
 
     name: str
     camera: Camera
     stamps: Ints
     odometry: Array | None = None
-    unmeasured_s: Array | None = None
+    unmeasured_s2: Array | None = None
     truth: Array | None = None
     assumed: Sequence[str] = ()
     warnings: Sequence[str] = ()

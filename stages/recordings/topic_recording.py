@@ -97,9 +97,9 @@ class TopicRecording(Recording):
         images: Sequence[Record],
         files: Sequence[Path],
         scans: Sequence[Record] = (),
-        unmeasured_s: Array | None = None,
+        unmeasured_s2: Array | None = None,
     ) -> None:
-        self.unmeasured_s = unmeasured_s
+        self.unmeasured_s2 = unmeasured_s2
         self.mounted = ""
         """Position of its camera by `/tf_static`, in words; empty where that is not new."""
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth

@@ -18,7 +18,7 @@ from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .clock_changes import camera_clock_set, set_back
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPES, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
-from .plausibility import MotionLimits, seconds_within, silent
+from .plausibility import MotionLimits, silent, squares_within
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import Stamps, longest_step_s, poses_at, within
@@ -124,7 +124,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         stamps=stamps,
         odometry=None if odometry is None else poses_at(odometry.stamps, odometry.poses, stamps),
         truth=true,
-        unmeasured_s=None if odometry is None else seconds_within(odometry.gaps, stamps),
+        unmeasured_s2=None if odometry is None else squares_within(odometry.gaps, stamps),
         feed=feed,
         images=frames,
         files=[*files, *camera_files],

@@ -25,12 +25,16 @@ BLUR_PX = 1.0
 """Standard deviation of the blur of their columns: between images, leaves and noise change."""
 NOMINAL_SPEED = 0.5
 """Metres per second of a path that is only drawn."""
+GUESSED_S = 0.5
+"""Seconds for which a speed may be off one way: variances of guesses grow in proportion to time, so that images add up
+to the same at any rate, and this interval is that of two images a second, at which it was measured."""
 MIN_SPEED_SIGMA = 0.5
-"""Metres per second by which any guessed speed may be off."""
+"""Metres per second by which any guessed speed may be off, for `GUESSED_S`."""
 COMPASS_SIGMA = math.radians(3.0)
 """Standard deviation of a turn that the compass finds between two images (rad), near walls that pass by."""
 BLIND_SIGMA = 0.5
-"""Radians per second that a robot may turn where a camera sees too little of the circle for a compass."""
+"""Radians per second that a robot may turn, for `GUESSED_S`, where a camera sees too little of the circle for a
+compass."""
 VISUAL_ODOMETRY = "visual_odometry"
 """Node that sees the motion in the images, so that none has to be guessed for what reads it."""
 
@@ -86,11 +90,11 @@ def dead_reckon(
 
 def assumed_motion(before: Floats | None, after: Floats | None, seconds: float, speed: float) -> AssumedMotion:
     """Straight on by a guessed speed (m/s) for some seconds, with half of the turn before and half of it after."""
-    turn, sigma_turn = 0.0, BLIND_SIGMA * seconds
+    turn, sigma_turn = 0.0, BLIND_SIGMA * math.sqrt(seconds * GUESSED_S)
     if before is not None and after is not None:
         turn, sigma_turn = turn_between(before, after), COMPASS_SIGMA
     way = speed * seconds
-    sigma_m = max(speed, MIN_SPEED_SIGMA) * seconds
+    sigma_m = max(speed, MIN_SPEED_SIGMA) * math.sqrt(seconds * GUESSED_S)
     return AssumedMotion(way * math.cos(turn / 2), way * math.sin(turn / 2), turn, sigma_m, sigma_turn)
 
 

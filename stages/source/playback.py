@@ -1,6 +1,7 @@
 """Playing recordings: one tick per usable image, whether they were written by a robot or are simulated."""
 
 import hashlib
+import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from pathlib import Path
@@ -193,8 +194,8 @@ class Playback(Source, ABC):
         if position.last < 0:
             return pose_of(odometry), None
         last = int(part.frames[position.last])
-        gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
-        return pose_of(odometry), motion_of(between(part.driven[last], odometry), gap)
+        gap = 0.0 if recording.unmeasured_s2 is None else float(np.ptp(recording.unmeasured_s2[[last, frame]]))
+        return pose_of(odometry), motion_of(between(part.driven[last], odometry), math.sqrt(gap))
 
     @property
     def _truth_file(self) -> Path | None:

@@ -37,7 +37,8 @@ class Motion(Value):
 class BridgedMotion(Motion):
     """A motion across a gap of the odometry, bridged from what is around it: less certain than a measured one.
 
-    `unmeasured_s`: how long the gap is, in seconds.
+    `unmeasured_s`: how long the gap is, in seconds; of motions that are parts of one, their squares add up to its own,
+    since their errors are drawn one by one and the gap is as uncertain whatever the camera's rate.
     """
 
     unmeasured_s: Annotated[float, Bounds(ge=0)]

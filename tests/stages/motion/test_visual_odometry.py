@@ -15,6 +15,7 @@ from omninav.stages.features.rotation_reduced_sift import none_found
 from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState, _scale_by_map
+from omninav.stages.source.dead_reckoning import assumed_motion
 from omninav.stages.values.landmarks import LandmarkFix
 from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 
@@ -102,6 +103,14 @@ def test_a_path_has_its_shape_and_turns_where_its_scale_is_not_known() -> None:
     assert "guess" in ctx.facts["scale"]
     assert outs[-1].motion.sigma_m > 0.4 * STEP_M * scale
     assert any("camera.yaml (height: 1.2)" in sentence for sentence in ctx.warnings)
+
+
+def test_at_a_speed_of_zero_lengths_are_those_of_half_a_metre_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    outs, _ = run(room(floor=False), walk(8))
+    seconds = GUESS.x / 0.5
+    still = replace(assumed_motion(None, None, seconds, 0.0), sigma_turn=GUESS.sigma_turn)
+    monkeypatch.setitem(globals(), "GUESS", still)
+    assert path(run(room(floor=False), walk(8))[0]) == pytest.approx(path(outs))
 
 
 def test_the_cameras_height_over_the_floor_gives_metres() -> None:

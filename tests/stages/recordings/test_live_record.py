@@ -32,7 +32,7 @@ def test_a_live_record_gives_what_a_log_of_the_same_messages_does(tmp_path: Path
     first = Made(HEADER, HEADER_TYPE, START, START, make_message(HEADER_TYPE, {"data": header.text()}))
     late = sorted(messages(), key=lambda made: made.stamp + 40_000_000 * (made.topic == IMAGE))
     record = open_recording(str(write_mcap(tmp_path / "live.mcap", iter([first, *late]))))
-    for name in ("stamps", "odometry", "truth", "unmeasured_s"):
+    for name in ("stamps", "odometry", "truth", "unmeasured_s2"):
         np.testing.assert_allclose(getattr(record, name), getattr(whole, name), atol=1e-9)
     np.testing.assert_array_equal(record.image(3), picture(3))
     with refused("has made no tick"):  # of images that lie in it before what follows them
@@ -49,7 +49,7 @@ def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:
     say(drive, "initial_pose", 0.3, {"pose": {"pose": pose_fields(1.5, 2.5, 0.3), "covariance": covariance}})
     say(drive, "goal", 0.4, {"pose": pose_fields(3.0, -1.0, 0.0)})
     asked, _ = drive.frame(199_999_999)
-    assert (asked.scan, asked.unmeasured_s, asked.restart.at) == (None, 0.0, pytest.approx((1.5, 2.5, 0.3, 0.5, 0.2)))
+    assert (asked.scan, asked.unmeasured_s2, asked.restart.at) == (None, 0.0, pytest.approx((1.5, 2.5, 0.3, 0.5, 0.2)))
     assert (asked.goal.x, asked.goal.y, np.isnan(asked.truth).tolist()) == (3.0, -1.0, [True] * 3)
     for at, ranges, used in ((0.5, [1.0, 2.0], ["scan at 0.2 s"]), (1.2, [1.0, 2.0], []), (1.200000001, None, [])):
         tick, items = drive.frame(round(at * 1e9))  # readings are of a second, and once in the record
@@ -59,7 +59,7 @@ def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:
     for at in (2.1, 3.1):  # a counter that was reset
         say(drive, "odometry", at, {"pose": {"pose": pose_fields(at - 102.1, 0.0, 0.0)}})
     tick, _ = drive.frame(2_600_000_000)
-    assert (tick.odometry[0], tick.reported_odometry[0], tick.unmeasured_s) == pytest.approx((2.6, -99.5, 0.1))
+    assert (tick.odometry[0], tick.reported_odometry[0], tick.unmeasured_s2) == pytest.approx((2.6, -99.5, 0.01))
     for variance in (-0.04, np.nan, np.inf, 1e300):
         covariance[35] = variance
         with pytest.raises(ValueError, match="covariance"):

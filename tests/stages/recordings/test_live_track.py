@@ -52,9 +52,9 @@ def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known
     assert len(straight(track, np.arange(7.1, 9.05, 0.1), x0=50.0)) == 20
     assert [track.at(at * S)[0] for at in (6, 8)] == pytest.approx([6, 8])
     assert track.reported(track.at(8 * S)) == pytest.approx([58, 0, 0])
-    assert [track.unmeasured_s(at * S) for at in (4, 6, 8)] == pytest.approx([0, 0.1, 0.2])
+    assert [track.unmeasured_s2(at * S) for at in (4, 6, 8)] == pytest.approx([0, 0.01, 0.02])
     straight(track, np.arange(1.0, 3.05, 0.1))  # a clock that is set back for good begins again
-    assert (track.last, track.at(6 * S), track.unmeasured_s(8 * S)) == (3 * S, None, 0.0)
+    assert (track.last, track.at(6 * S), track.unmeasured_s2(8 * S)) == (3 * S, None, 0.0)
 
 
 def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_might_have():
@@ -63,7 +63,7 @@ def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_
     straight(track, np.arange(8.0, 10.05, 0.1), x0=-100.0)
     assert track.at(8 * S) == pytest.approx([5.1, 0, 0], abs=1e-6)  # 0.1 s ahead as before, and not 3 s
     assert track.at(9 * S) == pytest.approx([6.1, 0, 0], abs=1e-6)
-    assert track.unmeasured_s(9 * S) == pytest.approx(3.0)
+    assert track.unmeasured_s2(9 * S) == pytest.approx(9.0)
 
 
 def test_a_silence_is_a_gap_once_whether_the_track_goes_on_or_was_reset():
@@ -71,7 +71,7 @@ def test_a_silence_is_a_gap_once_whether_the_track_goes_on_or_was_reset():
         track = LiveTrack(MotionLimits(), jumps=False)
         straight(track, np.arange(0.0, 5.05, 0.1))
         straight(track, np.arange(5.0 + pause, 8.05 + pause, 0.1), x0=shift)
-        assert track.unmeasured_s(round((7 + pause) * S)) == pytest.approx(pause)
+        assert track.unmeasured_s2(round((7 + pause) * S)) == pytest.approx(pause**2)
         assert track.dropped == ({} if shift else {"odometry_silence": 1})
 
 

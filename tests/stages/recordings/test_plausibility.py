@@ -32,7 +32,7 @@ from omninav.stages.recordings.plausibility import (
     MotionLimits,
     believed,
     possible_between,
-    seconds_within,
+    squares_within,
     without_jumps,
 )
 from omninav.stages.recordings.recording import Recording
@@ -159,6 +159,10 @@ def test_motion_in_a_silence_of_odometry_is_less_certain_unless_the_robot_stood(
     path = write_mcap(tmp_path / "log.mcap", messages(change))
     ctx = Context("source")
     motions = [out.motion for out in ticks(LogSource(log=str(path)), ctx)]
+    for stride in (1, 2, 3):  # as uncertain as a gap of 2 s, whatever the camera's rate
+        parts = [out.motion for out in ticks(LogSource(log=str(path), stride=stride), Context("source"))]
+        squares = sum(motion.unmeasured_s**2 for motion in parts if isinstance(motion, BridgedMotion))
+        assert squares == pytest.approx(0.0 if stands else 4.0)
     bridged = [number for number, motion in enumerate(motions) if isinstance(motion, BridgedMotion)]
     assert bridged == ([] if stands else [6, 7, 8, 9, 10])
     assert ctx.counts == ({} if stands else {"odometry_silence": 1})
@@ -206,7 +210,7 @@ def test_stretches_are_told_apart_by_hand() -> None:
     joined = without_jumps(stamps[rows], poses[rows], track.jumps)
     np.testing.assert_allclose(joined[:, 0], [0.0, 0.5, 1.5, 2.5, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0])
     at = np.array([0, 2, 4, 10, 15, 21], np.int64) * 5 * 10**8
-    np.testing.assert_allclose(seconds_within(track.gaps, at), [0.0, 0.5, 1.5, 4.5, 6.0, 7.5])
+    np.testing.assert_allclose(squares_within(track.gaps, at), [0.0, 0.25, 1.25, 8.25, 10.5, 17.25])
 
 
 def test_a_robot_gets_as_far_as_its_speeds_allow_and_turns_the_shorter_way() -> None:

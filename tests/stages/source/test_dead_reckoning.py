@@ -57,7 +57,7 @@ def test_a_video_drives_straight_at_the_stated_speed_and_turns_as_it_is_seen(tur
     for out in outs[1:]:
         assert isinstance(out.motion, AssumedMotion)
         assert math.hypot(out.motion.x, out.motion.y) == pytest.approx(0.8)
-        assert out.motion.sigma_m == pytest.approx(0.8)
+        assert out.motion.sigma_m == pytest.approx(0.8 / math.sqrt(2.0))
     assert math.degrees(outs[-1].odometry.heading) == pytest.approx(sum(TURNS_DEG), abs=1.0)
     assert ctx.facts["odometry"] == "guessed"
     assert any("guessed from a speed of 0.8 m/s" in sentence for sentence in ctx.warnings)
@@ -84,13 +84,20 @@ def test_a_guessed_motion_is_as_uncertain_as_it_says():
 
 
 def test_a_slow_guess_is_as_uncertain_as_one_of_half_a_metre_per_second():
-    motion = assumed_motion(None, None, 4.0, 0.25)
-    assert (motion.x, motion.y, motion.turn, motion.sigma_m, motion.sigma_turn) == (1.0, 0.0, 0.0, 2.0, 2.0)
+    motion = assumed_motion(None, None, 2.0, 0.25)
+    assert (motion.x, motion.y, motion.turn, motion.sigma_m, motion.sigma_turn) == (0.5, 0.0, 0.0, 0.5, 0.5)
     around = np.sin(np.linspace(0, 2 * math.pi, 360, endpoint=False), dtype=np.float32)[None]
     turned = assumed_motion(around, np.roll(around, 90, axis=1), 4.0, 0.75)  # to the left
     eighth = 3.0 / math.sqrt(2.0)  # half of the turn is before the way
     found = (turned.x, turned.y, turned.turn, turned.sigma_m, turned.sigma_turn)
-    assert found == pytest.approx((eighth, eighth, math.pi / 2, 3.0, math.radians(3.0)), abs=1e-3)
+    assert found == pytest.approx((eighth, eighth, math.pi / 2, 0.75 * math.sqrt(2.0), math.radians(3.0)), abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [0.5, 2.0, 30.0])
+def test_a_guess_is_as_uncertain_at_any_rate_of_images_as_at_two_a_second(rate: float):
+    motion = assumed_motion(None, None, 1.0 / rate, 0.8)
+    assert math.sqrt(rate) * motion.sigma_m == pytest.approx(math.sqrt(2.0) * 0.8 * 0.5)
+    assert math.sqrt(rate) * motion.sigma_turn == pytest.approx(math.sqrt(2.0) * 0.5 * 0.5)
 
 
 def test_a_rate_takes_the_first_image_of_each_period(turning: str) -> None:
