@@ -18,6 +18,7 @@ from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.recordings.live_record import HEADER, Frame, LiveHeader, LiveRecording, OdometryBuffer, Role
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.static_transforms import TF_STATIC
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.source.dead_reckoning import DeadReckoning, VisualCompass, assumed_speed, dead_reckon
 from omninav.stages.source.outputs import DriveOutputs, motion_of, pose_of
@@ -356,6 +357,7 @@ class LiveSource(Source):
             (self._odometry_topic(), "odometry"),
             (self.topics.truth, "truth"),
             (self.topics.scan if scan else None, "scan"),
+            (TF_STATIC if scan and self.topics.scan else None, "transforms"),
             (self.initial_pose, "initial_pose"),
             (self.goal, "goal"),
             (self.restart, "restart"),

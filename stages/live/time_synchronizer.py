@@ -16,7 +16,7 @@ from omninav.stages.recordings.live_record import Frame, LiveHeader, OdometryBuf
 from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, is_blank, pixels_of
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.plausibility import EXCURSION_S
-from omninav.stages.recordings.static_transforms import TF_STATIC, Mounted, StaticTransforms
+from omninav.stages.recordings.static_transforms import TF_STATIC, Mounted
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
@@ -34,6 +34,7 @@ TYPES: dict[Role, str] = {
     "initial_pose": POSE_WITH_COVARIANCE,
     "goal": POSE_STAMPED,
     "restart": EMPTY,
+    "transforms": TRANSFORMS_TYPE,
 }
 """Message types of each role's topic; an image's type follows from its topic."""
 SETTINGS = {"image": "topics.image", "odometry": "topics.odometry", "scan": "topics.scan"}
@@ -101,7 +102,7 @@ class TimeSynchronizer:
         self._without_scan = False
         self.mounted: Mounted | None = None
         """The camera of the first tick, with what static transforms state of it."""
-        self._fixed, self._base, self._info_frame = StaticTransforms(), "", ""
+        self._info_frame = ""
         self._by_info = self.camera is None
         self._since = time.monotonic()
         self._received: dict[str, float] = {}
@@ -114,10 +115,11 @@ class TimeSynchronizer:
         """Ask for all topics. Of images, only the newest is kept while nobody takes them."""
         self._since = time.monotonic()
         for topic, role in self.header.topics.items():
-            self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
+            if role != "transforms":
+                self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
         if self.camera is None and self.camera_info is not None:
             self.transport.subscribe(self.camera_info, CAMERA_INFO, newest=True)
-        if self._wants_transforms():
+        if self._wants_transforms() or TF_STATIC in self.header.topics:
             with suppress(TransportError):  # an installation without that type has no such transforms either
                 self.transport.subscribe(TF_STATIC, TRANSFORMS_TYPE, latched=True)
 
@@ -267,14 +269,13 @@ class TimeSynchronizer:
         try:
             decoded: Any = standard_types().deserialize_cdr(message.data, message.msgtype)
             if message.topic == TF_STATIC:
-                return self._fixed.add(decoded)
+                self.unrecorded += [message] if role else []  # even a broken one, whose others hold
+                return self.drive.fixed.add(decoded)
             if role is None:
                 if self.camera is None:
                     self.camera = camera_from_info(decoded, str(message.topic))
                     self._info_frame = decoded.header.frame_id
                 return
-            if role == "odometry":
-                self._base = decoded.child_frame_id
             header = getattr(decoded, "header", None)
             if header is not None and role in ("goal", "initial_pose"):
                 frame = header.frame_id.lstrip("/")
@@ -370,7 +371,7 @@ class TimeSynchronizer:
         mounted = Mounted(whole)
         if not self._used_any:
             own = self._info_frame or decoded.header.frame_id
-            mounted = self._fixed.mounted(whole, self._base, own, self._by_info)
+            mounted = self.drive.fixed.mounted(whole, self.drive.base, own, self._by_info)
             if not mounted.in_words and self._awaits_transforms():
                 return None
         made = self.drive.frame(image.stamp)

@@ -19,11 +19,13 @@ from omninav.stages.values.scan import Scan
 from .camera_yaml import parse_camera
 from .live_track import LiveTrack
 from .messages import pose_of, scan_of
+from .placed_scan import placed_scan
 from .plausibility import MotionLimits
 from .recording import UnreadableRecording
+from .static_transforms import StaticTransforms
 from .topic_recording import STALE, Feed, TopicRecording
 
-Role = Literal["image", "odometry", "truth", "scan", "initial_pose", "goal", "restart"]
+Role = Literal["image", "odometry", "truth", "scan", "initial_pose", "goal", "restart", "transforms"]
 HEADER, HEADER_TYPE = "/omninav/live", "std_msgs/msg/String"
 """The topic that makes a file a live record: its one message states what the others are."""
 CAMERA = "camera.yaml"
@@ -78,7 +80,9 @@ class OdometryBuffer:
         roles = header.topics.values()
         self.odometry = LiveTrack(header.limits, jumps=False) if "odometry" in roles else None
         self.truth = LiveTrack(header.limits, jumps=True) if "truth" in roles else None
-        self._scans: deque[tuple[int, Scan, Any]] = deque(maxlen=SCANS)
+        self.fixed, self.base = StaticTransforms(), ""
+        """Static transforms, and the robot's frame as the first odometry names it."""
+        self._scans: deque[tuple[int, Scan, str, Any]] = deque(maxlen=SCANS)
         self._restart: Reinitialise | None = None
         self._goal: GoalPoint | None = None
 
@@ -88,11 +92,13 @@ class OdometryBuffer:
         Raises ValueError or AttributeError where the message cannot be of its role.
         """
         if role == "odometry" and self.odometry is not None:
-            return self.odometry.add(stamp, pose_of(message), item)
+            used = self.odometry.add(stamp, pose_of(message), item)
+            self.base = self.base or (message.child_frame_id if used else "")
+            return used
         if role == "truth" and self.truth is not None:
             return self.truth.add(stamp, pose_of(message), item)
         if role == "scan":
-            self._scans.append((stamp, scan_of(message), item))
+            self._scans.append((stamp, scan_of(message), message.header.frame_id, item))
             return []
         if role == "goal":
             x, y, _ = pose_of(message)
@@ -101,6 +107,8 @@ class OdometryBuffer:
             self._restart = Reinitialise()
         elif role == "initial_pose":
             self._restart = Reinitialise(_start_of(message))
+        elif role == "transforms":
+            self.fixed.add(message)
         return [item]
 
     def frame(self, stamp: int) -> tuple[Frame, list[Any]] | None:
@@ -112,8 +120,9 @@ class OdometryBuffer:
         used = max((n for n, one in enumerate(self._scans) if 0 <= stamp - one[0] <= STALE), default=None)
         scan, item = None, None
         if used is not None:
-            at, scan, item = self._scans[used]
-            self._scans[used] = (at, scan, None)  # once in the record is enough
+            at, scan, frame_id, item = self._scans[used]
+            self._scans[used] = (at, scan, frame_id, None)  # once in the record is enough
+            scan = placed_scan(scan, self.fixed.scanner(self.base, frame_id))
         frame = Frame(
             odometry=odometry,
             reported_odometry=None if self.odometry is None or odometry is None else self.odometry.reported(odometry),

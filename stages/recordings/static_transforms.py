@@ -86,6 +86,15 @@ class StaticTransforms:
             return None
         return np.linalg.inv(to_base) @ to_frame
 
+    def scanner(self, base: str, frame: str) -> Array | None:
+        """The pose (4, 4) of a frame on the robot, whose own is `base`; None where no transforms join them."""
+        return next((pose for _, pose in self._on_robot(base, frame)), None)
+
+    def _on_robot(self, base: str, frame: str) -> list[tuple[str, Array]]:
+        """The frames of a robot to which transforms join one, each with its pose there."""
+        bases = base.strip("/"), *BASES
+        return [(name, pose) for name in bases if (pose := self.between(name, frame.strip("/"))) is not None]
+
     def _to_root(self, frame: str) -> tuple[str, Array, set[str]]:
         """The root of a frame's tree ("" for one that is its own ancestor), its pose there, and the frames between."""
         pose, passed = np.eye(4), set[str]()
@@ -104,9 +113,8 @@ class StaticTransforms:
         `base`: the robot's frame as odometry names it. `frame`: the camera's, by REP 103 with x to the right in the
         image, y down and z along the optical axis.
         """
-        frame, bases = frame.strip("/"), (base.strip("/"), *BASES)
-        joined = [(name, pose) for name in bases if (pose := self.between(name, frame)) is not None]
-        if not joined or frame in bases or (not by_info and camera.placed):
+        frame, joined = frame.strip("/"), self._on_robot(base, frame)
+        if not joined or frame in (base.strip("/"), *BASES) or (not by_info and camera.placed):
             return Mounted(camera)
         name, pose = joined[0]
         if np.abs(pose[:2, 3]).max() > FAR_M:

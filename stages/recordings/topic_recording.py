@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +17,7 @@ from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from .messages import pixels_of, scan_of
+from .placed_scan import placed_scan
 from .recording import DecodeAhead, Recording, UnreadableRecording, checked_image
 from .stamps import Stamps, ascending, lone
 
@@ -98,13 +99,14 @@ class TopicRecording(Recording):
         files: Sequence[Path],
         scans: Sequence[Record] = (),
         unmeasured_s2: Array | None = None,
+        scanner: Callable[[str], Array | None] = lambda frame: None,
     ) -> None:
         self.unmeasured_s2 = unmeasured_s2
         self.mounted = ""
         """Position of its camera by `/tf_static`, in words; empty where that is not new."""
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
         self._images = DecodeAhead(lambda frame: partial(pixels_of, message_of(feed, images[frame])))
-        self._feed, self._files, self._scans = feed, files, scans
+        self._feed, self._files, self._scans, self._scanner = feed, files, scans, scanner
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
@@ -129,7 +131,8 @@ class TopicRecording(Recording):
             return None
         record = self._scans[number]
         try:
-            return scan_of(message_of(self._feed, record))
+            message = message_of(self._feed, record)
+            return placed_scan(scan_of(message), self._scanner(message.header.frame_id))
         except BadMessage as error:
             self._feed.drop("bad_message", str(error))
         except ValueError as error:

@@ -129,6 +129,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         images=frames,
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, records),
+        scanner=partial(fixed.scanner, base),
     )
     found = ""
     if odometry_in_transforms and odometry is not None:

@@ -16,17 +16,18 @@ from conftest import DRIVE
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.mcap.message_types import header_stamp
+from omninav.pipeline.mcap.message_types import header_stamp, make_message, standard_types
 from omninav.stages.live.live_source import LiveSource, LiveSourceState
 from omninav.stages.live.publish import send
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.time_synchronizer import TimeSynchronizer
 from omninav.stages.live.transport import MessageQueue, RawMessage
 from omninav.stages.recordings.camera_yaml import UNSAID_BY_INFO, read_camera, write_camera
+from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 
-from .conftest import CAMERA, IMAGE, ODOMETRY, TRUTH, Wire, encode, recorded, replayed, same
+from .conftest import CAMERA, IMAGE, ODOMETRY, TRUTH, Wire, decode, encode, recorded, replayed, same
 
 POSE, POSE_STAMPED = "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseStamped"
 COMPRESSED, SCAN = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/LaserScan"
@@ -403,6 +404,7 @@ def test_requests_that_are_turned_off_are_not_heard(wire: Wire, tmp_path: Path):
         ODOMETRY,
         TRUTH,
         "/scan",
+        "/tf_static",
     }
 
 
@@ -436,6 +438,26 @@ def test_static_transforms_say_where_the_camera_sits_and_the_record_keeps_it(wir
     assert replayed(tmp_path / "live.mcap")[0].camera.mount == pytest.approx([0.2, -0.1, math.pi / 2])
 
 
+def test_a_scan_is_turned_as_its_frame_sits_on_the_robot_also_in_the_record(wire: Wire, tmp_path: Path):
+    kind, messages = "tf2_msgs/msg/TFMessage", said()
+    place = {"translation": {"x": 0.0}, "rotation": {"z": 1.0, "w": 0.0}}
+    fixed = {"header": {"frame_id": "base_link"}, "child_frame_id": "laser", "transform": place}
+    broken = {**fixed, "child_frame_id": "base_link"}
+    told = RawMessage("/tf_static", kind, messages[0].received, encode(kind, {"transforms": [broken, fixed]}))
+    for number, each in enumerate(messages):
+        if each.topic == "/scan":
+            fields = {"ranges": [1.0, 2.0], "angle_increment": 0.1, "range_max": 4.0, "header": {"frame_id": "laser"}}
+            content = make_message(SCAN, fields)
+            content.header.stamp = decode(SCAN, each.data).header.stamp
+            messages[number] = each._replace(data=bytes(standard_types().serialize_cdr(content, SCAN)))
+    half = len(messages) // 2
+    drive = driven(wire, tmp_path, [*messages[:half], told, *messages[half:]])
+    firsts = [out.scan.first for out in drive.outs if out.scan is not None]
+    assert (firsts[0], firsts[-1]) == (0.0, pytest.approx(math.pi))
+    record = open_recording(str(tmp_path / "live.mcap"))
+    assert [found.first for frame in range(len(record.stamps)) if (found := record.scan(frame))] == firsts
+
+
 def test_a_record_on_a_full_disk_names_its_file(wire: Wire, tmp_path: Path):
     drive = Drive(tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -453,9 +475,9 @@ def test_topics_without_a_slash_are_those_that_ros_makes_of_them(wire: Wire, tmp
     ctx = Context("source", folder=tmp_path)
     source.setup(ctx)
     synchronizer = source._join(LiveSourceState())
-    topics = {IMAGE, ODOMETRY, TRUTH, "/scan", "/initialpose", "/goal_pose", "/again"}
+    topics = {IMAGE, ODOMETRY, TRUTH, "/scan", "/tf_static", "/initialpose", "/goal_pose", "/again"}
     assert synchronizer.header.topics.keys() == topics
-    assert wire.queue._messages.keys() == topics | {"/camera/camera_info", "/tf_static"}
+    assert wire.queue._messages.keys() == topics | {"/camera/camera_info"}
     send(wire, "pose", POSE, encode(POSE, {}))
     assert [topic for topic, _ in wire.sent] == ["/pose"]
 

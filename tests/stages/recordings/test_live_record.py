@@ -18,6 +18,7 @@ TYPES = {
     "odometry": "nav_msgs/msg/Odometry",
     "scan": "sensor_msgs/msg/LaserScan",
     "initial_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "transforms": "tf2_msgs/msg/TFMessage",
     "goal": "geometry_msgs/msg/PoseStamped",
 }
 
@@ -37,6 +38,19 @@ def test_a_live_record_gives_what_a_log_of_the_same_messages_does(tmp_path: Path
     np.testing.assert_array_equal(record.image(3), picture(3))
     with refused("has made no tick"):  # of images that lie in it before what follows them
         open_recording(str(write_mcap(tmp_path / "early.mcap", iter([first, *messages()]))))
+
+
+def test_a_scan_is_turned_by_the_transforms_that_came_before_its_tick() -> None:
+    drive = OdometryBuffer(LiveHeader({"/odom": "odometry", "/tf_static": "transforms"}))
+    for at in (0.0, 1.0):
+        say(drive, "odometry", at, {"child_frame_id": "body", "pose": {"pose": pose_fields(at, 0.0, 0.0)}})
+    fields = {"header": {"frame_id": "laser"}, "ranges": [1.0, 2.0], "angle_increment": 0.1, "range_max": 4.0}
+    say(drive, "scan", 0.2, fields)
+    assert drive.frame(300_000_000)[0].scan.first == 0.0
+    turned = {"translation": {}, "rotation": {"z": 1.0, "w": 0.0}}
+    link = {"header": {"frame_id": "body"}, "child_frame_id": "laser", "transform": turned}
+    assert say(drive, "transforms", 0.3, {"transforms": [link]}) == ["transforms at 0.3 s"]
+    assert drive.frame(400_000_000)[0].scan.first == pytest.approx(np.pi)
 
 
 def test_a_tick_has_what_lies_before_it_and_each_wish_once() -> None:

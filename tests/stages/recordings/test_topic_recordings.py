@@ -316,6 +316,20 @@ def test_readings_are_the_last_of_the_second_before_an_image(tmp_path: Path) -> 
     assert recording.dropped == {"bad_message": 1}
 
 
+@pytest.mark.parametrize(("frame", "first"), [("laser", math.pi), ("elsewhere", 0.0)])
+def test_readings_are_turned_as_their_frame_sits_on_the_robot(frame: str, first: float, tmp_path: Path) -> None:
+    kind, at = "sensor_msgs/msg/LaserScan", START + 1_267_000_000
+    fields = {"ranges": np.array([1.0, 2.0], np.float32), "angle_increment": 0.1, "range_max": 4.0}
+    scan = Made("/scan", kind, at, at, make_message(kind, fields | {"header": {"frame_id": frame}}, at))
+    backwards = fixed_frames(
+        PLATE | {"transform": {"translation": {}, "rotation": {"z": 1.0}}},
+        in_frame("plate", "laser", 0, 0, 0, 0, 0, 0, 1),
+    )
+    made = chain([backwards], messages(), [scan])
+    found = open_recording(str(write_mcap(tmp_path / "log.mcap", made))).scan(2)
+    assert (found.first, found.ranges.tolist()) == (pytest.approx(first), [1.0, 2.0])
+
+
 FIRST, LAST = START + 2_000_000_000, START + 8_000_000_000
 
 
