@@ -103,8 +103,7 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         raise UnreadableRecording(
             f"{name}: its images are {width} x {height}, but its camera says {view.width} x {view.height_px}; {hint}"
         )
-    if track is not None:
-        stamps = stamps - view.delay_ns  # without a track there is nothing to be late against
+    stamps = stamps - view.delay_ns  # also without a track: the truth may be in a file, and scans have times too
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
         keep = _seen_within(feed, name, "odometry", stamps, odometry.stamps, topics.odometry)
