@@ -34,12 +34,16 @@ def remaining_frames(cuts: Sequence[Cut], frames: int) -> Ints:
 def thinned(frames: Ints, stamps: Ints, rate_hz: float | None) -> Ints:
     """The first of some frames in each period of 1 / `rate_hz` seconds, by the `stamps` (ns) of all; None: all.
 
-    A tenth of a period early is on time, since clocks jitter.
+    A tenth of a period early is on time, since clocks jitter. Where a clock was set back, periods begin again.
     """
-    if rate_hz is None:
+    if rate_hz is None or not len(frames):
         return frames
-    periods = np.floor((stamps[frames] - stamps[frames[:1]]) * (rate_hz / 1e9) + 0.1)
-    return frames[np.unique(periods, return_index=True)[1]]
+    at = stamps[frames]
+    begun = np.append(True, np.diff(at) <= 0)
+    since = at - at[begun][np.cumsum(begun) - 1]
+    periods = np.floor(since * (rate_hz / 1e9) + 0.1)
+    first: Bools = begun | np.append(True, np.diff(periods) > 0)
+    return frames[first]
 
 
 def crossed(cuts: Sequence[Cut], frames: Ints) -> Bools:

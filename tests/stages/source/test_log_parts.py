@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.source.cuts import thinned
 from omninav.stages.source.log_parts import frozen_steps, odometry_scale, truth_excursion
 
 AHEAD = np.column_stack([np.arange(20) * 0.2, np.zeros(20), np.zeros(20)])
@@ -17,6 +18,14 @@ def moved(first: int, end: int, *by: float) -> np.ndarray:
     """The poses of some images somewhere else."""
     rows = np.arange(20)
     return AHEAD + ((rows >= first) & (rows < end))[:, None] * np.array(by)
+
+
+@pytest.mark.parametrize("back_s", [15, 100])
+def test_a_rate_counts_anew_where_a_clock_was_set_back(back_s: int) -> None:
+    seconds = np.arange(400) / 10 - back_s * (np.arange(400) >= 200)
+    stamps = np.round(seconds * 1e9).astype(np.int64) + 10**12
+    assert thinned(np.arange(400), stamps, 2.0).tolist() == list(range(0, 400, 5))
+    assert not len(thinned(np.arange(0), stamps, 2.0))
 
 
 def test_odometry_that_stops_while_the_robot_goes_on_is_counted() -> None:
