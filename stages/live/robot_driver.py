@@ -127,7 +127,7 @@ class RobotDriver(Publisher, Stage):
         stamp = tick.stamp + self._offset + round(leaps * 1e9)
         self._publish(robot, tick.stamp, stamp - tick.stamp, odometry, motion, scan)
         if image is not None and not any(stop.at <= seconds < stop.at + stop.seconds for stop in self.camera_stops):
-            self._publish_image(stamp, image)
+            self._publish_image(stamp + camera.delay_ns, image)  # as late as its reader takes it to be
         self._note(ctx, seconds)
         robot.stamp, robot.odometry = tick.stamp, np.array([odometry.x, odometry.y, odometry.heading])
         self._wait(ctx, robot, seconds + period - 1.5 * self._worked, tick.stamp)

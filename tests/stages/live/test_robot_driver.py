@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +27,8 @@ SCAN = Scan(np.array([1.0, 2.0, np.inf]), -1.0, 1.0, 0.0, 5.0)
 class Drive:
     """A driver that is given ticks five times a second, and goes 0.1 m ahead in each."""
 
-    def __init__(self, **parameters) -> None:
+    def __init__(self, camera=CAMERA, **parameters) -> None:
+        self.camera = camera
         self.stage = RobotDriver(**{"real_time": False, **parameters})
         self.state, self.ctx, self.ticks = RobotDriverState(), Context("driver"), 0
         self.stage.setup(self.ctx)
@@ -36,7 +38,7 @@ class Drive:
         tick = Tick(number, 10**18 + number * 200_000_000, frame=number, first_of_log=number == 0)
         ahead = Pose(0.1 * number, 0.0, 0.0)
         motion = Motion(0.1, 0.0, 0.0) if number else None
-        return self.stage.step(self.ctx, self.state, tick, CAMERA, ahead, IMAGE, motion, SCAN)
+        return self.stage.step(self.ctx, self.state, tick, self.camera, ahead, IMAGE, motion, SCAN)
 
 
 def stamp_of(message):
@@ -87,6 +89,13 @@ def test_the_camera_fails_and_the_clock_leaps_when_they_are_told_to(wire):
     assert np.diff(stamps).tolist() == [200_000_000] * 4 + [-300_000_000, 200_000_000]
     shown = [stamp_of(message) for message in wire.on("/camera/image/compressed")]
     assert shown == [stamp for number, stamp in enumerate(stamps) if number not in (2, 3)]
+
+
+def test_images_are_stamped_as_late_as_the_camera_is_described(wire):
+    drive = Drive(camera=replace(CAMERA, delay=0.25))
+    taken = [drive.tick().tick.stamp for _ in range(3)]
+    for topic in ("/camera/image/compressed", "/camera/camera_info"):
+        assert [stamp_of(message) - 250_000_000 for message in wire.on(topic)] == taken
 
 
 def test_the_camera_is_described_in_a_file(wire, tmp_path):
