@@ -18,7 +18,7 @@ from .plausibility import (
     silent,
     squares_within,
 )
-from .stamps import TRUTH_MAX_GAP_S, longest_step_s
+from .stamps import TRUTH_MAX_GAP_S, max_step_s
 
 KEPT_S = 30.0
 """Longest time back for which a pose can be asked."""
@@ -103,8 +103,8 @@ class LiveTrack:
         """Tells whether a robot moved unseen between two poses, more than so many seconds and usual intervals apart."""
         if other.stamp - one.stamp <= seconds * 1e9:
             return False
-        longest = longest_step_s(np.array([known.stamp for known in self._known]), seconds, intervals)
-        return bool(silent(np.array([one.stamp, other.stamp]), np.stack([one.pose, other.pose]), longest)[0])
+        apart = max_step_s(np.array([known.stamp for known in self._known]), seconds, intervals)
+        return bool(silent(np.array([one.stamp, other.stamp]), np.stack([one.pose, other.pose]), apart)[0])
 
     def reported(self, pose: Array) -> Array:
         """A pose of the track in the frame of the newest messages that are believed: undoes what was joined."""

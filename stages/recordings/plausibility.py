@@ -116,10 +116,10 @@ def without_jumps(stamps: Stamps, poses: Array, jumps: Ints) -> Array:
     return np.concatenate([poses[:1], compose(poses[0], chain(steps))])
 
 
-def silent(stamps: Stamps, poses: Array, longest_s: float) -> Bools:
-    """Tells between which poses (N, 3) and the next ones, later than `longest_s`, a robot moved unseen: (N - 1,)."""
+def silent(stamps: Stamps, poses: Array, max_s: float) -> Bools:
+    """Tells between which poses (N, 3) and the next ones, later than `max_s`, a robot moved unseen: (N - 1,)."""
     moved = np.abs(between(poses[:-1], poses[1:])).max(axis=1)
-    nothing: Bools = (moved > STOOD) & (np.diff(stamps) > longest_s * 1e9)
+    nothing: Bools = (moved > STOOD) & (np.diff(stamps) > max_s * 1e9)
     return nothing
 
 

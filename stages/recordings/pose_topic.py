@@ -12,7 +12,7 @@ from omninav.stages.geometry.arrays import Array, Ints
 from .messages import TRANSFORMS_TYPES, pose_of
 from .plausibility import SILENCE_S, SILENT_INTERVALS, MotionLimits, believed, silent, without_jumps
 from .recording import UnreadableRecording
-from .stamps import Stamps, longest_step_s
+from .stamps import Stamps, max_step_s
 from .topic_recording import Feed, in_order, require_stamps
 
 MAX_STAMP = 2**63 - 1
@@ -82,7 +82,7 @@ class PoseTopic:
 
     def _with_silences(self, feed: Feed, name: str, stamps: Stamps, poses: Array, gaps: Stamps) -> Stamps:
         """Gaps (G, 2) and the track's silences, which are counted, in their order."""
-        rows = np.flatnonzero(silent(stamps, poses, longest_step_s(stamps, SILENCE_S, SILENT_INTERVALS)))
+        rows = np.flatnonzero(silent(stamps, poses, max_step_s(stamps, SILENCE_S, SILENT_INTERVALS)))
         rows = rows[~np.isin(stamps[rows], gaps[:, 0])]
         silences = np.column_stack([stamps[rows], stamps[rows + 1]])
         for begun, ended in silences:

@@ -19,7 +19,7 @@ LONE_S = 3600.0
 """A record further than this from all others of its kind tells of a broken clock, not of a drive."""
 
 
-def longest_step_s(times: Stamps, seconds: float, intervals: float) -> float:
+def max_step_s(times: Stamps, seconds: float, intervals: float) -> float:
     """Longest time (s) between two poses that is no gap: some seconds, or intervals as they usually are."""
     return max(seconds, intervals * float(np.median(np.diff(times))) / 1e9) if len(times) > 1 else seconds
 

@@ -21,7 +21,7 @@ from .named_camera import named_camera
 from .plausibility import MotionLimits, silent, squares_within
 from .pose_topic import MAX_STAMP, NOWHERE, PoseTopic, PoseTrack, TransformTopic
 from .recording import OpenOptions, Topics, UnreadableRecording
-from .stamps import Stamps, longest_step_s, poses_at, within
+from .stamps import Stamps, max_step_s, poses_at, within
 from .static_transforms import TF_STATIC, StaticTransforms
 from .topic_recording import Feed, TopicRecording, in_order, message_of, require_stamps
 
@@ -112,8 +112,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     true = None
     if truth is not None:
         kind = "no_position" if odometry is None else "no_truth"
-        longest = longest_step_s(truth.stamps, 2.0 * options.truth_max_gap_s, 2.0)
-        true = _true_poses(feed, f"{name}: {topics.truth}", stamps, keep, truth, longest, kind)
+        apart = max_step_s(truth.stamps, 2.0 * options.truth_max_gap_s, 2.0)
+        true = _true_poses(feed, f"{name}: {topics.truth}", stamps, keep, truth, apart, kind)
         keep &= (odometry is not None) | np.isfinite(true[:, 0])
         true = true[keep]
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
@@ -308,11 +308,11 @@ def _seen_within(feed: Feed, name: str, role: str, stamps: Stamps, times: Stamps
 
 
 def _true_poses(
-    feed: Feed, where: str, stamps: Stamps, keep: Bools, truth: PoseTrack, longest_s: float, kind: str
+    feed: Feed, where: str, stamps: Stamps, keep: Bools, truth: PoseTrack, max_s: float, kind: str
 ) -> Array:
     """True poses (N, 3) at images; NaN, and where they are to be kept counted as a `kind`, over silences and jumps."""
     poses, times = poses_at(truth.stamps, truth.poses, stamps), truth.stamps
-    torn = np.append(silent(times, truth.poses, longest_s) | np.isin(times[:-1], truth.gaps[:, 0]), False)
+    torn = np.append(silent(times, truth.poses, max_s) | np.isin(times[:-1], truth.gaps[:, 0]), False)
     unknown = torn[np.searchsorted(times, stamps) - 1] & ~np.isin(stamps, times)
     poses[unknown] = np.nan
     for stamp in stamps[unknown & keep]:
