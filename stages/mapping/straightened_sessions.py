@@ -78,6 +78,10 @@ class StraightenSessions(Stage):
         drives = sessions.drives
         own = compose(sessions.believed[0], sessions.by_odometry)
         start, joined = placed_drives(own, drives, closures, MIN_GAP * unit)
+        usable = joined[drives[closures.pairs]].all(axis=1)
+        closures = Closures(closures.pairs[usable], closures.turns[usable])
+        if not len(closures.pairs):
+            return self._as_it_is(ctx, sessions, updates, last)
         poses, weights = straightened_drives(start, drives, closures, *closure_sigmas(unit), sessions.motions)
         kept = int((weights >= MIN_WEIGHT).sum())
         if not kept:

@@ -66,7 +66,7 @@ class ViewComparison(Stage):
     ) -> Out:
         source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
-        rows = self._chosen(ticks, features, descriptor)
+        rows = self._chosen(ticks, features, descriptor, poses)
         seen = [each for row in rows if (each := features[row]) is not None]
         wholes = [whole for row in rows if (whole := descriptor[row]) is not None]
         taken = pose_rows([poses[row] if row < len(poses) else None for row in rows])
@@ -109,11 +109,16 @@ class ViewComparison(Stage):
         ticks: Sequence[Tick],
         features: Sequence[LocalFeatures | None],
         descriptors: Sequence[GlobalDescriptor | None],
+        poses: Sequence[Pose | None],
     ) -> list[int]:
-        """The images that take part: no two of a tour closer together than `every_s`, with a tolerance of a tenth."""
+        """The images that take part: no two of a tour closer together than `every_s`, with a tolerance of a tenth.
+
+        Where poses are known, those without one are passed over.
+        """
         chosen: list[int] = []
+        known = any(pose is not None for pose in poses)
         for row, tick in enumerate(ticks):
-            if features[row] is None or descriptors[row] is None:
+            if features[row] is None or descriptors[row] is None or (known and poses[row] is None):
                 continue
             last = ticks[chosen[-1]] if chosen else None
             if last is None or last.log != tick.log or tick.stamp - last.stamp >= 0.9e9 * self.every_s:
