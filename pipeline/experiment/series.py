@@ -58,7 +58,8 @@ def aggregated(
     series: Sequence[float | None], aggregate: Aggregate, window: tuple[float, float] = (0.0, 1.0)
 ) -> float | None:
     """One value of a series. Entries that are None are left out; None where too few are there."""
-    first, last = int(np.floor(window[0] * len(series))), int(np.ceil(window[1] * len(series)))
+    starts, ends = (round(share * len(series), 9) for share in window)  # 0.07 of 100 is above 7 by rounding
+    first, last = int(np.floor(starts)), int(np.ceil(ends))
     places = [place for place in range(first, last) if series[place] is not None]
     values = np.array([series[place] for place in places], dtype=np.float64)
     needed = 2 if aggregate in ("change", "ratio", "slope", "largest_rise") else 1

@@ -54,6 +54,11 @@ def test_an_entry_that_lies_partly_in_the_window_counts():
     assert aggregated(series, "mean") == pytest.approx(6.2)
 
 
+def test_a_window_that_ends_between_two_entries_is_exact():
+    assert aggregated(range(100), "last", (0.0, 0.07)) == 6.0
+    assert aggregated(range(100), "first", (0.29, 1.0)) == 29.0
+
+
 def test_one_entry_is_enough_where_nothing_is_compared():
     assert [aggregated([None, 7.0], take) for take in ("mean", "max", "first", "last")] == [7.0] * 4
     assert aggregated([3.0, None, 7.0], "change") == 4.0
