@@ -29,7 +29,7 @@ Five centimetres and two degrees are about what two good drives along one path d
 is 0.5 m wide and passes doors of 1 m; 1 % is one step in a hundred.
 """
 MARGIN_SHARE = 0.05
-"""The same of times, counts and sizes: a share of the other side."""
+"""The same of times, counts, sizes and ratios: a share of the other side."""
 Labels = dict[str, str]
 """A condition's label in each factor, or in some of them: `{filter: median, data: first}`."""
 

@@ -11,7 +11,7 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.report.metrics import metric_values
 
 from .intervals import MIN_GROUPS, Array, bootstrap_interval, share_interval
-from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, value_of
+from .specification import MARGIN_SHARE, Claim, Experiment, Labels, Measure, Side, comparison_of, value_of
 
 Repetition = tuple[str, int]
 """Scenario ('' where there is none) and seed."""
@@ -158,7 +158,9 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     if not ours or limit is None or (theirs is not None and sum(theirs.values()) == 0.0):
         return Case(where, None if ratio else _mean(measure, ours), limit, against, None, None, None)
     found = over_runs(measure, ours.values()) / (over_runs(measure, theirs.values()) if theirs is not None else 1.0)
-    margin, scenarios = measure.margin_beside(limit), _scenarios(ours)
+    # A ratio has no unit, so the margin of its measure's says nothing of it.
+    margin = MARGIN_SHARE * abs(limit) if ratio else measure.margin_beside(limit)
+    scenarios = _scenarios(ours)
     interval = kept = None
     if measure.over_runs != "mean":
         kept = sum(_keeps(side, value - limit, margin) for value in ours.values())

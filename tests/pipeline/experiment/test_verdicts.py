@@ -14,11 +14,13 @@ def held(claim: dict[str, object], seeds: int = 1, **errors: list[float]) -> boo
     return judged(claim, seeds, **errors).holds
 
 
-def judged(claim: dict[str, object], seeds: int = 1, over_runs: str = "mean", **errors: list[float]) -> Verdict:
+def judged(
+    claim: dict[str, object], seeds: int = 1, over_runs: str = "mean", title: str = "Error", **errors: list[float]
+) -> Verdict:
     """The verdict on it. An error of NaN is one that a repetition does not have."""
     claimed = experiment(
         sweep={"method": dict.fromkeys(errors, "")},
-        measures={"error": {"title": "Error", "path": ["error"], "over_runs": over_runs}},
+        measures={"error": {"title": title, "path": ["error"], "over_runs": over_runs}},
         published={"error": {"a": 10.0}},
         claims={"key": {"statement": "it holds", "measure": "error", "of": {"method": "a"}, **claim}},
     )
@@ -114,6 +116,12 @@ def test_a_margin_is_what_matters_to_a_robot_and_not_a_share_of_the_other_side()
     margins = {title: Measure(title, ()).margin_beside(15.0) for title in TITLES}
     assert margins == TITLES
     assert Measure("Growth per lap (cm)", (), margin=1.0).margin_beside(15.0) == 1.0
+
+
+@pytest.mark.parametrize(("times", "holds"), [(1.04, True), (3.0, False)])
+def test_the_margin_of_a_ratio_is_a_share_of_its_limit_whatever_the_unit(times: float, holds: bool):
+    claim = {"ratio_to": {"method": "b"}, "not_above": 1.0}
+    assert judged(claim, title="Error (cm)", a=[times * each for each in FAR], b=FAR).holds is holds
 
 
 def test_seeds_do_not_stand_for_scenarios():
