@@ -26,13 +26,13 @@ def generate_and_select(first: npt.ArrayLike, second: npt.ArrayLike, threshold: 
     first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
     if len(first) < MIN_PAIRS:
         return None
-    chosen, best, found = np.arange(len(first)), math.inf, np.zeros((3, 3))
+    outlierness, best, found = np.zeros(len(first)), math.inf, np.zeros((3, 3))
     for share in np.linspace(1.0, MIN_SHARE, ROUNDS):
+        chosen = np.argsort(outlierness, kind="stable")[: max(MIN_PAIRS, round(share * len(first)))]
         matrix, quality = eight_points(first[chosen], second[chosen])
         if quality < best:
             best, found = float(quality), matrix
         outlierness = angular_residuals(matrix, first, second)
-        chosen = np.argsort(outlierness, kind="stable")[: max(MIN_PAIRS, round(share * len(first)))]
     rotations, translations = decompose(found)
     close = angular_residuals(found, first, second) <= threshold
     k = int(np.argmax(in_front((rotations, translations), first[close], second[close])))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.two_views.epipolar import shared_residuals
+from omninav.stages.geometry.arrays import Array
+from omninav.stages.geometry.two_views.epipolar import eight_points, shared_residuals
 from omninav.stages.homing.generate_and_select import generate_and_select
 from omninav.stages.homing.two_view_pose import TwoViewPose
 from omninav.stages.metrics.two_view_errors import TwoViewErrors
@@ -74,6 +75,22 @@ def test_generate_and_select_solves_eight_pairs_and_no_fewer() -> None:
     pairs = problems(problems=1)[0].pairs
     found = [generate_and_select(pairs.first[:n], pairs.second[:n], math.radians(1.0)) for n in (7, 8)]
     assert [each is None for each in found] == [True, False]
+
+
+def test_generate_and_select_begins_with_all_pairs_and_ends_with_the_smallest_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sizes: list[int] = []
+
+    def counted(first: Array, second: Array) -> tuple[Array, Array]:
+        sizes.append(len(first))
+        return eight_points(first, second)
+
+    monkeypatch.setattr("omninav.stages.homing.generate_and_select.eight_points", counted)
+    pairs = problems(problems=1)[0].pairs
+    generate_and_select(pairs.first, pairs.second, math.radians(1.0))
+    total = len(pairs.first)
+    assert (sizes[0], sizes[-1], len(set(sizes))) == (total, round(0.3 * total), 20)
 
 
 def test_too_few_pairs_are_counted() -> None:
