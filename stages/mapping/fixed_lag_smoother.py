@@ -150,7 +150,8 @@ def remember(update: MapUpdate, model: UncertainMotion | None, path: FixedLagSmo
     if model is None:
         path.past, path.motions, path.jumps = [update], [], []
         return
-    path.past, path.motions = [*path.past, update][-max_views - 1 :], [*path.motions, model][-max_views:]
+    path.past, motions = [*path.past, update][-max_views - 1 :], [*path.motions, model]
+    path.motions = motions[len(motions) - len(path.past) + 1 :]
     path.jumps = [jump for jump in path.jumps if jump[0] >= path.past[0].index]
 
 

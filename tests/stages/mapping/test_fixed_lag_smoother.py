@@ -131,6 +131,9 @@ def test_a_path_begins_anew_without_odometry_and_holds_so_many_views() -> None:
     assert (len(drive.path.past), len(drive.path.motions)) == (4, 3)
     assert drive.to(at(6.0), moved=False).open_from == 6
     assert (len(drive.path.past), len(drive.path.motions), drive.path.jumps) == (1, 0, [])
+    alone = Straight(max_views=0)
+    assert [alone.to(at(x)).open_from for x in range(3)] == [0, 1, 2]
+    assert (len(alone.path.past), len(alone.path.motions)) == (1, 0)
     jumping = Straight(max_views=2)
     for x, y, by in ((0, 0.0, 0), (1, 5.0, 3), (2, 5.0, 3), (3, 5.0, 3)):
         jumping.to(at(x, y), (by,))
