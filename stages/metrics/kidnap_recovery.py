@@ -29,8 +29,8 @@ class KidnapRecovery(MetricStage):
     """Measures the time from each kidnapping of the robot until the estimate is right again, in the last log.
 
     The robot was kidnapped between two frames where its true motion is not that of odometry: it was turned, or put down
-    elsewhere. The estimate is right where position and heading errors stay below 1 m and 20 degrees for ten frames (as
-    under `converged_after_frames`).
+    elsewhere; what happens in a gap of the truth is not seen. The estimate is right where position and heading errors
+    stay below 1 m and 20 degrees for ten frames (as under `converged_after_frames`).
 
     Under `lifts`: `number`; `never`, after how many the estimate was not right before the next one or the end; lists
     with an entry for each: `step`, and `seconds` until the estimate was right, or until the next one or the end where
@@ -39,21 +39,21 @@ class KidnapRecovery(MetricStage):
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         log = drive.last_log
-        log = log.at(known(log.truth) & known(log.estimate))
-        if not len(log):
+        lifted, scored = kidnapped_rows(log, JUMP_M, JUMP_DEG), np.flatnonzero(known(log.truth) & known(log.estimate))
+        if not len(lifted) or not len(scored):
             return self.Out()
-        starts = kidnapped_rows(log, JUMP_M, JUMP_DEG).tolist()
-        if not starts:
-            return self.Out()
-        metres, degrees = position_errors(log.estimate, log.truth), heading_errors_deg(log.estimate, log.truth)
-        parts = list(itertools.pairwise([*starts, len(log)]))
+        poses, truth = log.estimate[scored], log.truth[scored]
+        metres, degrees = position_errors(poses, truth), heading_errors_deg(poses, truth)
+        starts = np.searchsorted(scored, lifted)
+        parts = itertools.pairwise([*starts, len(scored)])
         found = [first_settled(metres[first:end], degrees[first:end]) for first, end in parts]
-        until = [end - 1 if rows is None else first + rows for (first, end), rows in zip(parts, found, strict=True)]
+        ends = zip(starts, found, [*lifted[1:] - 1, scored[-1]], strict=True)
+        until = np.maximum([end if row is None else scored[start + row] for start, row, end in ends], lifted)
         values = {
-            "number": len(starts),
+            "number": len(lifted),
             "never": found.count(None),
-            "step": log.frames[starts].tolist(),
-            "seconds": (log.seconds[until] - log.seconds[starts]).tolist(),
+            "step": log.frames[lifted].tolist(),
+            "seconds": (log.seconds[until] - log.seconds[lifted]).tolist(),
         }
         return self.Out(metrics=Metrics({"lifts": values}, SPECS))
 

@@ -75,6 +75,16 @@ def test_odometry_of_another_unit_is_no_lift():
     assert "kidnapped_at" not in figures(SuccessRate(), drive)["success"]
 
 
+def test_a_gap_of_truth_or_estimate_is_no_lift_and_a_lift_while_the_estimate_is_silent_is_one():
+    drive = lifted_drive(0)
+    drive.truth[25:29] = drive.estimate[3:7] = np.nan
+    assert lifts(drive) == {"number": 1, "never": 0, "step": [12], "seconds": [0.0]}
+    drive.estimate[10:15] = np.nan
+    assert lifts(drive) == {"number": 1, "never": 0, "step": [12], "seconds": [6.0]}
+    drive.estimate[12:] = np.nan
+    assert lifts(drive) == {"number": 1, "never": 1, "step": [12], "seconds": [0.0]}
+
+
 def test_frames_without_truth_or_estimate_do_not_count_and_one_frame_alone_has_no_lift():
     drive = lifted_drive(5)
     drive.estimate[38] = np.nan
