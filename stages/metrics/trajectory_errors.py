@@ -11,6 +11,7 @@ from omninav.stages.geometry.plane.pose_errors import first_settled, heading_err
 from omninav.stages.geometry.plane.se2 import path_length
 from omninav.stages.values.drive import Drive, known
 
+from .kidnap_recovery import JUMP_M, kidnapped_rows
 from .truth_misfit import truth_misfit
 
 HEADLINES = (
@@ -42,12 +43,13 @@ def specs(lost_m: float) -> dict[str, MetricSpec]:
 class TrajectoryErrors(MetricStage):
     """Measures the errors of the estimate against ground truth, with those of odometry alone and of the belief's mean.
 
-    Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean,
-    standard deviation `std`, median, p90, max); `loss_rate`, the share of frames in which the robot was lost;
-    `converged_after_frames`, how many frames went by before the error stayed below 1 m and 20 degrees for ten frames
-    (None if it never did); the errors and loss rate again under `after_convergence`. `odometry_alone` starts at the
-    first true pose, and states how far off it ended. The top level is the last log, and `logs` has one entry per log
-    where there are several. Frames without truth or without estimate are left out and counted.
+    Per log: `frames`; `driven_m`, the length of the true path, where nobody carried the robot; `position_error_m` and
+    `heading_error_deg` (mean, standard deviation `std`, median, p90, max); `loss_rate`, the share of frames in which
+    the robot was lost; `converged_after_frames`, how many frames went by before the error stayed below 1 m and 20
+    degrees for ten frames (None if it never did); the errors and loss rate again under `after_convergence`.
+    `odometry_alone` starts at the first true pose, and states how far off it ended. The top level is the last log, and
+    `logs` has one entry per log where there are several. Frames without truth or without estimate are left out and
+    counted.
     Warns of a truth that fits the estimates of a sure robot only once it is changed.
     """
 
@@ -79,8 +81,9 @@ def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) 
     if not drive.has_truth:
         return result
     scored = known(drive.truth) & known(drive.estimate)
-    true = drive.truth[known(drive.truth)]
-    result["driven_m"] = path_length(true)
+    carried = kidnapped_rows(drive, JUMP_M)
+    jumps = drive.truth[carried] - drive.truth[carried - 1]
+    result["driven_m"] = path_length(drive.truth[known(drive.truth)]) - float(np.hypot(jumps[:, 0], jumps[:, 1]).sum())
     result["frames_without_truth"] = int((~known(drive.truth)).sum())
     result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
     if not scored.any():

@@ -106,6 +106,11 @@ def test_the_way_is_that_of_the_true_path_in_the_plane():
     assert measured(off_by(*[0.0] * 4, truth=[AT_ORIGIN, None, (3, 4, 2.0), (3, 4, -1.0)]))["driven_m"] == 5.0
 
 
+def test_where_the_robot_was_carried_it_did_not_drive():
+    driven = off_by(*range(20), truth=on_x([*range(10), *range(30, 40)]), motion=[None, *[(1.0, 0.0, 0.0)] * 19])
+    assert measured(driven)["driven_m"] == 18.0
+
+
 def test_where_nothing_was_estimated_only_the_drive_is_told():
     found = measured(off_by(None, None, None, truth=on_x(range(3))))
     assert found == {"frames": 3, "driven_m": 2.0, "frames_without_truth": 0, "frames_without_estimate": 3}
