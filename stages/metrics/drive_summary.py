@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
+from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.drive import Drive
 
 MIN_SPEED = 0.03
@@ -28,7 +29,7 @@ class DriveSummary(MetricStage):
     """
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
-        values: dict[str, Any] = {"duration_s": float(drive.seconds[-1]) if len(drive) else 0.0}
+        values: dict[str, Any] = {"duration_s": float(seconds_apart(drive).sum())}
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         if len(tallied):
             last = tallied[-1]
@@ -42,8 +43,17 @@ class DriveSummary(MetricStage):
         return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, SPECS, headlines))
 
 
+def seconds_apart(drive: Drive) -> Array:
+    """Time (s) from each tick to the next; 0 from the end of a log to the start of another."""
+    return np.asarray(np.diff(drive.seconds) * (np.diff(drive.log) == 0))
+
+
 def stopped_share(drive: Drive) -> float | None:
-    """Share of the ticks from the first move to the last slower than `MIN_SPEED` by odometry; None: no move."""
-    speeds = np.hypot(drive.motion[1:, 0], drive.motion[1:, 1]) / np.maximum(np.diff(drive.seconds), 1e-9)
+    """Share of the time from the first move to the last slower than `MIN_SPEED` by odometry; None: no move."""
+    apart = np.maximum(seconds_apart(drive), 1e-9)
+    speeds = np.hypot(drive.motion[1:, 0], drive.motion[1:, 1]) / apart
     moves = np.flatnonzero(speeds >= MIN_SPEED)
-    return float((speeds[moves[0] : moves[-1] + 1] < MIN_SPEED).mean()) if len(moves) else None
+    if not len(moves):
+        return None
+    driven = slice(moves[0], moves[-1] + 1)
+    return float(np.average(speeds[driven] < MIN_SPEED, weights=apart[driven]))

@@ -28,4 +28,14 @@ def test_a_robot_has_stopped_where_it_makes_no_way_between_its_first_move_and_it
     motion = [None, *zip(ahead, aside, [0.1] * 9, strict=True)]
     drive = made_drive([None] * 10, motion=motion)
     drive.stamps[:] = [int(10**9 * at) for at in seconds]
-    assert figures(DriveSummary(), drive)["drive"]["stopped_share"] == pytest.approx(4 / 7)
+    assert figures(DriveSummary(), drive)["drive"]["stopped_share"] == pytest.approx(1.5 / 3.0)
+
+
+def test_ticks_that_come_less_often_while_it_stands_weigh_their_time_and_a_pause_between_logs_none():
+    drive = made_drive([None] * 8, motion=[None, *[(0.5, 0.0, 0.0)] * 3, (0.0, 0.0, 0.0), *[(0.5, 0.0, 0.0)] * 3])
+    drive.stamps[:] = [10**9 * at for at in (0, 1, 2, 3, 13, 14, 15, 16)]
+    assert figures(DriveSummary(), drive)["drive"]["stopped_share"] == 10.0 / 16.0
+    later, earlier = (made_drive([None] * 4, logs=[0, 0, 1, 1]) for _ in range(2))
+    later.stamps[2:] += 86_400 * 10**9
+    earlier.stamps[2:] -= 86_400 * 10**9
+    assert [figures(DriveSummary(), each)["drive"]["duration_s"] for each in (later, earlier)] == [2.0, 2.0]
