@@ -33,9 +33,10 @@ class LocalisedShare(MetricStage):
     Of the last log. `localised`: the share of frames, one without an estimate among them, within 0.25 m and 2 degrees
     (`fine`), 0.5 m and 5 degrees (`medium`), 5 m and 10 degrees (`coarse`), as the benchmarks of visual localisation
     count (Sattler et al. 2018, "Benchmarking 6DOF outdoor visual localization in changing conditions", section 5).
-    `relocalisation`: `times_lost`, how often the position error rose above `lost_m`, a global start included;
-    `frames` and `metres` of true path, the medians, until it stayed below 1 m (`lost_m` where that is less) and 20
-    degrees for ten frames; `never`: how often it did not until the end. Gives nothing without ground truth.
+    `relocalisation`: `times_lost`, how often the position error rose above `lost_m` or there was no estimate, a global
+    start included; `frames` and `metres` of true path, the medians, until it stayed below 1 m (`lost_m` where that is
+    less) and 20 degrees for ten frames; `never`: how often it did not until the end. Gives nothing without ground
+    truth.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
@@ -43,15 +44,12 @@ class LocalisedShare(MetricStage):
 
     def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         last = drive.last_log
-        placed = int(known(last.truth).sum())  # an image without an estimate is in no share
-        if not placed:
-            return self.Out()
-        last = last.at(known(last.truth) & known(last.estimate))
+        last = last.at(known(last.truth))
         if not len(last):
-            return self.Out(metrics=Metrics({"localised": dict.fromkeys(THRESHOLDS, 0.0)}, SPECS))
+            return self.Out()
         metres, degrees = position_errors(last.estimate, last.truth), heading_errors_deg(last.estimate, last.truth)
-        within = {name: int(((metres <= m) & (degrees <= d)).sum()) for name, (m, d) in THRESHOLDS.items()}
-        shares = {name: number / placed for name, number in within.items()}
+        metres[~known(last.estimate)] = np.inf
+        shares = {name: float(((metres <= m) & (degrees <= d)).mean()) for name, (m, d) in THRESHOLDS.items()}
         found = relocalisations(metres, degrees, last.truth, self.lost_m)
         return self.Out(metrics=Metrics({"localised": shares, "relocalisation": found}, SPECS))
 

@@ -65,13 +65,23 @@ def test_trajectory_error_without_alignment_keeps_what_alignment_takes_away():
     assert found["absolute_trajectory_error_m"]["rmse"] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("wrong", [0, 5, 20])
+def test_a_robot_that_is_lost_in_silence_is_as_lost_as_with_a_wrong_estimate(wrong: int):
+    drive = driven([0.1] * 3 + [9.0] * wrong + [0.1] * (32 - wrong))
+    drive.estimate[3 + wrong : 23] = np.nan
+    found = figures(LocalisedShare(), drive)["relocalisation"]
+    assert found == {"times_lost": 1, "frames": 20.0, "metres": 10.0, "never": 0}
+
+
 def test_frames_without_truth_do_not_count_and_those_without_an_estimate_are_in_no_share():
     drive = driven([0.1, 9.0, 9.0, 0.1, 0.1])
     drive.truth[1] = np.nan
     drive.estimate[2] = np.nan
     found = figures(LocalisedShare(), drive)
-    assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (0.75, 0)
+    assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (0.75, 1)
     drive.estimate[:] = np.nan
-    assert figures(LocalisedShare(), drive) == {"localised": {"fine": 0.0, "medium": 0.0, "coarse": 0.0}}
+    found = figures(LocalisedShare(), drive)
+    assert found["localised"] == {"fine": 0.0, "medium": 0.0, "coarse": 0.0}
+    assert found["relocalisation"] == {"times_lost": 1, "frames": None, "metres": None, "never": 1}
     drive.truth[:] = np.nan
     assert figures(LocalisedShare(), drive) is None
