@@ -12,6 +12,8 @@ TRIED = 500
 """Most images whose estimates are each tried as the one that is right."""
 FITS = 2.0
 """Most distance, over the median, of an estimate that counts in the last fit."""
+SPREAD = 10.0
+"""Least extent of the true positions, over the median distance, for which they and not the headings give the turn."""
 
 
 def in_map_frame(truth: Array, estimate: Array) -> Array:
@@ -19,7 +21,7 @@ def in_map_frame(truth: Array, estimate: Array) -> Array:
 
     Each estimate in turn proposes the motion for which it is exact. The one with the least median distance is refined
     by least squares over the estimates near it (inliers), so that a robot that is lost for less than half of the time
-    does not change it. Rows of NaN stay NaN.
+    does not change it; its turn is that of the headings where the robot hardly moves. Rows of NaN stay NaN.
     """
     known = np.isfinite(truth[:, 0]) & np.isfinite(estimate[:, 0])
     if not known.any():
@@ -34,7 +36,10 @@ def in_map_frame(truth: Array, estimate: Array) -> Array:
         if distance < least:
             best, least = motion, distance
     near = position_errors(compose(best, there), believed) <= FITS * least
-    if near.sum() > 1 and np.ptp(there[near, :2], axis=0).max() > 0.0:
-        rotation, shift = align(there[near, :2], believed[near, :2])
-        best = np.array([*shift, np.arctan2(rotation[1, 0], rotation[0, 0])])
-    return compose(best, truth)
+    there, believed = there[near], believed[near]
+    turn = np.angle(np.exp(1j * (believed[:, 2] - there[:, 2])).sum())
+    if np.ptp(there[:, :2], axis=0).max() > SPREAD * least:
+        rotation, _ = align(there[:, :2], believed[:, :2])
+        turn = np.arctan2(rotation[1, 0], rotation[0, 0])
+    shift = (believed - compose([0.0, 0.0, turn], there))[:, :2].mean(axis=0)
+    return compose([*shift, turn], truth)

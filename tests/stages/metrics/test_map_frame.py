@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.metrics.map_frame import in_map_frame
 
@@ -24,6 +25,15 @@ def test_true_poses_are_moved_to_where_most_estimates_are(lost: int) -> None:
 def test_a_robot_that_stands_is_moved_with_its_heading() -> None:
     truth = np.tile([1.0, 2.0, 0.5], (5, 1))
     assert in_map_frame(truth, compose(MOTION, truth)) == pytest.approx(compose(MOTION, truth))
+
+
+@pytest.mark.parametrize("metres", [0.0, 0.05])
+def test_the_headings_of_a_robot_that_hardly_moves_say_how_its_frame_is_turned(metres: float) -> None:
+    rng = np.random.default_rng(0)
+    truth = np.column_stack([np.linspace(0.0, metres, 100), np.zeros(100), np.linspace(0.0, 6.0, 100)])
+    right, noise = compose(MOTION, truth), rng.normal(0.0, 1.0, (100, 3)) * [0.02, 0.02, 0.02]
+    moved = in_map_frame(truth + rng.normal(0.0, 0.001, (100, 3)), right + noise)
+    assert heading_errors_deg(moved, right).mean() < 0.5
 
 
 def test_without_any_estimate_nothing_is_moved() -> None:
