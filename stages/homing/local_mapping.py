@@ -360,7 +360,7 @@ class LocalMapping(Stage):
         agree = f"{inliers} of {len(first)} matches with the target view agree"
         if found is None or inliers < max(MIN_INLIERS, min_inliers):
             return None, f"{agree}, {MIN_INLIERS} are needed"
-        if false_alarms(found, first, second, threshold) > self.max_false_alarms:
+        if false_alarms(found, first, second, threshold, self.solver) > self.max_false_alarms:
             return None, f"{agree}, as they might by chance"
         places = triangulate(first, second, found.rotation, found.translation)
         wide = parallax(first, second, found.rotation) >= math.radians(MIN_PARALLAX_DEG)

@@ -21,6 +21,8 @@ from .ransac import BATCH, AgreedPose, refined, samples_needed, samples_of
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
 """Pairs of bearings in a sample."""
+POSES: dict[Solver, int] = {"planar": 4, "five_point": 20, "eight_point": 4}
+"""Most poses that a sample gives, both senses of the translation counted."""
 
 
 def relative_pose(
@@ -75,25 +77,27 @@ def relative_pose(
     return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)
 
 
-def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
+def false_alarms(
+    pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float, solver: Solver = "planar"
+) -> float:
     """Expected number of poses that as many pairs agree on among wrong pairs alone: above 1 proves nothing.
 
     How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
-    look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,
-    two solutions and two senses each (Moisan & Stival's a-contrario test, 2004). Infinite below three pairs.
+    look along the horizon, or along the way, that is often. As many poses are tried as there are samples times `POSES`,
+    and a sample's own pairs prove nothing (Moisan & Stival's a-contrario test, 2004). Infinite for fewer than a sample.
     """
     from scipy.special import betainc  # slow to import: not before a run
 
     first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
-    pairs, agreeing = len(first), int(np.count_nonzero(pose.inliers))
-    if pairs < 3 or agreeing < 3:
-        return math.inf
+    pairs, others = len(first), int(np.count_nonzero(pose.inliers)) - SAMPLE[solver]
+    poses = float(POSES[solver] * math.comb(pairs, SAMPLE[solver]))
+    if others < 1:
+        return poses or math.inf
     limit, shifts = math.sin(threshold) ** 2, min(pairs, 40)
     agreeing_by_chance = _agreeing_shifted(pose.rotation, pose.translation, first, second, limit, shifts)
     chance = agreeing_by_chance / (pairs * (shifts - 1))
     # At least this many of the other pairs: the tail of a binomial distribution.
-    tail = float(betainc(agreeing - 2, pairs - agreeing + 1, max(chance, 1e-6)))
-    return 2.0 * pairs * (pairs - 1) * tail
+    return poses * float(betainc(others, pairs - SAMPLE[solver] - others + 1, max(chance, 1e-6)))
 
 
 def _candidates(solver: Solver, first: Array, second: Array, samples: Ints) -> tuple[Array, Array, Array, Ints]:

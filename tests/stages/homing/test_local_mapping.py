@@ -518,6 +518,17 @@ def test_a_lost_target_says_why() -> None:
     assert homing.at((4.2, 4.6, 0.4)).state == "tracking"  # as soon as it is matched again
 
 
+def test_seven_matches_prove_the_pose_of_two_points_and_not_that_of_five() -> None:
+    pose = (4.2, 4.6, 0.4)
+    share = 7 / len(matched(described("mirror", pose), described("mirror", TARGET)))
+    assert Homing(solver="planar").at(pose, share=share).state == "new"
+    refused = Homing(solver="five_point").at(pose, share=share)
+    assert (refused.state, refused.why) == (
+        "lost",
+        "7 of 7 matches with the target view agree, as they might by chance",
+    )
+
+
 def test_the_memory_of_a_killed_run_goes_on_to_the_same_vectors() -> None:
     poses, homing, other = drive(6), Homing(), Homing()
     for pose in poses[:3]:

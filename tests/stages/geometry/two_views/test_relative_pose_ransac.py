@@ -124,13 +124,28 @@ def test_poses_that_wrong_pairs_agree_on_are_told_from_true_ones() -> None:
     assert min(by_chance) > 1e-3
 
 
-@pytest.mark.parametrize(("pairs", "agree", "poses"), [(2, 2, math.inf), (3, 3, 12.0), (4, 3, 48.0), (4, 2, math.inf)])
-def test_false_alarms_by_hand(pairs: int, agree: int, poses: float) -> None:
-    # Of 2 n (n - 1) poses, times the chance that n - 2 others, or all but one, agree: 1e-6 each, at least, or surely.
+@pytest.mark.parametrize(
+    ("solver", "pairs", "poses"),
+    [("planar", 3, 12.0), ("planar", 4, 24.0), ("five_point", 7, 420.0), ("eight_point", 9, 36.0)],
+)
+def test_false_alarms_by_hand(solver: Solver, pairs: int, poses: float) -> None:
+    # Each sample's poses, times the chance that one other pair agrees: 1e-6 at least, or surely.
     rotation, translation, first, second = two_views(0, pairs)
-    pose = AgreedPose(rotation, translation, np.arange(pairs) < agree, 0)
-    assert false_alarms(pose, first, second, 1e-4) == pytest.approx(1e-6 * poses, rel=1e-5)
-    bearings = np.tile([0.0, 1.0, 0.0], (pairs, 1))
-    assert false_alarms(pose, bearings, bearings @ rotation, 0.01) == (
-        2.0 * pairs * (pairs - 1) if agree > 2 else math.inf
-    )
+    size, bearings = SAMPLE[solver], np.tile([0.0, 1.0, 0.0], (pairs, 1))
+    pose = AgreedPose(rotation, translation, np.arange(pairs) < size + 1, 0)
+    found = false_alarms(pose, first, second, 1e-9, solver)
+    assert found == pytest.approx(1e-6 * (pairs - size) * poses, rel=1e-5)
+    assert false_alarms(pose, bearings, bearings @ rotation, 0.01, solver) == poses
+    alone = AgreedPose(rotation, translation, np.arange(pairs) < size, 0)
+    assert false_alarms(alone, first, second, 1e-9, solver) == poses
+    assert false_alarms(alone, first[1:size], second[1:size], 1e-9, solver) == math.inf
+
+
+def test_what_five_points_agree_on_by_chance_is_told_from_more() -> None:
+    limit, alarms = math.radians(1.0), []
+    for seed in range(12):
+        _, _, first, second = two_views(seed, 24, wrong=1.0)
+        found = relative_pose(first, second, np.random.default_rng(seed), "five_point", limit, max_samples=1000)
+        assert found is not None
+        alarms.append(false_alarms(found, first, second, limit, "five_point"))
+    assert min(alarms) > 0.1
