@@ -16,29 +16,30 @@ often than 95 % of the times (of five, 94 %; of two, half)."""
 
 
 def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = None) -> tuple[float, float]:
-    """95 % interval of the mean over all values, by resampling groups and then the values in each (always the same).
+    """95 % interval of the mean over all values, by resampling groups with all their values (always the same).
 
-    `groups`: the values (n_g,) of each scenario. With `over`, values of the same shapes: that of the ratio of the two
-    means, resampled in pairs. Equal values, or a single one, give an interval of no width. Of two to five scenarios it
-    is Student's t of their means.
+    `groups`: the values (n_g,) of each scenario; of one, its values are resampled. With `over`, values of the same
+    shapes: that of the ratio of the two means, resampled in pairs. Equal values, or a single one, give an interval of
+    no width. Of two to five scenarios it is Student's t of their means.
 
-    The two-stage bootstrap of hierarchical data (Davison & Hinkley, Bootstrap Methods and their Application, 1997). Its
-    percentiles are expanded (Hesterberg, What Teachers Should Know About the Bootstrap, 2015), because those of a plain
-    one are too narrow where there are few groups: by sqrt((n - 1) / n), and by the normal in place of Student's t.
+    The means of groups vary as their values do already: values that are resampled too count that twice, and 95 % become
+    99 (Davison & Hinkley, Bootstrap Methods and their Application, 1997, section 3.8). The percentiles are expanded
+    (Hesterberg, What Teachers Should Know About the Bootstrap, 2015), because those of a plain bootstrap are too narrow
+    where there are few groups: by sqrt((n - 1) / n), and by the normal in place of Student's t.
     """
     columns = [[group for group in column if len(group)] for column in ((groups,) if over is None else (groups, over))]
     whole = [np.concatenate(column) for column in columns]
     if all(np.ptp(values) == 0.0 for values in whole):
         mean = float(whole[0][0]) if over is None else float(_ratios(whole[0], whole[1])[0])
         return mean, mean
-    counts = [len(group) for group in columns[0]]
-    if over is None and 1 < len(counts) < MIN_GROUPS:
+    if over is None and 1 < len(columns[0]) < MIN_GROUPS:
         return student_interval([float(group.mean()) for group in columns[0]])
-    drawn, there = _draws(counts)
-    sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
-    values = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
-    independent = len(counts) if len(counts) > 1 else counts[0]
-    shares = _expanded(independent)
+    units = columns if len(columns[0]) > 1 else [np.split(values, len(values)) for values in whole]
+    number = len(units[0])
+    drawn = np.random.default_rng(0).integers(number, size=(RESAMPLES, number))
+    sums = [np.array([unit.sum() for unit in column])[drawn].sum(axis=1) for column in units]
+    values = sums[0] / np.array([len(unit) for unit in units[0]])[drawn].sum(axis=1) if over is None else _ratios(*sums)
+    shares = _expanded(number)
     if np.isfinite(values).all():
         low, high = np.quantile(values, shares)
     else:  # between infinite values there is nothing
@@ -65,20 +66,6 @@ def _ratios(of: Array, over: Array) -> Array:
     """Ratios of sums, where nothing over nothing is one and something over nothing infinite."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where((of == 0.0) & (over == 0.0), 1.0, of / over)
-
-
-def _draws(counts: Sequence[int]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """Places in the padded values that each resample draws (RESAMPLES, groups, n), and which of them count."""
-    rng, number, longest = np.random.default_rng(0), len(counts), max(counts)
-    of_group = np.asarray(counts)
-    group = rng.integers(number, size=(RESAMPLES, number))
-    place = (rng.random((RESAMPLES, number, longest)) * of_group[group][..., None]).astype(np.intp)
-    return group[..., None] * longest + place, np.arange(longest) < of_group[group][..., None]
-
-
-def _padded(groups: Sequence[Array]) -> Array:
-    longest = max(len(group) for group in groups)
-    return np.concatenate([np.pad(group, (0, longest - len(group))) for group in groups])
 
 
 def _expanded(independent: int) -> tuple[float, float]:

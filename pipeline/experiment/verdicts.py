@@ -164,7 +164,7 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     interval = kept = None
     if measure.over_runs != "mean":
         kept = sum(_keeps(side, value - limit, margin) for value in ours.values())
-        holds = decided_by_share(kept, ran) if scenarios > 1 else None
+        holds = decided_by_share(kept, ran) if scenarios >= MIN_GROUPS else None  # a scenario's runs are alike
     else:
         low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
         interval = low - limit, high - limit
