@@ -13,6 +13,8 @@ from omninav.stages.values.compared_views import ComparedViews
 
 MIN_GAP = 10
 """Views of one tour between the two of a closure."""
+STANDING_M = 0.01
+"""Largest distance between the poses of two images of a robot that stands (m)."""
 MIN_WEIGHT = 0.1
 """Weight of a closure below which the others have contradicted it."""
 SPECS = {
@@ -42,10 +44,10 @@ class StraightenViews(Stage):
         """Straighten a whole tour, or several."""
         if views.pose_source == "truth" or len(views) < 2:
             return self.Out(views=views)
-        follows = np.flatnonzero(np.diff(views.tours) == 0)
+        ways = np.hypot(*np.diff(views.poses[:, :2], axis=0).T)
+        follows = np.flatnonzero((np.diff(views.tours) == 0) & (ways > STANDING_M))
         found = self._closures(views, views.distances[follows, follows + 1])
-        ways = np.hypot(*(views.poses[follows + 1] - views.poses[follows])[:, :2].T)
-        unit = float(np.median(ways)) if len(ways) else 0.0
+        unit = float(np.median(ways[follows])) if len(follows) else 0.0
         if not len(found.pairs) or not unit:
             ctx.fact(
                 "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"

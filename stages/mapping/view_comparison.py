@@ -17,6 +17,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
     compare,
 )
 from omninav.stages.geometry.arrays import Array, Bools
+from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
@@ -25,6 +26,8 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 from .pose_of_view import Supervised
 
+STANDING = (0.02, math.radians(2.0))
+"""Largest motion (m, rad) between two images of a robot that stands."""
 ORDER_GAP = 1000
 """Gap between the numbers of the last view of a tour and the first of the next: they do not follow each other."""
 
@@ -34,8 +37,8 @@ class ViewComparison(Stage):
 
     Goedemé et al. 2007, section 4.2 (equations 3 and 4; erratum 27 in docs/papers.md): local features are only compared
     where the global colours leave it open. A known map takes part with the features that it keeps of its views. Poses
-    are kept for scoring and drawing only. Raises BadInput where no image shows anything, where `supervised: truth`
-    finds no true pose, or where known and new poses are not of one source.
+    are kept for scoring and drawing only; odometry tells where the robot stood. Raises BadInput where no image shows
+    anything, where `supervised: truth` finds no true pose, or where known and new poses are not of one source.
     """
 
     every_s: Annotated[float, Bounds(ge=0)] = 1.0
@@ -66,7 +69,7 @@ class ViewComparison(Stage):
     ) -> Out:
         source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
-        rows = self._chosen(ticks, features, descriptor, poses)
+        rows = self._chosen(ticks, features, descriptor, poses, odometry)
         seen = [each for row in rows if (each := features[row]) is not None]
         wholes = [whole for row in rows if (whole := descriptor[row]) is not None]
         taken = pose_rows([poses[row] if row < len(poses) else None for row in rows])
@@ -110,19 +113,28 @@ class ViewComparison(Stage):
         features: Sequence[LocalFeatures | None],
         descriptors: Sequence[GlobalDescriptor | None],
         poses: Sequence[Pose | None],
+        odometry: Sequence[Pose | None],
     ) -> list[int]:
         """The images that take part: no two of a tour closer together than `every_s`, with a tolerance of a tenth.
 
-        Where poses are known, those without one are passed over.
+        Where poses are known, those without one are passed over, and by odometry those of a robot that has not moved
+        since: the views between two others stand for the way between them.
         """
         chosen: list[int] = []
         known = any(pose is not None for pose in poses)
+        driven = pose_rows([*odometry, *[None] * (len(ticks) - len(odometry))])
         for row, tick in enumerate(ticks):
             if features[row] is None or descriptors[row] is None or (known and poses[row] is None):
                 continue
             last = ticks[chosen[-1]] if chosen else None
-            if last is None or last.log != tick.log or tick.stamp - last.stamp >= 0.9e9 * self.every_s:
+            if last is None or last.log != tick.log:
                 chosen.append(row)
+            elif tick.stamp - last.stamp >= 0.9e9 * self.every_s:
+                x, y, turn = driven[row] - driven[chosen[-1]]
+                if not (
+                    math.hypot(x, y) < STANDING[0] and abs(wrap_angle(turn)) < STANDING[1]
+                ):  # nor where it is not known
+                    chosen.append(row)
         return chosen
 
     def _pose_source(

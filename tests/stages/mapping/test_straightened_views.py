@@ -55,6 +55,28 @@ def test_a_tour_that_comes_back_to_no_place_stays():
     assert ctx.facts["map_straightened"].startswith("no: ")
 
 
+def test_a_long_stop_does_not_keep_a_tour_from_being_straightened(views):
+    once = bent(views)
+    stop, go = np.zeros(len(views) + 8, np.int64), np.arange(len(views))
+    rows = np.append(stop, go)
+    distances, shares = once.distances[rows][:, rows], once.shares[rows][:, rows]
+    waited = replace(
+        once,
+        features=tuple(once.features[row] for row in rows),
+        descriptors=tuple(once.descriptors[row] for row in rows),
+        poses=once.poses[rows],
+        frames=np.arange(len(rows)),
+        orders=np.arange(len(rows)),
+        tours=once.tours[rows],
+        owners=once.owners[rows],
+        distances=distances,
+        shares=shares,
+    )
+    out, _ = straightened(waited)
+    found = replace(waited, poses=views.poses[rows])
+    assert error(out.views, found) < 0.5 * error(waited, found)
+
+
 def test_views_of_one_spot_and_a_single_view_stay():
     still = mapped(WORLD, [along(SQUARE[:2], 1.5)[:1] * 30], truth=False).views
     assert straightened(still)[0].views is still

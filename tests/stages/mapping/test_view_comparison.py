@@ -75,6 +75,15 @@ def test_images_that_show_nothing_are_passed_over() -> None:
         compared(range(2), features=[None, None])
 
 
+def test_images_of_a_robot_that_stands_are_passed_over_unless_it_turns() -> None:
+    here, turned = POSES[0], replace(POSES[0], heading=POSES[0].heading + 0.1)
+    near = replace(POSES[1], x=POSES[1].x + 0.01)
+    driven = [here, here, turned, POSES[1], near, POSES[2]]
+    assert compared(range(6), odometry=driven, truth=POSES).frames.tolist() == [0, 2, 3, 5]
+    assert compared(range(6), odometry=(), truth=[here] * 6).frames.tolist() == [0, 1, 2, 3, 4, 5]
+    assert compared(range(6), [0, 0, 1, 1, 1, 1], odometry=[here] * 6).frames.tolist() == [0, 2]
+
+
 def test_images_whose_true_pose_is_not_known_are_passed_over() -> None:
     views = compared(range(4), truth=[None, *POSES[1:3], None])
     assert violation(views) is None
