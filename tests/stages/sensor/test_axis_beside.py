@@ -51,9 +51,10 @@ def test_an_axis_where_it_is_described_is_left_there() -> None:
     assert axis.bearings(MIRROR, pixels, described) is described
 
 
-def test_a_small_distance_does_not_count_and_old_images_count_less_than_new_ones() -> None:
+def test_a_small_distance_or_one_image_does_not_count_and_old_images_count_less_than_new_ones() -> None:
     small = (-0.3, 0.3)
-    assert not found(MIRROR, small, images=40)[0].distance().any()
+    assert not found(MIRROR, small, images=200)[0].distance().any()
+    assert not found(MIRROR, images=1, landmarks=30)[0].distance().any()
     assert found(MIRROR, images=200)[0].images == pytest.approx(50.0, rel=0.05)
 
 
