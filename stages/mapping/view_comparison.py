@@ -21,7 +21,7 @@ from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
-from omninav.stages.values.pose import Pose, PoseSource, frame_of
+from omninav.stages.values.pose import AssumedPose, Pose, PoseSource, frame_of
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .pose_of_view import Supervised
@@ -122,7 +122,8 @@ class ViewComparison(Stage):
         """
         chosen: list[int] = []
         known = any(pose is not None for pose in poses)
-        driven = pose_rows([*odometry, *[None] * (len(ticks) - len(odometry))])
+        measured = [None if isinstance(pose, AssumedPose) else pose for pose in odometry]
+        driven = pose_rows([*measured, *[None] * (len(ticks) - len(odometry))])
         for row, tick in enumerate(ticks):
             if features[row] is None or descriptors[row] is None or (known and poses[row] is None):
                 continue
@@ -131,9 +132,8 @@ class ViewComparison(Stage):
                 chosen.append(row)
             elif tick.stamp - last.stamp >= 0.9e9 * self.every_s:
                 x, y, turn = driven[row] - driven[chosen[-1]]
-                if not (
-                    math.hypot(x, y) < STANDING[0] and abs(wrap_angle(turn)) < STANDING[1]
-                ):  # nor where it is not known
+                stands = math.hypot(x, y) < STANDING[0] and abs(wrap_angle(turn)) < STANDING[1]
+                if not stands:
                     chosen.append(row)
         return chosen
 

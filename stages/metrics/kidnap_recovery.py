@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.values.drive import Drive, known
 
 SPECS = {
@@ -20,6 +20,8 @@ JUMP_M = 0.5
 """Distance between true motion and odometry of one frame from which the robot was kidnapped, metres."""
 JUMP_DEG = 15.0
 """Largest difference of their turns, degrees."""
+MAX_UNKNOWN = 2
+"""Images without a true pose over which a kidnapping is still seen."""
 MAX_KIDNAPPED, MAX_SHARE = 4, 0.2
 """Kidnappings in a drive, and their share of its frames, of which one may be exceeded: odometry that misses the truth
 in more frames is of another unit, and nobody carried the robot."""
@@ -29,8 +31,8 @@ class KidnapRecovery(MetricStage):
     """Measures the time from each kidnapping of the robot until the estimate is right again, in the last log.
 
     The robot was kidnapped between two frames where its true motion is not that of odometry: it was turned, or put down
-    elsewhere; what happens in a gap of the truth is not seen. The estimate is right where position and heading errors
-    stay below 1 m and 20 degrees for ten frames (as under `converged_after_frames`).
+    elsewhere; what happens while the truth is unknown for over `MAX_UNKNOWN` images is not seen. The estimate is right
+    where position and heading errors stay below 1 m and 20 degrees for ten frames (as under `converged_after_frames`).
 
     Under `lifts`: `number`; `never`, after how many the estimate was not right before the next one or the end; lists
     with an entry for each: `step`, and `seconds` until the estimate was right, or until the next one or the end where
@@ -60,10 +62,15 @@ class KidnapRecovery(MetricStage):
 
 def kidnapped_rows(log: Drive, jump_m: float, jump_deg: float = 360.0) -> Ints:
     """Rows of a log before which the robot was kidnapped, where its true pose and odometry are known."""
-    true: Array = between(log.truth[:-1], log.truth[1:])
-    gap = true - log.motion[1:]
+    rows = np.flatnonzero(known(log.truth))
+    before, rows = rows[:-1], rows[1:]
+    moved = log.motion[rows]
+    for back in range(1, MAX_UNKNOWN + 1):  # over images without a true pose, as that of the jump itself
+        further = rows - back > before
+        moved[further] = compose(log.motion[rows[further] - back], moved[further])
+    gap: Array = between(log.truth[before], log.truth[rows]) - moved
     jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))
-    return rare(np.flatnonzero(jumped) + 1, len(log))
+    return rare(rows[jumped & (rows - before <= MAX_UNKNOWN + 1)], len(log))
 
 
 def rare(rows: Ints, frames: int) -> Ints:

@@ -38,8 +38,10 @@ def in_map_frame(truth: Array, estimate: Array) -> Array:
     near = position_errors(compose(best, there), believed) <= FITS * least
     there, believed = there[near], believed[near]
     turn = np.angle(np.exp(1j * (believed[:, 2] - there[:, 2])).sum())
-    if np.ptp(there[:, :2], axis=0).max() > SPREAD * least:
-        rotation, _ = align(there[:, :2], believed[:, :2])
-        turn = np.arctan2(rotation[1, 0], rotation[0, 0])
+    if (extent := np.ptp(there[:, :2], axis=0).max()) > 0.0:
+        rotation, to = align(there[:, :2], believed[:, :2])
+        by_place = np.arctan2(rotation[1, 0], rotation[0, 0])
+        if extent > SPREAD * np.median(position_errors(compose([*to, by_place], there), believed)):
+            turn = by_place
     shift = (believed - compose([0.0, 0.0, turn], there))[:, :2].mean(axis=0)
     return compose([*shift, turn], truth)

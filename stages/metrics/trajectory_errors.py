@@ -82,8 +82,9 @@ def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) 
         return result
     scored = known(drive.truth) & known(drive.estimate)
     carried = kidnapped_rows(drive, JUMP_M)
-    jumps = drive.truth[carried] - drive.truth[carried - 1]
-    result["driven_m"] = path_length(drive.truth[known(drive.truth)]) - float(np.hypot(jumps[:, 0], jumps[:, 1]).sum())
+    shown = np.flatnonzero(known(drive.truth))
+    jumps = drive.truth[carried] - drive.truth[shown[np.searchsorted(shown, carried) - 1]]
+    result["driven_m"] = path_length(drive.truth[shown]) - float(np.hypot(jumps[:, 0], jumps[:, 1]).sum())
     result["frames_without_truth"] = int((~known(drive.truth)).sum())
     result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
     if not scored.any():

@@ -74,7 +74,7 @@ class AxisBeside(Value):
         square = np.einsum("m,mik,mil->kl", weights, rows, rows)
         slope = -np.einsum("m,mik,mi->k", weights, rows, rays - seen)
         square[range(2, 5), range(2, 5)] += np.array([HEIGHT_SIGMA_M, TILT_SIGMA, TILT_SIGMA]) ** -2.0
-        share = square[6:, :6] @ np.linalg.inv(square[:6, :6] + 1e-9 * np.eye(6))
+        share = square[6:, :6] @ np.linalg.pinv(square[:6, :6], hermitian=True)
         return AxisBeside(
             KEPT * self.square + square[6:, 6:] - share @ square[:6, 6:],
             KEPT * self.slope + slope[6:] - share @ slope[:6],

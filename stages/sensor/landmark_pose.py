@@ -53,6 +53,8 @@ SURE = 0.95
 SAID_JITTER_S, SAID_PROBABILITY = 0.025, 0.95
 """Standard deviation of stamps (s) and its probability from which on the run reports it: in sound drives up to 0.018 is
 found, since odometry is interpolated, or 0.028 with a probability of 0.8 for some images."""
+STANDING = (0.01, math.radians(1.0))
+"""Largest motion (m, rad) since the last image of a robot that stands, and sees the errors of landmarks again."""
 MIN_IMAGES = 25.0
 """Images from which on the run reports that the axis is beside its description: the first show it too near."""
 MAX_MOTIONS = 5.0
@@ -154,7 +156,8 @@ class LandmarkPose(Stage):
         state.shown = state.shown.seen(best.inliers[:1], expected(best.poses[:1]), float(best.probabilities[0]))
         if camera is None:
             return self.Out(fix=best)
-        if best.probabilities[0] >= SURE:
+        stands = motion is not None and math.hypot(motion.x, motion.y) < STANDING[0] and abs(motion.turn) < STANDING[1]
+        if best.probabilities[0] >= SURE and not stands:
             at, agreed = seen[best.agree == 0], best.agree == 0
             variance = landmarks.variance_factor * landmarks.sigma_rad**2
             state.axis = state.axis.seen(

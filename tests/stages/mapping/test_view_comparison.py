@@ -82,6 +82,7 @@ def test_images_of_a_robot_that_stands_are_passed_over_unless_it_turns() -> None
     assert compared(range(6), odometry=driven, truth=POSES).frames.tolist() == [0, 2, 3, 5]
     assert compared(range(6), odometry=(), truth=[here] * 6).frames.tolist() == [0, 1, 2, 3, 4, 5]
     assert compared(range(6), [0, 0, 1, 1, 1, 1], odometry=[here] * 6).frames.tolist() == [0, 2]
+    assert len(compared(range(6), odometry=[AssumedPose(0.0, 0.0, 0.0)] * 6)) == 6  # a speed of 0 says nothing
 
 
 def test_images_whose_true_pose_is_not_known_are_passed_over() -> None:

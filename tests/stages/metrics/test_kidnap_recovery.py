@@ -4,6 +4,7 @@ from measured_drives import AT_ORIGIN, figures, made_drive
 
 from omninav.stages.metrics.kidnap_recovery import KidnapRecovery
 from omninav.stages.metrics.success_rate import SuccessRate
+from omninav.stages.metrics.trajectory_errors import TrajectoryErrors
 
 
 def lifted_drive(wrong_for: int | None):
@@ -66,6 +67,17 @@ def test_what_is_at_a_limit_is_no_lift(monkeypatch: pytest.MonkeyPatch):
 
     assert standing(0.0, 0.5, 0.0) is standing(0.0, 0.0, np.pi / 2) is None
     assert standing(0.0, 0.51, 0.0)["number"] == 1
+
+
+@pytest.mark.parametrize(("unknown", "number"), [(1, 1), (2, 1), (3, None)])
+def test_a_lift_over_an_image_or_two_without_a_true_pose_is_seen(unknown: int, number: int | None):
+    drive = lifted_drive(0)
+    drive.truth[12:, :2] += 3.0
+    drive.truth[12 : 12 + unknown] = np.nan
+    found = lifts(drive)
+    assert (found and found["number"], found and found["step"]) == (number, [12 + unknown] if number else None)
+    driven = figures(TrajectoryErrors(), drive)["driven_m"]
+    assert driven == pytest.approx(0.5 * (39 - unknown - 1), abs=0.1) or number is None
 
 
 def test_odometry_of_another_unit_is_no_lift():

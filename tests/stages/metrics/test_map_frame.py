@@ -36,6 +36,13 @@ def test_the_headings_of_a_robot_that_hardly_moves_say_how_its_frame_is_turned(m
     assert heading_errors_deg(moved, right).mean() < 0.5
 
 
+def test_true_headings_that_are_all_turned_do_not_turn_the_positions_of_a_loop() -> None:
+    around = np.linspace(0.0, 6.0, 100)
+    truth = np.column_stack([10.0 * np.sin(around), -10.0 * np.cos(around), around])
+    moved = in_map_frame(truth + np.array([0.0, 0.0, 1.57]), compose(MOTION, truth))
+    assert np.abs((moved - compose(MOTION, truth))[:, :2]).max() < 0.01
+
+
 def test_without_any_estimate_nothing_is_moved() -> None:
     truth = np.zeros((3, 3))
     assert in_map_frame(truth, np.full((3, 3), np.nan)) is truth

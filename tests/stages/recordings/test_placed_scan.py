@@ -49,6 +49,17 @@ def test_a_scanner_beside_the_middle_sees_a_round_wall_as_the_middle_does(at: tu
     assert np.abs(off).max() < STEP  # what it does not see is in no beam
 
 
+def test_a_wall_that_is_nearer_to_the_middle_than_to_the_scanner_has_no_holes() -> None:
+    azimuths = -math.pi + STEP * np.arange(360)
+    corridor = np.minimum(0.5 / np.abs(np.sin(azimuths) + 1e-12), 9.0)
+    found = placed_scan(
+        Scan(np.where(corridor < 8.0, corridor, math.inf), -math.pi, STEP, 0.1, 8.0), pose(0.3, 0.0, 0.0)
+    )
+    beside = np.abs(np.sin(found.azimuths())) > 0.3
+    assert np.isfinite(found.ranges[beside]).all()
+    assert np.abs(found.ranges[beside] * np.sin(found.azimuths()[beside])).max() < 0.55
+
+
 def test_the_nearest_of_echoes_in_one_direction_counts_and_silence_reaches_less_far() -> None:
     ranges = np.full(360, math.inf)
     ranges[180], ranges[0] = 0.5, 0.6  # straight on, and behind it

@@ -262,6 +262,10 @@ def test_the_pose_is_right_although_the_cameras_axis_is_beside_its_description_a
         poses = LandmarkPose().step(ctx, state, features, mapped_room(), camera=described).fix.poses
         away.append(math.hypot(*(poses[0] - pose)[:2]))
     assert max(away[-20:]) < 0.1 * away[0]
+    before = state.axis
+    for motion in (Motion(0.0, 0.005, 0.0), Motion(0.0, 0.0, 0.1)):
+        LandmarkPose().step(ctx, state, features, mapped_room(), camera=described, motion=motion)
+        assert (state.axis is before) == (motion.turn == 0.0)  # what stands shows nothing new
     assert state.axis.distance() == pytest.approx([-6.0, 5.0], abs=0.1)
     assert [each for each in ctx.warnings if "axis" in each] == [ctx.warnings[0]]
     assert "7.7 px beside where camera.yaml has it, at 639.5, 479.4" in ctx.warnings[0]
