@@ -19,6 +19,8 @@ from .strip import Strip
 Model = TypeVar("Model", bound=Camera)
 AXIS = {"centre_x": math.inf, "centre_y": math.inf}
 """The point where a mirror's or lens's axis meets the image, nothing known of it: a robot on a floor shows it best."""
+SAME_RAY = 1e-6
+"""Difference of unit vectors up to which a bearing is that of its pixel."""
 TILT = ("roll", "pitch")
 """Parameters of a camera that leans (rad): it is turned about x by the roll, then about y by the pitch."""
 TILT_SIGMA = math.radians(3.0)

@@ -8,7 +8,7 @@ import numpy as np
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.landmarks import Landmarks, restored_descriptors
+from omninav.stages.values.landmarks import Landmarks, mirrored_alike, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 
 from .aligned import Alignment
@@ -34,8 +34,7 @@ def aligned_by_landmarks(maps: Sequence[ReferenceGraph], rng: np.random.Generato
     given = [map.landmarks for map in maps if map.landmarks is not None]
     if len(given) < len(maps):
         return None
-    mirrored = next((each.mirrored for each in given if each.mirrored is not None), None)
-    points, looks = zip(*(_compared(each.as_mirrored(mirrored)) for each in given), strict=True)
+    points, looks = zip(*map(_compared, mirrored_alike(given)), strict=True)
     motions: dict[int, Array] = {0: np.zeros(3)}
     tried: dict[tuple[int, int], tuple[int, Array]] = {}
     agreeing = 0

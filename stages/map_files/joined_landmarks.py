@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import BadInput
 from omninav.stages.geometry.appearance.visual_words import learned_words
 from omninav.stages.geometry.arrays import Bytes, Ints
-from omninav.stages.values.landmarks import Landmarks, restored_descriptors
+from omninav.stages.values.landmarks import Landmarks, mirrored_alike, restored_descriptors
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords, words_of_roots
 
@@ -28,15 +28,13 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
     given = [map.landmarks for map in maps if map.landmarks is not None]
     if not given:
         return None
-    mirrored = next((each.mirrored for each in given if each.mirrored is not None), None)
-    given = [each.as_mirrored(mirrored) for each in given]
     widths = {each.descriptors.shape[1] for each in given if len(each)}
     if len(widths) > 1:
         raise BadInput(
             f"maps: descriptors of their landmarks have {' and '.join(map(str, sorted(widths)))} numbers, expected one "
             "length; learn the maps with the same features"
         )
-    parts = [_of_all(map, given[0]).as_mirrored(mirrored) for map in maps]
+    parts = mirrored_alike([_of_all(map, given[0]) for map in maps])
     points = np.cumsum([0, *(len(each) for each in parts)])
     starts = np.cumsum([0, *(len(each.seen) for each in parts)])
     descriptors = np.concatenate([each.descriptors for each in parts if len(each)] or [parts[0].descriptors])
@@ -59,7 +57,7 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         pose_sigmas=np.concatenate(
             [np.zeros((len(each.starts) - 1, 3)) if each.pose_sigmas is None else each.pose_sigmas for each in parts]
         ),
-        mirrored=mirrored,
+        mirrored=parts[0].mirrored,
     )
 
 

@@ -12,6 +12,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import turned
 from omninav.stages.camera.self_calibration import (
     AXIS,
+    SAME_RAY,
     TILT,
     adjustable,
     corrected,
@@ -44,8 +45,6 @@ MAX_TILT = math.radians(1.0)
 MIN_VIEWS = 40
 """Fewest references by which a camera is judged: of 20 an exact one was found 1 px beside its axis, of 16 leaning by 1
 degree, of 4 by 8 (7 tours of simulated offices, an institute, a store and a house)."""
-SAME_RAY = 1e-6
-"""Difference of unit vectors up to which a bearing is that of its pixel."""
 
 
 class CameraCheck(NamedTuple):

@@ -8,15 +8,13 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.camera.model import Camera
-from omninav.stages.camera.self_calibration import AXIS, adjustable, observed
+from omninav.stages.camera.self_calibration import AXIS, SAME_RAY, adjustable, observed
 from omninav.stages.geometry.arrays import Array
 from omninav.stages.geometry.landmarks.adjustment import rotations_about
 from omninav.stages.geometry.landmarks.bearing_pose import HEIGHT_SIGMA_M, TILT_SIGMA
 
 STEP_PX = 0.5
 """Step of the derivatives of bearings, pixels."""
-SAME_RAY = 1e-6
-"""Difference of unit vectors up to which a bearing is that of its pixel."""
 MIN_LANDMARKS = 20
 """Fewest landmarks of an image that counts: its pose takes six numbers of them."""
 KEPT = 0.98

@@ -158,7 +158,8 @@ class LandmarkPose(Stage):
             return self.Out(fix=best)
         stands = motion is not None and math.hypot(motion.x, motion.y) < STANDING[0] and abs(motion.turn) < STANDING[1]
         if best.probabilities[0] >= SURE and not stands:
-            at, agreed = seen[best.agree == 0], best.agree == 0
+            agreed = best.agree == 0
+            at = seen[agreed]
             variance = landmarks.variance_factor * landmarks.sigma_rad**2
             state.axis = state.axis.seen(
                 camera, features.points[at], features.bearings[at], points[agreed], best.poses[0], variance
@@ -184,8 +185,7 @@ class LandmarkPose(Stage):
         return self.Out(fix=replace(best, poses=poses, covariances=covariances))
 
     def _say_axis(self, ctx: Context, state: LandmarkPoseState, camera: Camera) -> None:
-        beside = state.axis.distance()
-        if state.told_axis or not beside.any() or state.axis.images < MIN_IMAGES:
+        if state.told_axis or state.axis.images < MIN_IMAGES or not (beside := state.axis.distance()).any():
             return
         state.told_axis = True
         moved = corrected(camera, AXIS, beside)

@@ -15,6 +15,7 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import AHEAD, Recording, UnreadableRecording
+from omninav.stages.recordings.stamps import TRUTH_MAX_GAP_S
 from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
@@ -51,7 +52,7 @@ class Playback(Source, ABC):
     heading), a topic, or a frame of a tf topic as /tf:PARENT:CHILD."""
     truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
     """The file's clock minus the log's: an image taken at t is looked up in the file at t + this."""
-    truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
+    truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = TRUTH_MAX_GAP_S
     """Largest time between an image and a true pose, seconds; on a topic that is slower, its usual interval."""
     first: Annotated[int, Bounds(ge=0)] = 0
     """Number of the frame at which each log begins; 0: the first."""

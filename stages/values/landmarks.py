@@ -1,5 +1,6 @@
 """Landmarks of a map, and the pose of an image that sees them."""
 
+from collections.abc import Sequence
 from dataclasses import field, replace
 from typing import Annotated
 
@@ -110,9 +111,14 @@ class Landmarks(Value):
         )
 
     def as_mirrored(self, mirrored: bool | None) -> "Landmarks":
-        """The same with descriptors of images that show the world mirrored or, with False, as it is."""
-        if mirrored is None or self.mirrored in (None, mirrored):
+        """The same with descriptors of images that show the world mirrored or, with False, as it is.
+
+        Those that do not say are taken to be so; None: all stay as they are.
+        """
+        if mirrored is None or self.mirrored == mirrored:
             return self
+        if self.mirrored is None:
+            return replace(self, mirrored=mirrored)
         words = replace(self.words, centres=mirrored_sift(self.words.centres))
         return replace(self, descriptors=mirrored_sift(self.descriptors), words=words, mirrored=mirrored)
 
@@ -128,6 +134,12 @@ class Landmarks(Value):
             total = np.bincount(self.seen, after[owners, axis] + turned, len(self))
             points[seen, axis] = total[seen] / counts[seen]
         return replace(self, points=points)
+
+
+def mirrored_alike(given: Sequence[Landmarks]) -> list[Landmarks]:
+    """Landmarks of several maps, with descriptors as of the images of the first that says whether they are mirrored."""
+    mirrored = next((each.mirrored for each in given if each.mirrored is not None), None)
+    return [each.as_mirrored(mirrored) for each in given]
 
 
 def stored_descriptors(values: Floats) -> Bytes:
