@@ -31,10 +31,10 @@ MAX_FAILURES = 3
 class ShortestPathPlannerState(State):
     """The route so far: its number and places, and how many of its views lead to each place.
 
-    `planned`: routes so far; `waiting_since` (ns): since when there has been reason to plan, None: there is none.
-    `failed_links` (F, 2): the links on which routes have failed, a place with itself for its own medoid, with which a
-    route begins; `failures` (F,): how often. `why`: the last reason to plan, `blocked`: the last reason why the way was
-    blocked; `ended`: how the route ended, "" if it has not. `asked`: the place that was named since (-1:
+    `planned`: routes to this goal so far; `waiting_since` (ns): since when there has been reason to plan, None: there
+    is none. `failed_links` (F, 2): the links on which they have failed, a place with itself for its own medoid, with
+    which a route begins; `failures` (F,): how often. `why`: the last reason to plan, `blocked`: the last reason why the
+    way was blocked; `ended`: how the route ended, "" if it has not. `asked`: the place that was named since (-1:
     none has), and whether that is still to be planned for (`renewed`).
     """
 
@@ -104,7 +104,9 @@ class ShortestPathPlanner(Stage):
         if point is not None:
             medoids = map.poses[map.places][:, :2]
             state.asked = int(np.argmin(np.hypot(*(medoids - (point.x, point.y)).T)))
-            state.renewed, state.ended, state.waiting_since = True, "", None
+            state.renewed, state.ended, state.waiting_since, state.blocked = True, "", None, ""
+            state.planned, state.failures = 0, np.zeros(0, np.int64)
+            state.failed_links = np.zeros((0, 2), np.int64)
         if state.asked >= 0:
             goals = np.array([state.asked], np.int64)
         elif self.goal == GOAL_TOPIC:

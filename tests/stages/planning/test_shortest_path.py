@@ -325,3 +325,13 @@ def test_a_robot_that_is_sent_elsewhere_looks_anew_and_goes_to_the_place_nearest
     assert planner.look(2, "arrived", at=1).route.state == "arrived"
     outs = [planner.look(2, point=point) for point in (GoalPoint(0.0, 0.1), None, None)]
     assert outs[-1].route.places.tolist() == [2, 1, 0]
+
+
+def test_another_goal_forgets_what_failed_on_the_way_to_the_last_one():
+    planner = Planner(GOAL_TOPIC, search_s=0.0, max_routes=4)
+    planner.look(1, point=GoalPoint(0.0, 6.0))
+    outs = [planner.look(1, "blocked", at=1) for _ in range(6)]
+    assert outs[-1].route.state == "gave up"
+    assert planner.look(1, point=GoalPoint(0.0, 6.0)).route.state == "under way"
+    assert (planner.state.planned, planner.state.blocked, len(planner.state.failures)) == (1, "", 0)
+    assert not len(planner.state.failed_links)
