@@ -168,6 +168,13 @@ def builds(variant: str) -> None:
         assert "map" in learned.saves
 
 
+def test_no_belief_is_lost_over_a_tick_without_an_image():
+    wires = {variant: [w for w in prepared(variant).graph.wires if w.delay] for variant in VARIANTS}
+    delayed = {name: [w.hold for w in each if w.origin == "fusion.belief"] for name, each in wires.items()}
+    assert sum(len(each) for each in delayed.values()) > 10
+    assert {name for name, each in delayed.items() if not all(each)} == set()
+
+
 def test_every_variant_builds_without_what_it_is_measured_by():
     measured = [variant for variant in VARIANTS if "drive" in nodes_of(variant)]
     assert len(measured) > 15
