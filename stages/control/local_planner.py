@@ -76,8 +76,11 @@ class LocalPlanner(Stage):
         scan: Scan | None = None,
         motion: Motion | None = None,
         vector: HomingVector | None = None,
+        tick_motion: Motion | None = None,
     ) -> Out:
-        """Look at one tick. Without a `scan` the vector is passed on."""
+        """Look at one tick. Without a `scan` the vector is passed on. `tick_motion`: of a robot whose `motion` is
+        that between two images."""
+        motion = tick_motion or motion
         if motion is not None:
             state.pose = compose(state.pose, (motion.x, motion.y, motion.turn))
         lost = vector is not None and not vector.is_found

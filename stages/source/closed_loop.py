@@ -44,13 +44,15 @@ class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is. `ended`: ticks since its last route has. `asked`: goals that it was given. `commanded`: it had one.
+    everybody is. `unseen` (3,): odometry since the last image, where later ones were lost; empty: none was. `ended`:
+    ticks since its last route has. `asked`: goals that it was given. `commanded`: it had one.
     """
 
     robot: Array = field(default_factory=lambda: np.zeros(0))
     track: Array = field(default_factory=lambda: np.zeros((0, 4)))
     crowd: Array = field(default_factory=lambda: np.zeros((0, 5)))
     odometry: Array = field(default_factory=lambda: np.zeros(3))
+    unseen: Array = field(default_factory=lambda: np.zeros(0))
     ticks: int = 0
     ended: int = 0
     asked: int = 0
@@ -61,8 +63,9 @@ class ClosedLoop(Source):
     """Simulates a robot that obeys the last command; every tick gives image, odometry, ranges and contacts.
 
     It starts at rest. The command of the tick before holds until this tick; without one it brakes. `motion` is what its
-    wheels measure, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.
-    Images are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody knows the next command.
+    wheels measure between two images, as in a log, `tick_motion` since the tick before; the first tick has neither.
+    Noise is drawn from the run's seed, goods and textures from the world's. Images are blurred as in a log
+    (`world.sensor.shutter`), by the motion at their tick: nobody knows the next command.
     An image that is lost or late on its way (`world.delivery`) is absent, and counted. Raises `UnreadableRecording`
     for a place to start, or to go to, where the robot has no room, BadInput for goals where nothing reads them.
     """
@@ -99,6 +102,7 @@ class ClosedLoop(Source):
         camera: Camera
         odometry: Pose
         motion: Motion | None = None
+        tick_motion: Motion | None = None
         scan: Scan
         goal: GoalPoint | None = None
         truth: Pose
@@ -203,12 +207,20 @@ class ClosedLoop(Source):
         people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
         stamp = DAY_0_NS + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
+        image, since = self._look(ctx, simulation.robot, now, people), motion
+        if motion is not None and len(simulation.unseen):
+            since = Motion(*compose(simulation.unseen, (motion.x, motion.y, motion.turn)).tolist())
+        simulation.unseen = np.zeros(0)
+        if image is None:
+            simulation.unseen = np.zeros(3) if since is None else np.array([since.x, since.y, since.turn])
+            since = None
         return self.Out(
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
-            image=self._look(ctx, simulation.robot, now, people),
+            image=image,
             camera=self._camera.described,
             odometry=Pose(*simulation.odometry.tolist()),
-            motion=motion,
+            motion=since,
+            tick_motion=motion,
             scan=scan_value(self.world, metres),
             goal=goal,
             truth=Pose(*pose.tolist()),

@@ -130,6 +130,13 @@ def test_without_ranges_it_only_passes_the_vector_on() -> None:
     assert out.search is None
 
 
+def test_where_motion_is_that_between_images_the_robot_moves_by_that_of_each_tick() -> None:
+    state, one, both = LocalPlannerState(), Motion(0.1, 0.0, 0.0), Motion(0.2, 0.0, 0.0)
+    for motion in (None, both):  # no image came with the first
+        LocalPlanner().step(CTX, state, Tick(0, 0), None, motion, tick_motion=one)
+    assert state.pose.tolist() == [0.2, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("before", "after"),
     [((1.67, -0.27), (-0.03, 0.03)), ((-0.27, 1.62), (0.03, 0.02)), ((1.42, -1.42), (1.42, -1.42))],

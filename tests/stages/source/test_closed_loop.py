@@ -12,6 +12,7 @@ from world_files import DEMO
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.bodies import box_array
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
@@ -22,6 +23,7 @@ from omninav.stages.simulator.robot import around, limits, reach, steer
 from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.command import Command
+from omninav.stages.values.drive import pose_row
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
@@ -209,6 +211,20 @@ def test_lost_images_are_absent_and_counted():
     lost = sum(out.image is None for out in loop.drive(ticks=40))
     assert loop.ctx.counts["lost_image"] + loop.ctx.counts["late_image"] == lost
     assert 0.35 < lost / 40 < 0.8
+
+
+def test_motion_is_that_between_two_images_and_tick_motion_that_of_every_tick():
+    loop = Loop(world=replace(EXACT, delivery=Delivery(dropped=0.4)), start=(1.5, 1.3, 0.0))
+    outs = loop.drive(Command(0.3, 0.2), 30)
+    seen, ticks = np.zeros(3), np.zeros(3)
+    for out in outs[1:]:
+        ticks = compose(ticks, (out.tick_motion.x, out.tick_motion.y, out.tick_motion.turn))
+        assert (out.motion is None) == (out.image is None)
+        if out.image is not None:
+            seen = compose(seen, (out.motion.x, out.motion.y, out.motion.turn))
+            assert seen == pytest.approx(ticks)
+            assert seen == pytest.approx(pose_row(out.odometry))
+    assert 5 < sum(out.image is None for out in outs) < 20
 
 
 def test_a_loop_that_is_put_to_sleep_goes_on_to_the_same_bytes():
