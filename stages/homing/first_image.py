@@ -1,7 +1,13 @@
 """The first image of a log, for homing that compares whole images."""
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.values.image import Image, Panorama
+
+
+class FirstImageState(State):
+    """The log whose first image has been given."""
+
+    log: int = -1
 
 
 class FirstImage(Stage):
@@ -12,6 +18,7 @@ class FirstImage(Stage):
 
         image: Image | Panorama | None = None
 
-    def step(self, ctx: Context, tick: Tick, image: Image | Panorama) -> Out:
-        """The image, where it is the log's first."""
-        return self.Out(image=image if tick.first_of_log else None)
+    def step(self, ctx: Context, state: FirstImageState, tick: Tick, image: Image | Panorama) -> Out:
+        """The image, where it is the log's first; that of its first tick may have been lost."""
+        first, state.log = tick.log != state.log, tick.log
+        return self.Out(image=image if first else None)

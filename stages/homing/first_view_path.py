@@ -9,8 +9,9 @@ DELAY_S = 1.0
 
 
 class FirstViewPathState(State):
-    """The first view, until the path is given, and when it was seen (ns)."""
+    """The first view of a log, until the path is given, and when it was seen (ns)."""
 
+    log: int = -1
     views: tuple[LocalFeatures, ...] = ()
     stamp: int = 0
 
@@ -26,8 +27,8 @@ class FirstViewPath(Stage):
 
     def step(self, ctx: Context, state: FirstViewPathState, tick: Tick, features: LocalFeatures) -> Out:
         """The path, once."""
-        if tick.first_of_log:
-            state.views, state.stamp = (features,), tick.stamp
+        if tick.log != state.log:  # its first image may have been lost
+            state.views, state.log, state.stamp = (features,), tick.log, tick.stamp
         elif state.views and tick.stamp - state.stamp >= DELAY_S * 1e9:
             path = ImagePath(tick.log, state.views, ("the start",))
             state.views = ()

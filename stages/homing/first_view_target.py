@@ -6,8 +6,9 @@ from omninav.stages.values.local_features import LocalFeatures
 
 
 class FirstViewTargetState(State):
-    """The first view."""
+    """The first view of a log."""
 
+    log: int = -1
     views: tuple[LocalFeatures, ...] = ()
 
 
@@ -25,7 +26,7 @@ class FirstViewTarget(Stage):
         features: LocalFeatures | None = None
 
     def step(self, ctx: Context, state: FirstViewTargetState, tick: Tick, features: LocalFeatures) -> Out:
-        if tick.first_of_log:
-            state.views = (features,)
+        if tick.log != state.log:  # the image of its first tick may have been lost
+            state.log, state.views = tick.log, (features,)
             return self.Out()
         return self.Out(target=HomingTarget(tick.index, state.views[0]), features=state.views[0])

@@ -11,7 +11,7 @@ from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.homing.column_table import ColumnTable
-from omninav.stages.homing.first_image import FirstImage
+from omninav.stages.homing.first_image import FirstImage, FirstImageState
 from omninav.stages.homing.min_warping import (
     DEPTH_RATIOS,
     LOG_STEP,
@@ -153,6 +153,7 @@ def test_a_camera_without_a_full_circle_is_refused():
 
 
 def test_the_first_image_is_given_once():
-    stage, ctx, image = FirstImage(), Context("first"), Image(np.zeros((4, 8, 3), np.uint8))
-    assert stage.step(ctx, Tick(index=0, stamp=0, frame=0, first_of_log=True), image).image is image
-    assert stage.step(ctx, Tick(index=1, stamp=1, frame=1, first_of_log=False), image).image is None
+    stage, kept, ctx, image = FirstImage(), FirstImageState(), Context("first"), Image(np.zeros((4, 8, 3), np.uint8))
+    assert stage.step(ctx, kept, Tick(index=1, stamp=1, frame=1), image).image is image  # the first tick had none
+    assert stage.step(ctx, kept, Tick(index=2, stamp=2, frame=2), image).image is None
+    assert stage.step(ctx, kept, Tick(index=3, stamp=0, log=1, first_of_log=True), image).image is image

@@ -125,3 +125,5 @@ def test_the_first_view_is_given_once_a_second_later() -> None:
     given = [remember.step(ctx, kept, Tick(k, 200_000_000 * k, first_of_log=k == 0), views[k]).path for k in range(9)]
     assert [path is not None for path in given] == [k == 5 for k in range(9)]
     assert given[5].views == (views[0],)
+    again = [remember.step(ctx, kept, Tick(k, 200_000_000 * k, log=1), views[k]).path for k in (1, 6)]
+    assert again[1].views == (views[1],)  # that of the log's first tick was lost

@@ -68,7 +68,7 @@ def test_every_tick_but_the_first_has_a_target_of_its_own() -> None:
         for _ in grid_around((0, 0, 0), 1, 1)
     ]
     stage, first = FirstViewTarget(), FirstViewTargetState()
-    outs = [stage.step(CTX, first, Tick(n, n, first_of_log=n == 0), view) for n, view in enumerate(views)]
+    outs = [stage.step(CTX, first, Tick(n, n), view) for n, view in enumerate(views)]
     assert outs[0].target is None
     assert [out.target.number for out in outs[1:]] == [1, 2, 3]
     assert all(out.target.features is views[0] and out.features is views[0] for out in outs[1:])
