@@ -55,11 +55,12 @@ class RoadmapPlannerState(State):
     `goal` (3,): x, y (m), heading (rad; NaN: any); empty before the first tick. `rivals` (K, 3): where else its image
     may have been taken; `doubtful`: whether the look of the place has to confirm it. `metres`, `next` (R,): of the
     shortest path to it from each reference; `extra` (R,): metres that count more where paths were blocked, and
-    `retry`: from when on (ns) they can be again. `lost_since` (ns): since when the robot does not know where it is;
-    None: it does. `number`: of the path, -1 before the first, and the references along it, `places` (K,), as it was
-    planned. `leg`: its number, and `left`: metres to go when it began, inf before it does. `arrival`: metres from the
-    goal at which it docks; `unlike`: images in a row that did not look like it there. `near_since` (ns): since when the
-    estimate keeps to a point; None: it does not. `asked`: goals before this one.
+    `between` (B, 3): places x, y and such metres where they were, far from any; `retry`: from when on (ns) they can be
+    again. `lost_since` (ns): since when the robot does not know where it is; None: it does. `number`: of the path, -1
+    before the first, and the references along it, `places` (K,), as it was planned. `leg`: its number, and `left`:
+    metres to go when it began, inf before it does. `arrival`: metres from the goal at which it docks; `unlike`: images
+    in a row that did not look like it there. `near_since` (ns): since when the estimate keeps to a point; None: it does
+    not. `asked`: goals before this one.
     """
 
     goal: Array = field(default_factory=lambda: np.zeros(0))
@@ -68,6 +69,7 @@ class RoadmapPlannerState(State):
     metres: Array = field(default_factory=lambda: np.zeros(0))
     next: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     extra: Array = field(default_factory=lambda: np.zeros(0))
+    between: Array = field(default_factory=lambda: np.zeros((0, 3)))
     retry: int = 0
     lost_since: int | None = None
     number: int = -1
@@ -167,7 +169,12 @@ class RoadmapPlanner(Stage):
                 away_m = np.hypot(*(map.poses[:, :2] - ahead).T)
                 more = np.maximum(DETOUR_M, 10.0 * state.extra)
                 state.extra = np.where(away_m <= BLOCKED_RADIUS_M, more, state.extra)
-                if state.extra[away_m.argmin()] >= DETOUR_M * 10.0 ** (BLOCKED_HERE - 1):
+                here_m = state.extra[away_m.argmin()]
+                if away_m.min() > BLOCKED_RADIUS_M:
+                    same = np.hypot(*(state.between[:, :2] - ahead).T) <= BLOCKED_RADIUS_M
+                    here_m = max(DETOUR_M, 10.0 * state.between[same, 2].max(initial=0.0))
+                    state.between = np.vstack([state.between[~same], [*ahead, here_m]])
+                if here_m >= DETOUR_M * 10.0 ** (BLOCKED_HERE - 1):
                     state.ended, (x, y) = "gave up", ahead
                     state.why = f"its way near ({x:.1f}, {y:.1f}) m was blocked {BLOCKED_HERE} times: {status.why}"
                     return _stopped(state)
@@ -210,13 +217,15 @@ class RoadmapPlanner(Stage):
 
     def _set_out(self, state: RoadmapPlannerState, map: ReferenceGraph, goal: Array) -> None:
         state.goal, state.extra, state.places = goal, np.zeros(len(map)), np.zeros(0, np.int64)
+        state.between = np.zeros((0, 3))
         state.docking, state.ended, state.why, state.left = False, "", "", math.inf
         state.lost_since, state.near_since, state.arrival, state.unlike = None, None, ARRIVAL_M, 0
         self._plan(state, map)
 
     def _plan(self, state: RoadmapPlannerState, map: ReferenceGraph) -> None:
         reach = 2.0 * self.robot_radius_m
-        state.metres, state.next = paths_to(state.goal[:2], map.poses[:, :2], map.edges, reach, state.extra)
+        goal, points, extra = state.goal[:2], map.poses[:, :2], (state.extra, state.between)
+        state.metres, state.next = paths_to(goal, points, map.edges, reach, *extra)
 
     def _path(self, state: RoadmapPlannerState, map: ReferenceGraph, here: Array) -> Ints | None:
         to_goal = math.dist(here[:2], state.goal[:2])

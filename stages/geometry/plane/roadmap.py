@@ -14,11 +14,14 @@ class Paths(NamedTuple):
     next: Ints
 
 
-def paths_to(goal: Array, points: Array, edges: Ints, reach: float, extra: Array) -> Paths:
+def paths_to(
+    goal: Array, points: Array, edges: Ints, reach: float, extra: Array, between: Array | tuple[()] = ()
+) -> Paths:
     """Shortest paths to a goal (2,) from points (N, 2) along `edges` (E, 2), and between points closer than `reach` m.
 
     The goal is joined with all points that are at most `reach` farther from it than the nearest one. `extra` (N,):
-    metres by which a path through a point counts as longer. Dijkstra's algorithm.
+    metres by which a path through a point counts as longer, `between` (B, 3): places x, y and metres by which each
+    stretch counts as longer that leads within `reach` of one. Dijkstra's algorithm.
     """
     from scipy.sparse import coo_matrix  # slow to import, and seldom needed
     from scipy.sparse.csgraph import dijkstra
@@ -31,6 +34,11 @@ def paths_to(goal: Array, points: Array, edges: Ints, reach: float, extra: Array
     one, other = np.unique(np.sort(pairs, axis=1), axis=0).T
     places, more = np.vstack([points, goal]), np.append(extra, 0.0)
     metres = np.hypot(*(places[one] - places[other]).T) + (more[one] + more[other]) / 2.0
+    steps = places[other] - places[one]
+    for blocked in between:
+        off = blocked[:2] - places[one]
+        along = np.clip((off * steps).sum(axis=1) / np.maximum((steps**2).sum(axis=1), 1e-9), 0.0, 1.0)
+        metres += blocked[2] * (np.hypot(*(off - along[:, None] * steps).T) <= reach)
     graph = coo_matrix((np.maximum(metres, 1e-6), (one, other)), shape=(count + 1, count + 1)).tocsr()
     lengths, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
     return Paths(lengths[:count], before[:count].astype(np.int64))

@@ -369,3 +369,16 @@ def test_a_way_counts_longer_beside_where_it_was_blocked_and_ten_times_as_much_t
     for seconds, metres in ((0, 10.0), (4.9, 10.0), (5, 100.0)):
         line.at(0.1, seconds, status=BLOCKED)  # at 1.3 m: from the reference at 0.5 m on
         assert line.plan.extra[:6].tolist() == [0.0, *4 * [metres], 0.0]
+
+
+def test_blocked_far_from_references_it_takes_another_way_and_gives_up_where_there_is_none() -> None:
+    line = Line(6.0)
+    line.point = GoalPoint(6.0, 3.0)
+    routes = [line.at(6.0, seconds, y=0.6, status=BLOCKED).route for seconds in (0, 5, 10)]
+    assert [route.state for route in routes] == ["under way", "under way", "gave up"]
+    assert routes[2].why == "its way near (6.0, 1.4) m was blocked 3 times: a chair"
+    line = Line(7.5)
+    places = np.array([[0.0, 0, 0], [2.5, 0, 0], [5.0, 0, 0], [7.5, 0, 0], [2.5, 3, 0], [5.0, 3, 0]])
+    line.map = replace(graph_of(places), edges=np.array([[0, 1], [1, 2], [2, 3], [1, 4], [4, 5], [5, 2]]))
+    assert line.at(2.9).route.places.tolist() == [1, 2, 3]
+    assert line.at(2.9, status=BLOCKED).route.places.tolist() == [1, 4, 5, 2, 3]
