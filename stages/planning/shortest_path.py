@@ -118,7 +118,9 @@ class ShortestPathPlanner(Stage):
         if state.ended or not self._must_plan(state, tick, belief, status, progress):
             return self.Out(route=_route(state))
         if state.number >= 0 and not state.renewed and progress is not None and status is not None:
-            _remember(state, _failing(state, progress.at, lost=status.state == "lost"))
+            failing = _failing(state, progress.at, lost=status.state == "lost")
+            if status.state == "lost" or failing[0] != failing[1]:  # blocked, it may well be where it believes to be
+                _remember(state, failing)
             state.blocked = status.why if status.state == "blocked" else state.blocked
         path = self._plan(ctx, state, belief.probabilities, goals, map)
         return self.Out(path=path, route=_route(state))
@@ -251,8 +253,8 @@ def _failing(state: ShortestPathPlannerState, reached: int, lost: bool) -> Ints:
     """The link on which a route fails behind this many of its views; lost before the first, its place with itself."""
     if lost and not reached:
         return state.places[[0, 0]]
-    leg = int(np.searchsorted(state.views, reached, side="right"))
-    return state.places[[max(leg - 1, 0), min(leg, len(state.places) - 1)]]
+    leg = max(1, int(np.searchsorted(state.views, reached, side="right")))
+    return state.places[[leg - 1, min(leg, len(state.places) - 1)]]
 
 
 def _same(state: ShortestPathPlannerState, pair: Ints) -> Bools:

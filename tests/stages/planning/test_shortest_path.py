@@ -335,3 +335,13 @@ def test_another_goal_forgets_what_failed_on_the_way_to_the_last_one():
     assert planner.look(1, point=GoalPoint(0.0, 6.0)).route.state == "under way"
     assert (planner.state.planned, planner.state.blocked, len(planner.state.failures)) == (1, "", 0)
     assert not len(planner.state.failed_links)
+
+
+def test_a_robot_that_is_blocked_before_the_first_view_is_where_it_believes_to_be():
+    planner, belief = Planner(3), PlaceBelief(np.array([0.0, 0.6, 0.0, 0.0, 0.4, 0.0]), np.zeros((6, 3)))
+    assert planner.look(belief).route.places[0] == 1
+    assert planner.look(belief, "blocked", at=0).route.places[0] == 1
+    assert planner.state.failed_links.tolist() == [[1, 0]]
+    planner = Planner(1)
+    planner.look(belief)
+    assert planner.look(belief, "blocked", at=0).route.places.tolist() == [1]
