@@ -80,6 +80,8 @@ class LocalPlanner(Stage):
     ) -> Out:
         """Look at one tick. Without a `scan` the vector is passed on. `tick_motion`: of a robot whose `motion` is
         that between two images."""
+        if tick.first_of_log:  # the robot has been put elsewhere
+            vars(state).update(vars(LocalPlannerState()))
         motion = tick_motion or motion
         if motion is not None:
             state.pose = compose(state.pose, (motion.x, motion.y, motion.turn))

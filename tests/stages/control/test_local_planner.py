@@ -130,6 +130,16 @@ def test_without_ranges_it_only_passes_the_vector_on() -> None:
     assert out.search is None
 
 
+def test_a_robot_that_has_been_put_elsewhere_is_led_around_nothing_of_before() -> None:
+    robot = Robot(((1.0, -1.0), (1.0, 1.0)))
+    said = robot.vector_to(3.0, 0.0)
+    assert robot.look(said).vector is not said
+    again = robot.planner.step(
+        CTX, robot.state, Tick(1, 0, 1, 0, True), scan_from(np.zeros(3), np.array([])), None, said
+    )
+    assert again.vector is said
+
+
 def test_where_motion_is_that_between_images_the_robot_moves_by_that_of_each_tick() -> None:
     state, one, both = LocalPlannerState(), Motion(0.1, 0.0, 0.0), Motion(0.2, 0.0, 0.0)
     for motion in (None, both):  # no image came with the first
