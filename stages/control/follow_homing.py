@@ -38,14 +38,15 @@ DOUBTFUL_S, DOUBTFUL_SPEED = 5.0, 0.5
 class FollowHomingState(State):
     """Since when (ns) targets have been lost or doubtful, and since when no direction has been free; None: not now.
 
-    `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone. `ranged`: whether there
-    has been a scan.
+    `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone. `targeted` (ns): when
+    there was a target last. `ranged`: whether there has been a scan.
     """
 
     lost_since: int | None = None
     blocked_since: int | None = None
     target: int = -1
     sought_since: int | None = None
+    targeted: int = 0
     ranged: bool = False
 
 
@@ -87,12 +88,14 @@ class FollowHoming(Stage):
         stalled: DrivingStatus | None = None,
         wander: Command | None = None,
     ) -> Out:
-        if tick.first_of_log:  # its clock may be behind that of the one before
+        idle = tick.stamp - state.targeted > BLOCKED_AFTER_S * 1e9  # what it waited for is long over
+        if idle or tick.first_of_log:  # its clock may be behind that of the one before
             state.lost_since = state.blocked_since = state.sought_since = None
         if progress is not None and progress.arrived:
             return self._stand("arrived", "")
         if vector is None:
             return self._stand("waiting", "there is no target")
+        state.targeted = tick.stamp
         state.lost_since, lost_s = _since(state.lost_since, not vector.is_found, tick)
         if vector.number != state.target:
             state.target, state.sought_since = vector.number, None

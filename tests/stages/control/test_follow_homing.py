@@ -124,6 +124,15 @@ def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
     assert robot.drive(vector(), progress(), scan()).command.speed == 0.4
 
 
+def test_who_had_no_target_for_long_waits_anew() -> None:
+    closed = scan((-180.0, 180.0, 0.4))
+    for idle, state in ((8, "blocked"), (20, "driving")):
+        robot = Robot()
+        for said in (*3 * [vector()], *idle * [None], vector()):
+            out = robot.drive(said, None, closed)
+        assert out.status.state == state
+
+
 @pytest.mark.parametrize(
     ("said", "ring", "state"),
     [
