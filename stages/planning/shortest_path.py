@@ -223,8 +223,8 @@ def shortest_route(
     """The places from `place` to the nearest of `goals` (G,), both included: (K,); none where no route is left.
 
     `failed_links` (F, 2): pairs of places between which it has failed to drive, `failures` (F,) times: any route around
-    them is preferred, and those that failed `MAX_FAILURES` times are closed. Equally short routes: that of lower
-    numbers.
+    them is preferred, and those that failed `MAX_FAILURES` times are closed. Equally short routes: that of the
+    first link.
     """
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(map)))
