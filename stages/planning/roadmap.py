@@ -143,6 +143,7 @@ class RoadmapPlanner(Stage):
         if state.ended:
             return _stopped(state)
         pose, sure = np.array(pose_row(estimate.pose)), confidence.probability >= MIN_PROBABILITY
+        found = sure and state.lost_since is not None
         state.lost_since = None if sure else tick.stamp if state.lost_since is None else state.lost_since
         if state.lost_since is not None and tick.stamp - state.lost_since > SEARCH_S * 1e9:
             state.ended, state.why = "gave up", f"for {SEARCH_S:g} s it has not found out where it is"
@@ -188,7 +189,8 @@ class RoadmapPlanner(Stage):
         ahead, beyond = ahead_on(_line(state, map, places), pose[:2], LOOKAHEAD_M)
         x, y = ahead - pose[:2]
         remaining_m = math.hypot(x, y) + beyond
-        if new or remaining_m + LEG_M < state.left < math.inf:
+        carried = found and remaining_m > state.left + LEG_M  # to where what it drove before says nothing
+        if new or carried or remaining_m + LEG_M < state.left < math.inf:
             state.leg, state.left = state.leg + 1, remaining_m
         turn = 0.0 if math.isnan(state.goal[2]) else wrap_angle(state.goal[2] - at[2])
         if known:

@@ -333,6 +333,10 @@ def test_a_leg_is_done_beyond_two_metres_and_none_begins_before_the_robot_knows_
     assert (lost.number, lost.ratio, lost.metres, lost.distance) == (0, 1.0, None, pytest.approx(6.0))
     vectors = [line.at(x).vector for x in (0.0, 2.0, 2.001)]
     assert [(v.number, v.ratio) for v in vectors] == [(1, 1.0), (1, pytest.approx(0.0)), (2, 1.0)]
+    for confidence, number in ((0.9, 2), (0.3, 3)):  # found again farther back, it may have been carried
+        vectors = [line.at(x, confidence=sure).vector for x, sure in ((2.1, 0.9), (0.0, confidence), (0.0, 0.9))]
+        assert vectors[-1].number == number
+    assert vectors[-1].ratio == 1.0
 
 
 def test_where_the_map_falls_apart_no_path_leads_to_the_goal() -> None:
