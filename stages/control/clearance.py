@@ -1,11 +1,15 @@
 """Room around a robot, by a ring of ranges."""
 
+import math
+
 import numpy as np
 
 from omninav.stages.geometry.arrays import Array
 
 LOOKAHEAD_M = 0.8
 """Free distance that a direction needs where the target is not closer, metres."""
+REACTION_S = 0.25
+"""Time until a robot brakes, seconds: a tick, and some delay."""
 
 
 def free_ahead(ranges: Array, azimuths: Array, radius: float, margin: float) -> float:
@@ -13,6 +17,12 @@ def free_ahead(ranges: Array, azimuths: Array, radius: float, margin: float) -> 
     ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
     in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
     return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
+
+
+def stopping_speed(free: float, deceleration: float) -> float:
+    """Largest speed (m/s) from which a robot that brakes by `deceleration` m/s^2 stops within `free` m."""
+    lag = REACTION_S * deceleration
+    return math.sqrt(lag**2 + 2.0 * deceleration * max(0.0, free)) - lag
 
 
 def roomier_side(ranges: Array, azimuths: Array) -> float:

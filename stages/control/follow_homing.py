@@ -11,7 +11,7 @@ from omninav.stages.values.command import Command
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
-from .clearance import LOOKAHEAD_M, free_ahead, free_direction
+from .clearance import LOOKAHEAD_M, REACTION_S, free_ahead, free_direction, stopping_speed
 
 NARROW_MARGIN, NARROW_SPEED = 0.2, 0.5
 """Shares of the margin and of the speed with which the robot passes where there is no room for all of the margin."""
@@ -39,7 +39,8 @@ class FollowHomingState(State):
     """Since when (ns) targets have been lost or doubtful, and since when no direction has been free; None: not now.
 
     `sought_since` (ns): the same as `lost_since` of the target with the number `target` alone. `targeted` (ns): when
-    there was a target last. `ranged`: whether there has been a scan.
+    there was a target last. `ranged`: whether there has been a scan, and `free`: metres free ahead as it leads to
+    expect.
     """
 
     lost_since: int | None = None
@@ -48,6 +49,7 @@ class FollowHomingState(State):
     sought_since: int | None = None
     targeted: int = 0
     ranged: bool = False
+    free: float = math.inf
 
 
 class FollowHoming(Stage):
@@ -65,6 +67,8 @@ class FollowHoming(Stage):
     """m/s."""
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
     """rad/s."""
+    deceleration: Annotated[float, Bounds(gt=0)] = 0.5
+    """m/s^2, with which it brakes: it drives no faster than it can stop within what is free ahead."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
     """Radius of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.1
@@ -140,8 +144,10 @@ class FollowHoming(Stage):
             speed = min(speed, max(MIN_SPEED, slowed))
         if scan is not None:
             ranges = np.minimum(scan.ranges, scan.farthest)
-            if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(STOP_DISTANCE_M, left):
-                speed = 0.0
+            free = free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0)
+            stops = free < min(STOP_DISTANCE_M, left)
+            speed = 0.0 if stops else min(speed, stopping_speed(min(free, state.free), self.deceleration))
+            state.free = free - REACTION_S * speed  # an echo may be missing in the next scan
         return self.Out(command=Command(speed, self._turn(direction)), status=moving)
 
     def _approaches(self, vector: HomingVector, lost_s: float, sought_s: float) -> bool:

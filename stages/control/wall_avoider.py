@@ -11,7 +11,7 @@ from omninav.stages.geometry.arrays import Array
 from omninav.stages.values.command import Command
 from omninav.stages.values.scan import Scan
 
-from .clearance import free_ahead, roomier_side
+from .clearance import free_ahead, roomier_side, stopping_speed
 
 
 class WallAvoiderState(State):
@@ -32,6 +32,8 @@ class WallAvoider(Stage):
     """m/s."""
     max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
     """rad/s."""
+    deceleration: Annotated[float, Bounds(gt=0)] = 0.5
+    """m/s^2, with which it brakes."""
     robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
     """Radius of the robot's body."""
     margin_m: Annotated[float, Bounds(ge=0)] = 0.15
@@ -51,7 +53,8 @@ class WallAvoider(Stage):
         free = free_ahead(ranges, scan.azimuths(), self.robot_radius_m, self.margin_m)
         room = (free - self.stop_distance_m) / (self.slow_distance_m - self.stop_distance_m)
         speed, turning, state.side = wandering(room, roomier_side(ranges, scan.azimuths()), state.side)
-        return self.Out(command=Command(self.max_speed * speed, self.max_angular_speed * turning))
+        speed = min(self.max_speed * speed, stopping_speed(free - self.stop_distance_m, self.deceleration))
+        return self.Out(command=Command(speed, self.max_angular_speed * turning))
 
 
 def wandering(room: float, roomier: float, side: int) -> tuple[float, float, int]:

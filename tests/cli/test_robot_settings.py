@@ -22,9 +22,10 @@ def test_the_robots_geometry_and_limits_reach_all_nodes_that_drive_it() -> None:
 
 
 @pytest.mark.parametrize("words", [(), ("world=office",)])
-def test_a_simulated_robot_has_its_worlds_radius(words: tuple[str, ...]) -> None:
+def test_a_simulated_robot_has_its_worlds_radius_and_brakes(words: tuple[str, ...]) -> None:
     assert nodes_of("wander", *words)["control"]["robot_radius_m"] == 0.25
     assert nodes_of("wander", *words, "world.robot.radius=0.3")["control"]["robot_radius_m"] == 0.3
+    assert nodes_of("wander", *words, "world.robot.acceleration=2.0")["control"]["deceleration"] == 2.0
 
 
 def test_frames_and_domain_reach_all_nodes_that_speak_to_the_robot() -> None:

@@ -237,6 +237,20 @@ def test_a_lost_robot_stands_where_no_wander_command_is_wired(monkeypatch: pytes
     assert all(command(out) == STAND for out in said)
 
 
+def test_it_drives_no_faster_than_it_can_stop_within_what_is_free_ahead() -> None:
+    wall = scan((-60.0, 60.0, 2.25))  # 2 m are free
+    for deceleration, fastest in ((0.5, 1.290), (0.1, 0.606), (5.0, 1.5)):
+        robot = Robot(max_speed=1.5, deceleration=deceleration)
+        speeds = [robot.drive(vector(), progress(), ring).command.speed for ring in (wall, scan(), scan())]
+        assert speeds[0] == pytest.approx(fastest, abs=1e-3)
+        assert fastest - 0.3 < speeds[1] <= speeds[0]  # an echo that is missing once frees nothing
+        assert speeds[2] >= speeds[0]
+    slow = scan((-60.0, 60.0, 1.65))  # 1.4 m, of which it keeps 0.25
+    assert wander(slow)[0][0] == 0.4
+    avoider = WallAvoider(max_speed=1.5).step(Context("wander"), slow, WallAvoiderState())
+    assert command(avoider)[0] == pytest.approx(0.932, abs=1e-3)
+
+
 def test_a_target_close_before_a_wall_can_be_reached() -> None:
     assert drive(vector(metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
 
@@ -253,14 +267,14 @@ def test_it_docks_at_a_wall_closer_than_it_stops_on_the_way() -> None:
     assert drive(vector(metres=0.08), progress(last=True), wall).command.speed > 0.0
 
 
-@pytest.mark.parametrize(("metres", "speed"), [(0.42, 0.0), (0.47, 0.4 * math.cos(math.radians(30.0)))])
+@pytest.mark.parametrize(("metres", "speed"), [(0.42, 0.0), (0.47, 0.29052)])
 def test_it_stops_before_what_stands_straight_ahead_while_it_turns_to_a_free_direction(
     metres: float, speed: float
 ) -> None:
     # A post on the right lets it go 0.114 or 0.157 m straight on, and as far as it likes to the left.
     out = drive(vector(math.radians(30.0), metres=2.0), progress(), scan((-31.0, -29.0, metres)))
     assert out.status.state == "driving"
-    assert command(out) == pytest.approx((speed, 1.5 * math.radians(30.0)))
+    assert command(out) == pytest.approx((speed, 1.5 * math.radians(30.0)), abs=1e-5)
 
 
 def test_time_in_which_the_target_is_lost_does_not_count_as_stalled(monkeypatch: pytest.MonkeyPatch) -> None:
