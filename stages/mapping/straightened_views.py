@@ -48,13 +48,20 @@ class StraightenViews(Stage):
         follows = np.flatnonzero((np.diff(views.tours) == 0) & (ways > STANDING_M))
         found = self._closures(views, views.distances[follows, follows + 1])
         unit = float(np.median(ways[follows])) if len(follows) else 0.0
+        drives = np.unique(views.tours, return_inverse=True)[1].astype(np.int64)
+        start, joined = placed_drives(views.poses, drives, found, MIN_GAP * unit)
+        if not joined.all():
+            apart = ", ".join(str(drive + 1) for drive in np.flatnonzero(~joined))
+            ctx.warn(
+                f"mapping: of {len(joined)} tours number {apart} shows no place of the first often enough, so where it "
+                "lies is not known and no route may lead there; drive one tour through the places of both, or learn a "
+                "map of each (tour=FILE)"
+            )
         if not len(found.pairs) or not unit:
             ctx.fact(
                 "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"
             )
             return self.Out(views=views)
-        drives = np.unique(views.tours, return_inverse=True)[1].astype(np.int64)
-        start, joined = placed_drives(views.poses, drives, found, MIN_GAP * unit)
         usable = joined[drives[found.pairs]].all(axis=1)
         found = Closures(found.pairs[usable], found.turns[usable])
         poses, weights = straightened_drives(start, drives, found, *closure_sigmas(unit))

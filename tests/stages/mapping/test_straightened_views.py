@@ -112,6 +112,9 @@ def test_tours_that_look_elsewhere_are_not_moved_by_the_others(monkeypatch):
     monkeypatch.setattr(MIN_GAP, 2)
     first, second = [0, 1, 2, 3, 4, 5], [100, 101, 102, 103]
     assert closures(first + second, [1] * 6 + [2] * 4) == 0
+    ctx = Context("straightened", np.random.default_rng(0))
+    StraightenViews().step(ctx, made_views(between_looks(first + second), tours=[1] * 6 + [2] * 4))
+    assert "of 2 tours number 2 shows no place of the first" in ctx.warnings[0]
 
 
 def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual(monkeypatch):
