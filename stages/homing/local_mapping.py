@@ -9,6 +9,7 @@ import numpy as np
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Array, Ints
+from omninav.stages.geometry.plane.mount import MIN_ARM_M
 from omninav.stages.geometry.plane.se2 import compose, wrap_angle
 from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
 from omninav.stages.geometry.two_views.epipolar import yaw_of
@@ -200,6 +201,13 @@ class LocalMapping(Stage):
             state.target, state.doubtful, state.witness, state.refuted = target.number, None, None, NO_ROWS
         matches = matches_with(target, features, correspondences)
         before = state.map if state.map is not None and state.map.target == target.number else None
+        arm = 0.0 if camera is None else math.hypot(*camera.arm[:2])
+        if before is not None and motion is None and arm > MIN_ARM_M:
+            ctx.warn(
+                f"homing: the camera sits {arm:.2f} m beside the robot's axis, for which homing allows "
+                "by odometry alone: without it the robot may circle around its target; type "
+                "wires.local_map.motion=source.motion wires.tracker.motion=source.motion"
+            )
         local_map = LocalMap(-1, target.number, "lost") if before is None else before.moved(motion)
         shown = self._tracked(ctx, state, local_map, tracks, matches)
         state.map = shown

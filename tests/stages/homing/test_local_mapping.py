@@ -185,6 +185,9 @@ def test_under_a_camera_in_front_of_its_axis_the_vector_is_the_robots() -> None:
     assert vector.turn == pytest.approx(turn, abs=0.03)
     beside = between(np.array(poses[-1]), np.array(TARGET))
     assert abs(wrapped(math.atan2(beside[1], beside[0]) - math.atan2(y, x))) > 0.2
+    assert not homing.ctx.warnings
+    homing.at(poses[-1])
+    assert homing.ctx.warnings[0].startswith("homing: the camera sits 0.32 m beside the robot's axis")
 
 
 def test_the_depth_ratio_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:
