@@ -257,6 +257,14 @@ def test_a_track_that_stands_still_keeps_its_direction() -> None:
     np.testing.assert_allclose(directions, math.pi / 4)
 
 
+@pytest.mark.parametrize("noise_m", [0.005, 0.1])
+def test_noisy_positions_of_a_robot_that_stands_do_not_turn_it(noise_m: float) -> None:
+    seconds = np.arange(0.0, 60.0, 0.1)
+    x = 0.4 * np.where(seconds < 20.0, seconds, np.maximum(20.0, seconds - 20.0))
+    positions = np.column_stack([x, x]) + np.random.default_rng(0).normal(0, noise_m, (len(x), 2))
+    assert abs(track_directions(seconds, positions, window=1.0) - math.pi / 4).max() < 0.3
+
+
 @needs_data
 @pytest.mark.parametrize(
     ("log", "frames", "dropped"),
