@@ -53,9 +53,9 @@ def frame_poses(
     known = np.flatnonzero((track_times != NO_TIME) & np.isfinite(x + y))
     rows = known[ascending_rows(track_times[known])]
     stamps, ascending = track_times[rows], len(rows)
-    likely = np.arange(len(rows))
+    likely, jumps = np.arange(len(rows)), np.empty(0, np.int64)
     if own is not None or description.frames.time is not None:  # else nothing states how fast the robot was
-        likely = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits).rows
+        likely, jumps, _ = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits)
     said = [f"{table.path.name}: row {row}: no robot gets to its position" for row in np.delete(rows, likely)]
     rows, stamps = rows[likely], stamps[likely]
     if len(rows) < 2:
@@ -72,7 +72,7 @@ def frame_poses(
     sure = np.isfinite(track).all(axis=1)
     if sure.sum() < 2:
         raise UnreadableRecording(f"{table.path}: fewer than two rows with a heading")
-    poses[timed] = poses_near(stamps[sure], track[sure], shifted, positions.max_gap)
+    poses[timed] = poses_near(stamps[sure], track[sure], shifted, positions.max_gap, stamps[jumps])
     return poses, said
 
 

@@ -33,8 +33,10 @@ def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:
     return at
 
 
-def poses_near(times: Stamps, poses: Array, stamps: Stamps, max_gap_s: float) -> Array:
-    """Interpolates as `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away.
+def poses_near(times: Stamps, poses: Array, stamps: Stamps, max_gap_s: float, begun: npt.ArrayLike = ()) -> Array:
+    """Interpolates as `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away, and over jumps.
+
+    `begun` (J,): stamps (ns) at which the track starts again.
 
     The first and the last pose are also those of stamps that rounding alone puts before and after them.
     """
@@ -42,7 +44,8 @@ def poses_near(times: Stamps, poses: Array, stamps: Stamps, max_gap_s: float) ->
     at = poses_at(times, poses, np.where(np.abs(stamps - ends) <= SAME_TIME_S * 1e9, ends, stamps))
     after = np.clip(np.searchsorted(times, stamps), 1, len(times) - 1)
     gap = np.minimum(np.abs(stamps - times[after - 1]), np.abs(times[after] - stamps))
-    at[gap > max_gap_s * 1e9] = np.nan
+    jumps = np.isin(after, np.searchsorted(times, begun)) & (times[after - 1] < stamps) & (stamps < times[after])
+    at[jumps | (gap > max_gap_s * 1e9)] = np.nan
     return at
 
 

@@ -68,15 +68,16 @@ def truth_from(
     """The true poses (N, 3) that a file holds of a recording's images, interpolated at their times; and doubts.
 
     An image taken at t is looked up at t + `clock_offset_s`; it has no truth before the file's first pose, after its
-    last, and more than `max_gap_s` from the nearest (a row of NaN), which is counted as `no_truth`, poses to which no
-    robot gets as `impossible_motion`, orientations whose quaternion is no rotation as `impossible_pose`, and rows that
-    lack something as `bad_truth_row`. Raises `UnreadableRecording` for a file that holds no trajectory, and where no
-    image has a true pose.
+    last, at a jump, and more than `max_gap_s` from the nearest (a row of NaN), which is counted as `no_truth`, poses to
+    which no robot gets as `impossible_motion`, orientations whose quaternion is no rotation as `impossible_pose`, and
+    rows that lack something as `bad_truth_row`. Raises `UnreadableRecording` for a file that holds no trajectory, and
+    where no image has a true pose.
     """
     stamps, poses, impossible, lost, doubts = read_trajectory(file)
-    likely = believed(stamps, poses, limits).rows
+    likely, jumps, _ = believed(stamps, poses, limits)
     shifted = recording.stamps + round(clock_offset_s * 1e9)
-    truth = poses_near(stamps[likely], poses[likely], shifted, max_gap_s) if len(likely) > 1 else None
+    begun = stamps[likely[jumps]]
+    truth = poses_near(stamps[likely], poses[likely], shifted, max_gap_s, begun) if len(likely) > 1 else None
     unlikely = len(stamps) - len(likely)
     fast = f"of {len(stamps):,} beyond {limits.speed:g} m/s or {limits.turn:.3g} rad/s (nodes.source.limits)"
     if too_fast := 2 * unlikely > len(stamps):
@@ -89,7 +90,7 @@ def truth_from(
             f"the images' {_span(shifted)}; clocks that differ: "
             "nodes.source.truth_clock_offset_s=SECONDS, the file's clock minus the log's"
         )
-    far = f"before its first pose, after its last or more than {max_gap_s:g} s from all"
+    far = f"before its first pose, after its last, at a jump or more than {max_gap_s:g} s from all"
     for kind, number, noun, what in (
         ("bad_truth_row", sum(lost.values()), "row", f"left out: {_listed(lost)}"),
         ("impossible_pose", impossible, "orientation", NO_ROTATION),

@@ -112,6 +112,16 @@ def test_a_position_that_no_robot_reaches_is_dropped_and_counted(tmp_path: Path)
     np.testing.assert_allclose(recording.truth[:, 0], 5 + np.array([0.5, 1.5, 2.5, 3.5]) * 0.0254)
 
 
+def test_an_image_between_two_positions_that_no_robot_gets_between_has_none(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    track = [f"{9.05 + n * 0.1:.2f};{n + 900 * (n >= 12)};0;0" for n in range(25)]
+    (path / "track.csv").write_text("\n".join(track))
+    recording = open_recording(str(path))
+    assert recording.dropped == {"no_position": 1}
+    inches = np.array([9.5, 10.5, 912.5, 913.5, 914.5])
+    np.testing.assert_allclose(recording.truth[:, 0], 5 + inches * 0.0254)
+
+
 def test_images_without_a_clock_come_at_a_constant_rate(tmp_path: Path) -> None:
     description = """
     frames: {csv: frames.csv, file: 0, header: false, images: pictures, period: 0.5}

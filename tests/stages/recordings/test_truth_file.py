@@ -186,9 +186,18 @@ def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) 
         expected = pose_at((out.tick.stamp - START) / 1e9)
         assert (out.truth.x, out.truth.y, out.truth.heading) == pytest.approx(expected, abs=2e-2)
     assert 0 < ctx.counts["no_truth"] == FRAMES - len(known)
-    assert "before its first pose, after its last or more than 0.5 s from all" in ctx.details["no_truth"]
+    assert "before its first pose, after its last, at a jump or more than 0.5 s from all" in ctx.details["no_truth"]
     assert ctx.facts["odometry"] == "measured"
     assert source.inputs_digest() != LogSource(log=log).inputs_digest()
+
+
+def test_where_the_truth_of_a_file_jumps_an_image_has_none(tmp_path: Path) -> None:
+    rows = [f"{START / 1e9 + at - 0.05:.3f} {100 * (n > 48)} 0 0 0 0 0 1" for n, at in enumerate(SECONDS)]
+    (tmp_path / "truth.tum").write_text("\n".join(rows))
+    source = LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.tum"))
+    truths = [out.truth for out in ticks(source, Context("source"))]
+    assert {truth.x for truth in truths if truth is not None} == {0.0, 100.0}
+    assert [number for number, truth in enumerate(truths) if truth is None] == [9]
 
 
 def test_clocks_that_do_not_meet_are_said_with_both_spans(tmp_path: Path) -> None:
