@@ -33,7 +33,7 @@ def main() -> int:
 
     from benchmarks.changing_field import graph_on_field
     from omninav.pipeline.engine.engine import Engine, EngineOptions
-    from omninav.stages.metrics.view_map_size import stored_bytes
+    from omninav.stages.metrics.map_size import stored_bytes
 
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     variant = sys.argv[2] if len(sys.argv) > 2 else "omniview_cml"

@@ -1,5 +1,8 @@
 """Size of a map."""
 
+import dataclasses
+from typing import Any
+
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -16,7 +19,7 @@ class MapSize(MetricStage):
     """Measures the size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
 
     def step(self, ctx: Context, map: ReferenceGraph) -> MetricStage.Out:
-        size = map.features.nbytes + map.poses.nbytes + map.edges.nbytes
+        size = stored_bytes(map)
         ctx.fact("map_poses", map.pose_source)
         values = {
             "size_bytes": size,
@@ -26,3 +29,9 @@ class MapSize(MetricStage):
             "pose_source": map.pose_source,
         }
         return self.Out(metrics=Metrics({"map": values}, SPECS))
+
+
+def stored_bytes(value: Any) -> int:
+    """Bytes of a value's arrays, and of those of the values that it holds."""
+    fields = [getattr(value, field.name) for field in dataclasses.fields(value)]
+    return sum(stored_bytes(each) if dataclasses.is_dataclass(each) else getattr(each, "nbytes", 0) for each in fields)

@@ -16,7 +16,7 @@ from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.mapping.view_updates import PendingUpdates
 from omninav.stages.match.neighbours import ViewNeighbours
-from omninav.stages.metrics.view_map_size import stored_bytes
+from omninav.stages.metrics.map_size import stored_bytes
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import Motion

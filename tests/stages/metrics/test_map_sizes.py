@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from made_values import with_few_landmarks
 from measured_drives import AT_ORIGIN, figures, made_drive
 from small_run import mixture_run, reference_graph, small_run
 
@@ -30,6 +31,16 @@ def test_a_map_of_references_is_as_large_as_its_arrays():
     }
     assert ctx.facts["map_poses"] == "truth"
     assert figures(MapSize(), reference_graph(0))["map"]["reference_size_bytes"] is None
+
+
+def test_a_map_is_as_large_as_its_landmarks_and_words_make_it():
+    graph = with_few_landmarks()
+    marks, words = graph.landmarks, graph.landmarks.words
+    bare = figures(MapSize(), dataclasses.replace(graph, landmarks=None))["map"]["size_bytes"]
+    more = (marks.points, marks.descriptors, marks.starts, marks.seen, marks.described, marks.mount, marks.pose_sigmas)
+    more += (words.centres, words.rarity, words.starts, words.words, words.weights)
+    expected = bare + sum(array.nbytes for array in more if array is not None)
+    assert figures(MapSize(), graph)["map"]["size_bytes"] == expected
 
 
 @pytest.fixture(scope="module")
