@@ -18,7 +18,7 @@ from .plan_chart import tinted
 PINK = (154, 96, 195)
 """Blue-green-red."""
 COLUMNS = 900
-"""Ticks that are distinct in the plot; of longer drives the largest belief in each."""
+"""Most columns of the plot; where more than one tick is in a column, the largest belief is shown."""
 
 
 class PlaceBeliefOverTime(PlotStage):
@@ -70,20 +70,25 @@ def with_neighbours(shares: Array, nearest: Ints, map: TopologicalMap) -> tuple[
     return alone, np.where(nearest >= 0, (shares * linked[nearest]).sum(axis=1), np.nan)
 
 
-def binned(shares: Array, columns: int) -> Array:
-    """The largest of neighbouring ticks, so that (N, P) becomes at most (columns, P)."""
-    if len(shares) <= columns:
-        return shares
-    edges = np.linspace(0, len(shares), columns + 1).astype(np.int64)[:-1]
-    fewer: Array = np.fmax.reduceat(shares, edges, axis=0)
-    return fewer
+def binned(shares: Array, seconds: Array, edges: Array, step: float) -> Array:
+    """The largest share (C, P) of the ticks (N, P) between each two of the edges (C + 1,), all in seconds.
+
+    Where no tick is, the one before is repeated for two steps; NaN further on.
+    """
+    first = np.searchsorted(seconds, edges[:-1])
+    largest: Array = np.fmax.reduceat(np.append(shares, np.full((1, shares.shape[1]), np.nan), axis=0), first, axis=0)
+    empty = np.flatnonzero(first == np.searchsorted(seconds, edges[1:]))
+    before = first[empty] - 1
+    largest[empty] = np.where((edges[empty] - seconds[before] > 2 * step)[:, None], np.nan, shares[before])
+    return largest
 
 
 def _draw(seconds: Array, shares: Array, nearest: Ints, map: TopologicalMap) -> bytes:
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
     time, middle = (float(seconds[0]), float(seconds[-1]) + step), seconds + step / 2
     upper = Chart(time, (-0.5, len(map) - 0.5), "time (s)", "place", height=(float(np.clip(5 * len(map), 150, 320)), 0))
-    opacity = np.round(255 * np.sqrt(np.nan_to_num(binned(shares, COLUMNS)))).astype(np.uint8)
+    edges = np.linspace(*time, min(COLUMNS, round((time[1] - time[0]) / step)) + 1)
+    opacity = np.round(255 * np.sqrt(np.nan_to_num(binned(shares, middle, edges, step)))).astype(np.uint8)
     upper.base.raster(tinted(opacity.T[::-1], PINK), (*time, -0.5, len(map) - 0.5))
     upper.name("belief", "pink", "square")
     if (nearest >= 0).any():

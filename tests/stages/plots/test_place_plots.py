@@ -92,10 +92,17 @@ def test_a_places_neighbours_are_those_that_it_is_linked_with():
 def test_of_a_long_drive_the_most_that_was_believed_is_kept():
     shares = np.zeros((1000, 2))
     shares[777, 1] = 0.9
-    fewer = binned(shares, 100)
+    seconds = np.arange(1000) + 0.5
+    fewer = binned(shares, seconds, np.linspace(0, 1000, 101), 1.0)
     assert fewer.shape == (100, 2)
     assert fewer[77].tolist() == [0.0, 0.9]
-    assert binned(shares, 5000) is shares
+    assert (binned(shares, seconds, np.arange(1001.0), 1.0) == shares).all()
+
+
+def test_a_belief_is_drawn_at_its_time_and_no_longer_than_two_steps():
+    shares, seconds = np.array([[0.1], [0.2], [0.3]]), np.array([0.5, 1.5, 7.5])
+    drawn = binned(shares, seconds, np.arange(9.0), 1.0)[:, 0]
+    np.testing.assert_array_equal(drawn, [0.1, 0.2, 0.2, 0.2, np.nan, np.nan, np.nan, 0.3])
 
 
 def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
