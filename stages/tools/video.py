@@ -78,9 +78,8 @@ class MakeVideo(Tool):
         if not scenes:
             end = f"{self.end:g} s" if self.end else "the end"
             raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and {end}; see its frames.csv")
-        lasted = scenes[-1]["seconds"] - scenes[0]["seconds"]
-        rate = self.speed * (len(scenes) - 1) / lasted if lasted > 0.0 else self.speed
-        rate = min(max(rate, MIN_RATE), MAX_RATE)
+        steps = np.diff([scene["seconds"] for scene in scenes])  # their median: between logs are hours
+        rate = min(max(self.speed / float(np.median(steps)) if len(steps) else self.speed, MIN_RATE), MAX_RATE)
         floor = Floor(scenes)
         with _writer(out, rate, (WIDTH, floor.seen_height + BAND + floor.height)) as writer:
             for number in range(len(scenes)):

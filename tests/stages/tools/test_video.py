@@ -119,6 +119,14 @@ def test_a_video_has_a_rate_that_players_can_show(tmp_path, seconds, rate):
     assert cv2.VideoCapture(str(tmp_path / "video.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(rate)
 
 
+def test_a_pause_between_two_logs_makes_a_video_no_slower(tmp_path):
+    with written_log(tmp_path / "result.mcap") as log:
+        for k in range(10):
+            write_scene(log, 100 + 0.5 * k + 86400 * (k >= 5), 0.1 * k, 0.0)
+    MakeVideo(run_folder=str(tmp_path), out=str(tmp_path / "video.mp4"), speed=3.0).run(Context("video"))
+    assert cv2.VideoCapture(str(tmp_path / "video.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(6.0)
+
+
 def whole_video(file, width):
     writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"mp4v"), 4.0, (width, 400))
     writer.write(np.zeros((400, width, 3), np.uint8))
