@@ -13,6 +13,8 @@ from .config import OdometryNoise
 
 DRAWS = 6
 """Normal random numbers per increment."""
+SLIDING_RAD = 0.02
+"""Rotations of an increment beyond its turn, above which the robot slides sideways: driving, ten times less (rad)."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.r
 
     Each increment is split into rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4), and each part
     gets noise: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then `added` noise
-    follows. A motion backwards is a negative translation, not two half turns.
+    follows. A motion backwards is a negative translation, not two half turns; of a robot that slides along something,
+    no rotation but its own turn adds noise.
     """
     motions = np.asarray(motions, dtype=np.float64)
     length = np.hypot(motions[:, 0], motions[:, 1])
@@ -47,9 +50,13 @@ def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.r
     first = np.where(length > 1e-6, np.arctan2(forward * motions[:, 1], forward * motions[:, 0]), 0.0)
     second = wrap(motions[:, 2] - first)
     drawn = rng.normal(size=(len(motions), DRAWS))
-    half = 0.5 * noise.drift**2 * length
-    first_seen = _misjudged(first, length, noise, half, bias, drawn[:, 0])
-    second_seen = _misjudged(second, length, noise, half, bias, drawn[:, 2])
+    half, turn = 0.5 * noise.drift**2 * length, np.abs(motions[:, 2])
+    slides = np.abs(first) + np.abs(second) > turn + SLIDING_RAD
+    first_sigma, second_sigma = (
+        np.sqrt(noise.rotation**2 * np.where(slides, turn / 2, np.abs(rotation)) + half) for rotation in (first, second)
+    )
+    first_seen = _misjudged(first, length, bias, first_sigma * drawn[:, 0])
+    second_seen = _misjudged(second, length, bias, second_sigma * drawn[:, 2])
     rolled = forward * (length * (1.0 + bias.translation) + noise.translation * np.sqrt(length) * drawn[:, 1])
     seen = np.stack([rolled * np.cos(first_seen), rolled * np.sin(first_seen), first_seen + second_seen], axis=1)
     return add_odometry_noise(seen, noise.added, drawn[:, 3:]) if any(noise.added) else seen
@@ -72,8 +79,7 @@ def odometry(
     return np.concatenate([np.zeros((1, 3)), chain(motions)])
 
 
-def _misjudged(rotation: Array, length: Array, noise: OdometryNoise, half: Array, bias: Bias, drawn: Array) -> Array:
+def _misjudged(rotation: Array, length: Array, bias: Bias, error: Array) -> Array:
     """Rotations as the wheels measure them, each with its half of what drifts over the metres."""
-    sigma = np.sqrt(noise.rotation**2 * np.abs(rotation) + half)
-    seen: Array = rotation * (1.0 + bias.rotation) + 0.5 * bias.turn * length + sigma * drawn
+    seen: Array = rotation * (1.0 + bias.rotation) + 0.5 * bias.turn * length + error
     return seen

@@ -105,6 +105,14 @@ def test_biases_scale_translation_and_rotation_and_bend_the_straight() -> None:
     assert odometry(spot, EXACT, Bias(0.0, 0.05, 0.0), rng)[-1, 2] == pytest.approx(2.1)
 
 
+@pytest.mark.parametrize("steps", [10, 500])
+def test_a_robot_that_slides_along_a_wall_without_turning_is_not_measured_to_turn(steps: int) -> None:
+    slid = np.stack([np.linspace(0.0, 2.0, steps + 1), np.zeros(steps + 1), np.full(steps + 1, 0.8)], axis=1)
+    rng = np.random.default_rng(5)
+    turned = [odometry(slid, OdometryNoise(), NO_BIAS, rng)[-1, 2] for _ in range(800)]
+    assert np.std(turned) == pytest.approx(0.0122 * math.sqrt(2.0), rel=0.1)
+
+
 def test_noise_grows_with_the_root_of_the_way_and_of_the_turn() -> None:
     """One metre straight: sigma of length 0.02, of heading 0.7 degrees; a turn of 1 rad: 1.2 degrees."""
     noise = OdometryNoise(scale_bias=0.0, rotation_bias=0.0, turn_bias=0.0)
