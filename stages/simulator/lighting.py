@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.arrays import Array, Bools, Floats
@@ -113,12 +114,14 @@ def light_map(
     corner: Array,
     size: tuple[float, float],
     step: float,
+    unlit: npt.ArrayLike = 1.0,
 ) -> Floats:
     """Irradiance (5, rows, columns, 3) of faces that look up, +x, -x, +y, -y, at points `step` m apart from `corner`.
 
     It falls with the square of the distance, and with the angles at the light and at the face. What is as high as the
     ceiling (`height`) casts shadows, so that a dark room stays dark. With everything on, the mean over the floor is 1;
-    a share `ambient` of it comes from all around: what faces throw back, here and everywhere.
+    a share `ambient` of it comes from all around: what faces throw back, here and everywhere. Without lights it is
+    `unlit` everywhere (blue, green, red).
     """
     columns, rows = (math.ceil((extent - 2 * c) / step) + 2 for extent, c in zip(size, corner, strict=True))
     x, y = corner[0] + step * np.arange(columns), corner[1] + step * np.arange(rows)
@@ -132,7 +135,7 @@ def light_map(
     lit *= (1.0 - ambient) / mean
     lit[1:] *= 1.6  # a wall also gets what floor and ceiling throw back
     if not lights:
-        return lit + np.float32(1.0)
+        return lit + np.asarray(unlit, np.float32)
     around = np.maximum(cv2.GaussianBlur(full, (0, 0), BOUNCE_SIGMA_M / step), 1e-9)
     here = cv2.GaussianBlur(lit[0], (0, 0), BOUNCE_SIGMA_M / step) * (mean / (1.0 - ambient) if ambient < 1.0 else 0.0)
     everywhere = here.mean(axis=(0, 1), dtype=np.float64) / mean

@@ -31,12 +31,13 @@ def build_scene(
     glow: Sequence[float],
     lights: Sequence[Light],
     ambient: float,
+    unlit: npt.ArrayLike,
     looks: Sequence[Sequence[Coverings]] = (),
 ) -> Scene:
     """The scene of boxes on a floor of `size` m under a ceiling at `height` m.
 
-    `images` and `glow` are the textures that tilings number, and how much of each shines by itself. `looks`: the
-    coverings of the parts of people, look by look.
+    `images` and `glow` are the textures that tilings number, and how much of each shines by itself. `unlit`: the
+    light (blue, green, red) where there are no `lights`. `looks`: the coverings of the parts of people, look by look.
     """
     tilings = [floor, ceiling, *(face for box in boxes for face in box.faces)]
     people = [face for look in looks for part in look for face in part]
@@ -65,7 +66,7 @@ def build_scene(
         grid=grid,
         rows=rows,
         columns=columns,
-        light=light_map(lights, ambient, bodies, height, grid[:2], size, LIGHT_STEP),
+        light=light_map(lights, ambient, bodies, height, grid[:2], size, LIGHT_STEP, unlit),
         light_step=LIGHT_STEP,
         contact=contact_map(bodies, grid[:2], size, CONTACT_STEP),
         contact_step=CONTACT_STEP,

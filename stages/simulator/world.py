@@ -238,6 +238,7 @@ class World:
             glow,
             lamps_and_windows(self.layout.lamps, self.layout.wall_panels, self.config, self.day),
             self.config.ambient,
+            day,
             looks,
         )
 

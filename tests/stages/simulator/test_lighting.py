@@ -71,6 +71,14 @@ def test_lamps_that_are_off_take_their_light_away_and_dim_days_dim_it() -> None:
     np.testing.assert_allclose(dusk / day, (0.4, 0.5, 0.6), rtol=1e-4)
 
 
+def test_a_world_without_lamps_has_the_light_of_its_day() -> None:
+    world = WorldConfig(days=(Day(), Day(light=(0.2, 1.0, 1.5))))
+    assert [np.unique(World(world, day).scene.light.reshape(-1, 3), axis=0).tolist() for day in (0, 1)] == [
+        [[1.0, 1.0, 1.0]],
+        [pytest.approx([0.2, 1.0, 1.5])],
+    ]
+
+
 def test_a_days_lamps_are_named_or_hit_by_a_share() -> None:
     lamps = [Lamp((float(k), 1.0), name="kitchen" if k < 3 else f"lamp {k}") for k in range(200)]
     config = WorldConfig(lamps=tuple(lamps), days=(Day(), Day(lamps_off=("kitchen", "lamp 7")), Day(lamps_off=0.3)))
