@@ -86,16 +86,21 @@ def _sky(config: WorldConfig, day: Day) -> list[Light]:
     """The light of an open sky, as from many large lamps where no roof is."""
     if config.ceiling != "sky":
         return []
-    columns, rows = (math.ceil(extent / SKY_LIGHT_SPACING_M) for extent in config.size)
+    across, along = (_sky_places(extent) for extent in config.size)
     roofs = [(*room.corner, *room.size) for room in config.rooms if room.walls]
-    points = [
-        ((c + 0.5) * SKY_LIGHT_SPACING_M, (r + 0.5) * SKY_LIGHT_SPACING_M) for r in range(rows) for c in range(columns)
-    ]
     return [
         Light(position=(x, y, config.height), colour=DAYLIGHT, on=day.light, scale=0.25 * SKY_LIGHT_SPACING_M**2)
-        for x, y in points
+        for y in along
+        for x in across
         if not any(left <= x <= left + wide and low <= y <= low + deep for left, low, wide, deep in roofs)
     ]
+
+
+def _sky_places(extent: float) -> list[float]:
+    """Places (m) of the sky's lamps along an axis: none beyond the outer wall, which would hide it."""
+    number, step = math.ceil(extent / SKY_LIGHT_SPACING_M), SKY_LIGHT_SPACING_M
+    step = extent / number if (number - 0.5) * step > extent else step
+    return [(n + 0.5) * step for n in range(number)]
 
 
 def lamps_on(lamps: Sequence[Lamp], config: WorldConfig, number: int) -> list[bool]:

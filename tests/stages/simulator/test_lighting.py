@@ -79,6 +79,15 @@ def test_a_world_without_lamps_has_the_light_of_its_day() -> None:
     ]
 
 
+def test_an_open_sky_lights_both_edges_of_any_floor_alike() -> None:
+    scene = World(WorldConfig(size=(9.0, 9.0), ceiling="sky")).scene
+    up = scene.light[0, :, :, 1]
+    row, column = (round((4.5 - corner) / scene.light_step) for corner in scene.grid[1::-1])
+    first, last = (round((y - scene.grid[1]) / scene.light_step) for y in (0.6, 8.4))
+    assert up[last, column] == pytest.approx(up[first, column], rel=0.1)
+    assert up[row, last] == pytest.approx(up[row, first], rel=0.1)
+
+
 def test_a_days_lamps_are_named_or_hit_by_a_share() -> None:
     lamps = [Lamp((float(k), 1.0), name="kitchen" if k < 3 else f"lamp {k}") for k in range(200)]
     config = WorldConfig(lamps=tuple(lamps), days=(Day(), Day(lamps_off=("kitchen", "lamp 7")), Day(lamps_off=0.3)))
