@@ -11,6 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.arrays import Floats
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.own_body import OwnBody
 
 from .colour_moments import disc_colours
 from .prepared_image import PreparedImage, prepared_image
@@ -54,25 +55,21 @@ class RotationReducedSift(Stage):
         """Make the detector; without the precise form it finds fine points a quarter of a pixel off."""
         self._camera: Camera | None = None
         self._mirrored = False
-        # Features that turn by themselves are found and described in one pass: some more, since edges take away.
-        most = 2 * self.max_features if self.orientation == "own" else 0
-        self._sift = cv2.SIFT.create(
-            nfeatures=most,
-            contrastThreshold=self.contrast,
-            edgeThreshold=EDGE_RATIO,
-            sigma=self.blur_px,
-            enable_precise_upscale=True,
-        )
+        self._body: OwnBody | None = None
+        self._sift = self._detector(self.max_features)
 
-    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        read = prepared_image(image, camera, self.max_pixels)
+    def step(
+        self, ctx: Context, image: Image | Panorama, camera: Camera | None = None, body: OwnBody | None = None
+    ) -> Out:
+        """Find the features of an image but for those of the robot's own `body`."""
+        read = self._without(prepared_image(image, camera, self.max_pixels), body)
         pixels, seen, seam = read.pixels, read.seen, 0
         if read.circle:
             seam = min(SEAM, pixels.shape[1])
             pixels = np.concatenate([pixels[:, -seam:], pixels, pixels[:, :seam]], axis=1)
-            seen = np.ones(pixels.shape[:2], np.bool_)
+            seen = np.concatenate([seen[:, -seam:], seen, seen[:, :seam]], axis=1)
         grey = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
-        mask = None if read.camera.upright else seen.astype(np.uint8)
+        mask = None if read.camera.upright and self._body is None else seen.astype(np.uint8)
         found = self._strongest(self._detected(grey, mask), read, seam)
         if not found:
             return self.Out(features=none_found())
@@ -88,6 +85,27 @@ class RotationReducedSift(Stage):
         features = LocalFeatures(bearings, points, rows, colours, sizes, mirrored=self._mirrored)
         shown = np.isfinite(features.bearings).all(axis=1)  # beyond the mirror's edge there is nothing to see
         return self.Out(features=features.chosen(np.flatnonzero(shown)))
+
+    def _detector(self, number: int) -> cv2.SIFT:
+        # Features that turn by themselves are found and described in one pass: some more, since edges take away.
+        return cv2.SIFT.create(
+            nfeatures=2 * number if self.orientation == "own" else 0,
+            contrastThreshold=self.contrast,
+            edgeThreshold=EDGE_RATIO,
+            sigma=self.blur_px,
+            enable_precise_upscale=True,
+        )
+
+    def _without(self, read: PreparedImage, body: OwnBody | None) -> PreparedImage:
+        if body is None or not body.cells.any():
+            return read
+        if body is not self._body:
+            if self._body is None:
+                self._sift = self._detector(0)  # it takes the strongest before those of the body are left out
+            rows, columns = read.seen.shape
+            grid = np.stack(np.meshgrid(np.arange(float(columns)), np.arange(float(rows))), axis=-1)
+            self._body, self._shown = body, ~body.hides(read.original(grid))
+        return read._replace(seen=read.seen & self._shown)
 
     def _detected(self, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
         if self.orientation == "reduced":

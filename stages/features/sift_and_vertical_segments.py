@@ -5,6 +5,7 @@ from dataclasses import replace
 from omninav.pipeline import Context
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.own_body import OwnBody
 
 from .rotation_reduced_sift import RotationReducedSift
 from .vertical_segments import FindVerticalSegments
@@ -21,7 +22,9 @@ class SiftAndVerticalSegments(RotationReducedSift):
         super().setup(ctx)
         self._columns = FindVerticalSegments(max_pixels=self.max_pixels)
 
-    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> RotationReducedSift.Out:
-        patches = super().step(ctx, image, camera).features
+    def step(
+        self, ctx: Context, image: Image | Panorama, camera: Camera | None = None, body: OwnBody | None = None
+    ) -> RotationReducedSift.Out:
+        patches = super().step(ctx, image, camera, body).features
         columns = self._columns.step(ctx, image, camera).vertical_segments
         return self.Out(features=replace(patches, columns=columns))

@@ -27,6 +27,7 @@ from omninav.stages.values.landmarks import Landmarks, stored_descriptors
 from omninav.stages.values.length_scale import DEFAULT_M
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
+from omninav.stages.values.own_body import OwnBody, references_without_body
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.visual_words import VisualWords
 
@@ -71,6 +72,7 @@ class LearnLandmarks(Stage):
         events: Sequence[ReferenceEvent | None],
         map: ReferenceGraph,
         words: VisualWords,
+        body: Sequence[OwnBody] = (),
         as_driven: ReferenceGraph | None = None,
         camera: Camera | None = None,
         ticks: Sequence[Tick] = (),
@@ -80,7 +82,7 @@ class LearnLandmarks(Stage):
         """The whole tour at once; `events`: which of its images became references; `as_driven`: the map before it was
         straightened. `ticks`, `odometry` and `truth` of all images tell how late these are stamped."""
         ctx.status("triangulating landmarks")
-        kept_features = [each for each, event in zip(features, events, strict=True) if event is not None]
+        kept_features = references_without_body(features, events, body)
         views, given = _views(kept_features), map.pose_source == "truth"
         check = CameraCheck.of(camera, kept_features, views.bearings, given)
         described = np.zeros(3) if camera is None else camera.mount

@@ -11,6 +11,7 @@ from omninav.stages.geometry.arrays import Bytes
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
+from omninav.stages.values.own_body import OwnBody, references_without_body
 from omninav.stages.values.topological_map import LoopHypotheses
 from omninav.stages.values.visual_words import PlaceWords, VisualWords, words_of
 
@@ -35,13 +36,16 @@ class LearnVisualWords(Stage):
         words: VisualWords
 
     def step(
-        self, ctx: Context, features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None]
+        self,
+        ctx: Context,
+        features: Sequence[LocalFeatures | None],
+        events: Sequence[ReferenceEvent | None],
+        body: Sequence[OwnBody] = (),
     ) -> Out:
         """The whole tour at once; `events`: which of its images became references."""
         views = [
             np.empty((0, 128), np.uint8) if found is None else found.descriptors
-            for found, event in zip(features, events, strict=True)
-            if event is not None
+            for found in references_without_body(features, events, body)
         ]
         ctx.status("learning visual words")
         made = vocabulary_and_words(views, self.words)

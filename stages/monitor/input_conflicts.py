@@ -25,6 +25,7 @@ from omninav.stages.values.pose import AssumedMotion, AssumedPose, Motion, Pose
 from omninav.stages.values.similarity import Similarities
 
 from .confidence_monitor import best_place
+from .covered_cells import CoveredCells
 from .turn_fit import TurnFit, clipped, explained, turn_fit
 
 INTERVAL_S = 0.25
@@ -91,11 +92,12 @@ def driven(odometry: Array) -> tuple[float, float]:
 
 class InputConflictsState(State):
     """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 14) of `Watched`, and the `strips` (rows,
-    columns) of the last ones, of which all but the first are still to be compared with the one before; the kind that
+    columns) of the last ones, of which all but the first are still to be compared with the one before; what is `covered` in them; the kind that
     the last judgement found; what was found, by its kind, and how many judgements ago each that holds was found last.
     """
 
     strips: list[Floats] = field(default_factory=list)
+    covered: CoveredCells = field(default_factory=CoveredCells)
     stamp: int = 0
     pose: Array = field(default_factory=lambda: np.full(3, np.nan))
     rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
@@ -247,6 +249,7 @@ def remember(recent: InputConflictsState, stamp: int, pixels: Floats) -> None:
         row[0, 10] = float((recent.strips[-1] == pixels).all())
     recent.rows = np.concatenate((recent.rows, row))[-WINDOW:]
     recent.strips.append(pixels)
+    recent.covered = recent.covered.seen(pixels)
     recent.stamp = stamp
 
 
@@ -257,23 +260,11 @@ def compare_strips(recent: InputConflictsState) -> None:
         strips = np.stack(list(run))
         first, end = end, end + len(strips)
         if len(strips) > 1:
-            seen = turns_and_correlations(without_covered(strips))
+            seen = turns_and_correlations(recent.covered.uncovered(strips))
             recent.rows[first + 1 : end or None, 8:10] = np.column_stack(seen)
     recent.strips = recent.strips[-1:]
 
 
-def without_covered(strips: Floats) -> Floats:
-    """Strips (N, rows, columns) in which columns that never change while others do count as even: something covers
-    them, and would hide the turns of the others."""
-    covered = np.ptp(strips, axis=0).max(axis=0) < COVERED_GREY
-    if not MIN_COVERED < covered.mean() < 1.0 - MIN_COVERED:
-        return strips
-    return np.where(covered, strips[:, :, ~covered].mean(axis=2, keepdims=True), strips)
-
-
-COVERED_GREY, MIN_COVERED = 6.0, 0.1
-"""Largest change of a pixel that is covered (grey levels of 255), and the smallest share of columns that is, or is not,
-for a cover to be told from a wall and from a robot that stands."""
 MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
 """Images before a leap of the clock, and what it is at least (s, and times the usual interval)."""
 LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)

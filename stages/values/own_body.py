@@ -1,0 +1,49 @@
+"""Parts of a camera's image in which a robot sees itself."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import field, replace
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Shape, Value
+from omninav.stages.geometry.arrays import Array, Bools, Ints
+
+from .local_features import LocalFeatures
+from .maps import ReferenceEvent
+
+
+class OwnBody(Value):
+    """Parts of an image in which a robot sees itself: `cells` (R, C), of `side` pixels each."""
+
+    cells: Annotated[Bools, Shape("R", "C")] = field(default_factory=lambda: np.zeros((1, 1), np.bool_))
+    side: float = math.inf
+
+    def hides(self, pixels: Array) -> Bools:
+        """Which pixels (..., 2) are of it: (...,)."""
+        column, row = self.cells_of(pixels)
+        return np.asarray(self.cells[row, column], np.bool_)
+
+    def cells_of(self, pixels: Array) -> tuple[Ints, Ints]:
+        rows, columns = self.cells.shape
+        found = np.nan_to_num(pixels / self.side).astype(np.int64)
+        return np.clip(found[..., 0], 0, columns - 1), np.clip(found[..., 1], 0, rows - 1)
+
+    def without(self, features: LocalFeatures) -> LocalFeatures:
+        """The features that are not of it."""
+        if not self.cells.any():
+            return features
+        kept = features.chosen(np.flatnonzero(~self.hides(features.points)))
+        if features.columns is None:
+            return kept
+        shown = ~self.hides(features.columns.points).any(axis=1)
+        return replace(kept, columns=features.columns.chosen(np.flatnonzero(shown)))
+
+
+def references_without_body(
+    features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None], body: Sequence[OwnBody]
+) -> list[LocalFeatures | None]:
+    """Features of a tour's images that became references, but for those of the robot's `body` as found by its end."""
+    kept = [each for each, event in zip(features, events, strict=True) if event is not None]
+    return [None if each is None else body[-1].without(each) for each in kept] if body else kept
