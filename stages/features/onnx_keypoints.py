@@ -13,6 +13,7 @@ from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.arrays import Array, Bytes, Floats
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.own_body import OwnBody
 
 from .colour_moments import disc_colours
 from .onnx_network import error_line, loaded, network_digest
@@ -79,29 +80,34 @@ class OnnxKeypoints(Stage):
         """The digest of the network, and of the version that runs it."""
         return network_digest(self.model)
 
-    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        mirror = camera if isinstance(image, Image) and camera is not None and camera.ring is not None else None
+    def step(
+        self, ctx: Context, image: Image | Panorama, camera: Camera | None = None, body: OwnBody | None = None
+    ) -> Out:
+        """Find the features of an image but for those of the robot's own `body`."""
+        mirror = camera if isinstance(image, Image) and camera is not None and not camera.upright else None
         read, seam = self._prepared(image if mirror is None else self._unwrapped(image.pixels, mirror), camera)
         points, scores, descriptors = self._found(read.pixels, seam)
         edge = np.array([0.5 if read.circle else 0.0, 0.0])  # a circle's last column borders on its first
         inside = ((points >= -edge) & (points < np.array(read.seen.shape[::-1]) - 1 + edge + 1e-9)).all(axis=1)
-        kept = np.flatnonzero(inside & (scores > 0) & (np.linalg.norm(descriptors, axis=1) > 0))
-        kept = kept[np.lexsort((points[kept, 1], points[kept, 0], -scores[kept]))[: self.max_features]]
+        likely = np.flatnonzero(inside & (scores > 0) & (np.linalg.norm(descriptors, axis=1) > 0))
+        likely = likely[np.lexsort((points[likely, 1], points[likely, 0], -scores[likely]))]
+        originals = read.original(points[likely])
+        bearings = read.bearings(originals)
+        if mirror is not None:
+            originals = seen_at(mirror, bearings)
+            bearings = mirror.unproject(originals)[0]
+        hidden = np.zeros(len(likely), np.bool_) if body is None else body.hides(originals)
+        shown = np.flatnonzero(np.isfinite(bearings).all(axis=1) & ~hidden)[: self.max_features]
+        kept, originals, bearings = likely[shown], originals[shown], bearings[shown]
         if not len(kept):
             return self.Out(features=none_found(2 * descriptors.shape[1]))
         sizes = np.full(len(kept), DIAMETER, np.float32)
         colours = disc_colours(read.pixels, read.seen, points[kept], COLOUR_RADIUS * sizes)
         sizes *= np.float32(read.scale.mean())
-        originals = read.original(points[kept])
-        bearings = read.bearings(originals)
-        if mirror is not None:
-            originals = seen_at(mirror, bearings)
-            bearings = mirror.unproject(originals)[0]
-        features = LocalFeatures(bearings, originals, signed_as_bytes(descriptors[kept]), colours, sizes)
-        return self.Out(features=features.chosen(np.flatnonzero(np.isfinite(bearings).all(axis=1))))
+        return self.Out(features=LocalFeatures(bearings, originals, signed_as_bytes(descriptors[kept]), colours, sizes))
 
     def _unwrapped(self, pixels: Pixels, camera: Camera) -> Panorama:
-        """A mirror's image as a panorama of square pixels."""
+        """The image of a mirror, or of lenses, as a panorama of square pixels."""
         if camera is not self._camera:
             top, bottom = self._edges = cast(tuple[float, float], camera.elevations)
             size = min(self.max_pixels, camera.width * camera.height_px)

@@ -9,7 +9,7 @@ from omninav.pipeline import Context, Outputs, Stage, State
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
-from omninav.stages.geometry.arrays import Array, Floats, Ints
+from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.own_body import OwnBody
 
@@ -30,6 +30,7 @@ MIN_RETURNS, MIN_SHARE = 3, 0.2
 class OwnBodyState(State):
     """An earlier image, and how often a cell's features were found again in their place, of how many: (R, C) each."""
 
+    size: tuple[int, int] = (0, 0)
     features: LocalFeatures | None = None
     looks: Floats = field(default_factory=lambda: np.empty((0, 128), np.float32))
     returns: Array = field(default_factory=lambda: np.zeros((1, 1)))
@@ -51,41 +52,45 @@ class WithoutBody(Stage):
 
     def step(self, ctx: Context, features: LocalFeatures, camera: Camera, state: OwnBodyState) -> Out:
         looks = root_descriptors(features.descriptors)
-        if state.body.side == math.inf:
-            side = max(camera.width, camera.height_px) / CELLS
-            shape = math.ceil(camera.height_px / side), math.ceil(camera.width / side)
-            state.returns, state.looked = np.zeros(shape), np.zeros(shape)
-            state.body = OwnBody(np.zeros(shape, np.bool_), side)
-        if state.features is None:
+        if (camera.width, camera.height_px) != state.size:
+            _begin(state, camera)
+        if state.features is None or looks.shape[1] != state.looks.shape[1]:
             state.features, state.looks = features, looks
-        else:
-            self._compare(state, features, looks)
+        elif self._compared(state, state.features, features, looks):
+            share = np.count_nonzero(state.body.cells) / state.body.cells.size
+            ctx.fact("own_body", f"covers {share:.0%} of the image, whose features are left out")
         return self.Out(features=state.body.without(features), body=state.body)
 
-    def _compare(self, state: OwnBodyState, features: LocalFeatures, looks: Floats) -> None:
-        before = state.features
-        assert before is not None
+    def _compared(self, state: OwnBodyState, before: LocalFeatures, features: LocalFeatures, looks: Floats) -> bool:
+        """Compares an image with the earlier one. Returns whether this changes where the body is."""
         pairs = mutual_nearest_units(state.looks, looks, RATIO)
         was, now = before.points[pairs.first], features.points[pairs.second]
         stays = np.hypot(*(now - was).T) < SAME_CELLS * state.body.side
         first, second = before.bearings[pairs.first[~stays]], features.bearings[pairs.second[~stays]]
-        turns = np.arctan2(second[:, 1], second[:, 0]) - np.arctan2(first[:, 1], first[:, 0])
-        mean = np.exp(1j * turns).mean() if len(turns) >= MIN_MATCHES else 0.0
-        if abs(mean) >= MIN_AGREEMENT and abs(np.angle(mean)) >= MIN_TURN:
-            np.add.at(state.returns, self._rows(state, now[stays]), 1.0)
-            np.add.at(state.looked, self._rows(state, features.points), 1.0)
-            returns, looked = _with_neighbours(state.returns), _with_neighbours(state.looked)
-            cells = (returns >= MIN_RETURNS) & (returns >= MIN_SHARE * looked)
-            if (cells != state.body.cells).any():
-                state.body = replace(state.body, cells=cells)
-        elif len(turns) >= MIN_MATCHES:
-            return
+        if len(first) < MIN_MATCHES:
+            state.features, state.looks = features, looks
+            return False
+        turn = np.exp(1j * (np.arctan2(second[:, 1], second[:, 0]) - np.arctan2(first[:, 1], first[:, 0]))).mean()
+        if abs(turn) < MIN_AGREEMENT or abs(np.angle(turn)) < MIN_TURN:
+            return False
         state.features, state.looks = features, looks
+        for counts, pixels in ((state.returns, now[stays]), (state.looked, features.points)):
+            np.add.at(counts, state.body.rows_and_columns(pixels), 1.0)
+        returns, looked = _with_neighbours(state.returns), _with_neighbours(state.looked)
+        cells = (returns >= MIN_RETURNS) & (returns >= MIN_SHARE * looked)
+        if (cells == state.body.cells).all():
+            return False
+        state.body = replace(state.body, cells=cells)
+        return True
 
-    @staticmethod
-    def _rows(state: OwnBodyState, pixels: Array) -> tuple[Ints, Ints]:
-        column, row = state.body.cells_of(pixels)
-        return row, column
+
+def _begin(state: OwnBodyState, camera: Camera) -> None:
+    """Nothing is known of the body in another camera's images."""
+    side = max(camera.width, camera.height_px) / CELLS
+    shape = math.ceil(camera.height_px / side), math.ceil(camera.width / side)
+    state.size, state.features = (camera.width, camera.height_px), None
+    state.body = OwnBody(np.zeros(shape, np.bool_), side)
+    state.returns, state.looked = np.zeros(shape), np.zeros(shape)
 
 
 def _with_neighbours(counts: Array) -> Array:

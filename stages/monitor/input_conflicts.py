@@ -92,8 +92,9 @@ def driven(odometry: Array) -> tuple[float, float]:
 
 class InputConflictsState(State):
     """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 14) of `Watched`, and the `strips` (rows,
-    columns) of the last ones, of which all but the first are still to be compared with the one before; what is `covered` in them; the kind that
-    the last judgement found; what was found, by its kind, and how many judgements ago each that holds was found last.
+    columns) of the last ones, of which all but the first are still to be compared with the one before; what is
+    `covered` in them; the kind that the last judgement found; what was found, by its kind, and how many judgements ago
+    each that holds was found last.
     """
 
     strips: list[Floats] = field(default_factory=list)

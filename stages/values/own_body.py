@@ -22,13 +22,13 @@ class OwnBody(Value):
 
     def hides(self, pixels: Array) -> Bools:
         """Which pixels (..., 2) are of it: (...,)."""
-        column, row = self.cells_of(pixels)
-        return np.asarray(self.cells[row, column], np.bool_)
+        return np.asarray(self.cells[self.rows_and_columns(pixels)], np.bool_)
 
-    def cells_of(self, pixels: Array) -> tuple[Ints, Ints]:
+    def rows_and_columns(self, pixels: Array) -> tuple[Ints, Ints]:
+        """The cells of pixels (..., 2); of those beside the image the nearest."""
         rows, columns = self.cells.shape
         found = np.nan_to_num(pixels / self.side).astype(np.int64)
-        return np.clip(found[..., 0], 0, columns - 1), np.clip(found[..., 1], 0, rows - 1)
+        return np.clip(found[..., 1], 0, rows - 1), np.clip(found[..., 0], 0, columns - 1)
 
     def without(self, features: LocalFeatures) -> LocalFeatures:
         """The features that are not of it."""
