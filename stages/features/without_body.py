@@ -23,7 +23,7 @@ MIN_MATCHES, MIN_AGREEMENT = 15, 0.8
 """Matches elsewhere in the image that tell a turn, and the mean cosine of their turns to their mean."""
 RATIO = 0.8
 """Largest ratio of the distances to the nearest and the second nearest descriptor of a match."""
-MIN_RETURNS, MIN_SHARE = 3, 0.2
+MIN_RETURNS, MIN_SHARE = 5, 0.2
 """Times that features have to be found again in one place after a turn, and their share of all there, of a body."""
 
 

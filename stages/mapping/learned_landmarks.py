@@ -72,7 +72,7 @@ class LearnLandmarks(Stage):
         events: Sequence[ReferenceEvent | None],
         map: ReferenceGraph,
         words: VisualWords,
-        body: Sequence[OwnBody] = (),
+        body: Sequence[OwnBody | None] = (),
         as_driven: ReferenceGraph | None = None,
         camera: Camera | None = None,
         ticks: Sequence[Tick] = (),

@@ -40,7 +40,7 @@ class LearnVisualWords(Stage):
         ctx: Context,
         features: Sequence[LocalFeatures | None],
         events: Sequence[ReferenceEvent | None],
-        body: Sequence[OwnBody] = (),
+        body: Sequence[OwnBody | None] = (),
     ) -> Out:
         """The whole tour at once; `events`: which of its images became references."""
         views = [

@@ -21,6 +21,7 @@ from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
+from omninav.stages.values.own_body import OwnBody, without_body
 from omninav.stages.values.pose import AssumedPose, Pose, PoseSource, frame_of
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -66,7 +67,9 @@ class ViewComparison(Stage):
         odometry: Sequence[Pose | None] = (),
         truth: Sequence[Pose | None] = (),
         known: TopologicalMap | None = None,
+        body: Sequence[OwnBody | None] = (),
     ) -> Out:
+        features = without_body(features, body)
         source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
         rows = self._chosen(ticks, features, descriptor, poses, odometry)

@@ -42,8 +42,16 @@ class OwnBody(Value):
 
 
 def references_without_body(
-    features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None], body: Sequence[OwnBody]
+    features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None], body: Sequence[OwnBody | None]
 ) -> list[LocalFeatures | None]:
     """Features of a tour's images that became references, but for those of the robot's `body` as found by its end."""
     kept = [each for each, event in zip(features, events, strict=True) if event is not None]
-    return [None if each is None else body[-1].without(each) for each in kept] if body else kept
+    return without_body(kept, body)
+
+
+def without_body(
+    features: Sequence[LocalFeatures | None], body: Sequence[OwnBody | None]
+) -> list[LocalFeatures | None]:
+    """Features of images but for those of the robot's `body` as it was found by the last one."""
+    found = next((each for each in reversed(body) if each is not None), OwnBody())
+    return [None if each is None else found.without(each) for each in features]
