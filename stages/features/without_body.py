@@ -24,7 +24,9 @@ MIN_MATCHES, MIN_AGREEMENT = 15, 0.8
 RATIO = 0.8
 """Largest ratio of the distances to the nearest and the second nearest descriptor of a match."""
 MIN_RETURNS, MIN_SHARE = 5, 0.2
-"""Times that features have to be found again in one place after a turn, and their share of all there, of a body."""
+"""Times that features of a body have to be found again in one place after a turn, and their share of all there."""
+MIN_CELLS = 24
+"""Fewest cells of a body: by chance up to 3 were found at once, in fourteen drives without one."""
 
 
 class OwnBodyState(State):
@@ -78,6 +80,7 @@ class WithoutBody(Stage):
             np.add.at(counts, state.body.rows_and_columns(pixels), 1.0)
         returns, looked = _with_neighbours(state.returns), _with_neighbours(state.looked)
         cells = (returns >= MIN_RETURNS) & (returns >= MIN_SHARE * looked)
+        cells &= np.count_nonzero(cells) >= MIN_CELLS
         if (cells == state.body.cells).all():
             return False
         state.body = replace(state.body, cells=cells)
