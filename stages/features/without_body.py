@@ -26,7 +26,7 @@ RATIO = 0.8
 MIN_RETURNS, MIN_SHARE = 5, 0.2
 """Times that features of a body have to be found again in one place after a turn, and their share of all there."""
 MIN_CELLS = 24
-"""Fewest cells of a body: by chance up to 3 were found at once, in fourteen drives without one."""
+"""Fewest cells of a body: by chance 7 were found at once in one of twelve drives without one, in the others none."""
 
 
 class OwnBodyState(State):
