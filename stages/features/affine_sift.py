@@ -25,5 +25,5 @@ class AffineSift(RotationReducedSift):
         super().setup(ctx)
         self._affine = cv2.AffineFeature.create(self._sift)
 
-    def _detected(self, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
+    def _detected(self, sift: cv2.SIFT, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
         return self._with_rows(*self._affine.detectAndCompute(grey, mask))

@@ -96,7 +96,9 @@ class OnnxKeypoints(Stage):
         if mirror is not None:
             originals = seen_at(mirror, bearings)
             bearings = mirror.unproject(originals)[0]
-        hidden = np.zeros(len(likely), np.bool_) if body is None else body.hides(originals)
+        hidden = np.zeros(len(likely), np.bool_)
+        if body is not None and body.found_in(image.pixels.shape[1], image.pixels.shape[0]):
+            hidden = body.hides(originals)
         shown = np.flatnonzero(np.isfinite(bearings).all(axis=1) & ~hidden)[: self.max_features]
         kept, originals, bearings = likely[shown], originals[shown], bearings[shown]
         if not len(kept):

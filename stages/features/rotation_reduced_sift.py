@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.camera.model import Camera
-from omninav.stages.geometry.arrays import Floats
+from omninav.stages.geometry.arrays import Bools, Floats
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.own_body import OwnBody
@@ -56,21 +56,27 @@ class RotationReducedSift(Stage):
         self._camera: Camera | None = None
         self._mirrored = False
         self._body: OwnBody | None = None
-        self._sift = self._detector(self.max_features)
+        # Features that turn by themselves are found and described in one pass: some more, since edges take away; and
+        # all, where a body takes away any number.
+        self._sift = self._detector(2 * self.max_features if self.orientation == "own" else 0)
+        self._unlimited = self._detector(0)
 
     def step(
         self, ctx: Context, image: Image | Panorama, camera: Camera | None = None, body: OwnBody | None = None
     ) -> Out:
         """Find the features of an image but for those of the robot's own `body`."""
-        read = self._without(prepared_image(image, camera, self.max_pixels), body)
-        pixels, seen, seam = read.pixels, read.seen, 0
+        read = prepared_image(image, camera, self.max_pixels)
+        pixels, seen, seam, sift = read.pixels, read.seen, 0, self._sift
+        hidden = body is not None and body.found_in(read.camera.width, read.camera.height_px)
+        if body is not None and hidden:
+            seen, sift = seen & self._shows(read, body), self._unlimited
         if read.circle:
             seam = min(SEAM, pixels.shape[1])
             pixels = np.concatenate([pixels[:, -seam:], pixels, pixels[:, :seam]], axis=1)
             seen = np.concatenate([seen[:, -seam:], seen, seen[:, :seam]], axis=1)
         grey = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
-        mask = None if read.camera.upright and self._body is None else seen.astype(np.uint8)
-        found = self._strongest(self._detected(grey, mask), read, seam)
+        mask = None if read.camera.upright and not hidden else seen.astype(np.uint8)
+        found = self._strongest(self._detected(sift, grey, mask), read, seam)
         if not found:
             return self.Out(features=none_found())
         descriptors = self._described(grey, found)
@@ -87,30 +93,26 @@ class RotationReducedSift(Stage):
         return self.Out(features=features.chosen(np.flatnonzero(shown)))
 
     def _detector(self, number: int) -> cv2.SIFT:
-        # Features that turn by themselves are found and described in one pass: some more, since edges take away.
         return cv2.SIFT.create(
-            nfeatures=2 * number if self.orientation == "own" else 0,
+            nfeatures=number,
             contrastThreshold=self.contrast,
             edgeThreshold=EDGE_RATIO,
             sigma=self.blur_px,
             enable_precise_upscale=True,
         )
 
-    def _without(self, read: PreparedImage, body: OwnBody | None) -> PreparedImage:
-        if body is None or not body.cells.any():
-            return read
+    def _shows(self, read: PreparedImage, body: OwnBody) -> Bools:
+        """Tells which pixels (rows, columns) of the image are not of the robot's own body."""
         if body is not self._body:
-            if self._body is None:
-                self._sift = self._detector(0)  # it takes the strongest before those of the body are left out
             rows, columns = read.seen.shape
             grid = np.stack(np.meshgrid(np.arange(float(columns)), np.arange(float(rows))), axis=-1)
-            self._body, self._shown = body, ~body.hides(read.original(grid))
-        return read._replace(seen=read.seen & self._shown)
+            self._body, self._world = body, ~body.hides(read.original(grid))
+        return self._world
 
-    def _detected(self, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
+    def _detected(self, sift: cv2.SIFT, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
         if self.orientation == "reduced":
-            return list(self._sift.detect(grey, mask))
-        return self._with_rows(*self._sift.detectAndCompute(grey, mask))
+            return list(sift.detect(grey, mask))
+        return self._with_rows(*sift.detectAndCompute(grey, mask))
 
     def _with_rows(self, found: Sequence[cv2.KeyPoint], rows: Any) -> list[cv2.KeyPoint]:
         self._rows = rows

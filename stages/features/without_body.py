@@ -21,6 +21,11 @@ MIN_TURN = math.radians(10.0)
 """Turn of the robot after which nothing but its body is seen where it was (rad)."""
 MIN_MATCHES, MIN_AGREEMENT = 15, 0.8
 """Matches elsewhere in the image that tell a turn, and the mean cosine of their turns to their mean."""
+SECTORS, MIN_SECTORS, SAME_TURN = 12, 7, math.radians(5.0)
+"""Sectors around the robot, those of them that must hold such a match, and by how much its turn differs from the mean
+(rad): things near that pass by on one side move alike too, in half of the sectors at most."""
+MAX_LOOKED = 20.0
+"""Features of a cell that count: a body that is put on or off later is told then."""
 RATIO = 0.8
 """Largest ratio of the distances to the nearest and the second nearest descriptor of a match."""
 MIN_RETURNS, MIN_SHARE = 5, 0.2
@@ -32,7 +37,6 @@ MIN_CELLS = 24
 class OwnBodyState(State):
     """An earlier image, and how often a cell's features were found again in their place, of how many: (R, C) each."""
 
-    size: tuple[int, int] = (0, 0)
     features: LocalFeatures | None = None
     looks: Floats = field(default_factory=lambda: np.empty((0, 128), np.float32))
     returns: Array = field(default_factory=lambda: np.zeros((1, 1)))
@@ -54,16 +58,18 @@ class WithoutBody(Stage):
 
     def step(self, ctx: Context, features: LocalFeatures, camera: Camera, state: OwnBodyState) -> Out:
         looks = root_descriptors(features.descriptors)
-        if (camera.width, camera.height_px) != state.size:
-            _begin(state, camera)
+        if ctx.tick.first_of_log or (camera.width, camera.height_px) != state.body.size:
+            _begin(state, camera, ctx.tick.log)
         if state.features is None or looks.shape[1] != state.looks.shape[1]:
             state.features, state.looks = features, looks
-        elif self._compared(state, state.features, features, looks):
+        elif self._compared(state, state.features, features, looks, camera.wraps):
             share = np.count_nonzero(state.body.cells) / state.body.cells.size
             ctx.fact("own_body", f"covers {share:.0%} of the image, whose features are left out")
         return self.Out(features=state.body.without(features), body=state.body)
 
-    def _compared(self, state: OwnBodyState, before: LocalFeatures, features: LocalFeatures, looks: Floats) -> bool:
+    def _compared(
+        self, state: OwnBodyState, before: LocalFeatures, features: LocalFeatures, looks: Floats, circle: bool
+    ) -> bool:
         """Compares an image with the earlier one. Returns whether this changes where the body is."""
         pairs = mutual_nearest_units(state.looks, looks, RATIO)
         was, now = before.points[pairs.first], features.points[pairs.second]
@@ -72,13 +78,20 @@ class WithoutBody(Stage):
         if len(first) < MIN_MATCHES:
             state.features, state.looks = features, looks
             return False
-        turn = np.exp(1j * (np.arctan2(second[:, 1], second[:, 0]) - np.arctan2(first[:, 1], first[:, 0]))).mean()
+        azimuths = np.arctan2(first[:, 1], first[:, 0])
+        turns = np.exp(1j * (np.arctan2(second[:, 1], second[:, 0]) - azimuths))
+        turn = turns.mean()
         if abs(turn) < MIN_AGREEMENT or abs(np.angle(turn)) < MIN_TURN:
+            return False
+        alike = np.abs(np.angle(turns / turn)) < SAME_TURN
+        if len(np.unique((azimuths[alike] // (math.tau / SECTORS)).astype(np.int64))) < MIN_SECTORS:
             return False
         state.features, state.looks = features, looks
         for counts, pixels in ((state.returns, now[stays]), (state.looked, features.points)):
             np.add.at(counts, state.body.rows_and_columns(pixels), 1.0)
-        returns, looked = _with_neighbours(state.returns), _with_neighbours(state.looked)
+        kept = MAX_LOOKED / np.maximum(state.looked, MAX_LOOKED)
+        state.returns, state.looked = kept * state.returns, kept * state.looked
+        returns, looked = _with_neighbours(state.returns, circle), _with_neighbours(state.looked, circle)
         cells = (returns >= MIN_RETURNS) & (returns >= MIN_SHARE * looked)
         cells &= np.count_nonzero(cells) >= MIN_CELLS
         if (cells == state.body.cells).all():
@@ -87,17 +100,17 @@ class WithoutBody(Stage):
         return True
 
 
-def _begin(state: OwnBodyState, camera: Camera) -> None:
-    """Nothing is known of the body in another camera's images."""
+def _begin(state: OwnBodyState, camera: Camera, log: int) -> None:
+    """Nothing is known of the body in another camera's images, or another log's."""
     side = max(camera.width, camera.height_px) / CELLS
     shape = math.ceil(camera.height_px / side), math.ceil(camera.width / side)
-    state.size, state.features = (camera.width, camera.height_px), None
-    state.body = OwnBody(np.zeros(shape, np.bool_), side)
+    state.features = None
+    state.body = OwnBody(np.zeros(shape, np.bool_), side, (camera.width, camera.height_px), log)
     state.returns, state.looked = np.zeros(shape), np.zeros(shape)
 
 
-def _with_neighbours(counts: Array) -> Array:
-    """Sums over each cell and the eight around it."""
-    padded = np.pad(counts, 1)
+def _with_neighbours(counts: Array, circle: bool) -> Array:
+    """Sums over each cell and the eight around it; on a `circle` the first column borders on the last."""
+    padded = np.pad(np.pad(counts, ((0, 0), (1, 1)), mode="wrap" if circle else "constant"), ((1, 1), (0, 0)))
     rows, columns = counts.shape
     return sum((padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)), np.zeros_like(counts))

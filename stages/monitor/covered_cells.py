@@ -8,33 +8,33 @@ import numpy as np
 from omninav.pipeline import Bounds, Shape, Value
 from omninav.stages.geometry.arrays import Array, Bools, Floats
 
-MIN_IMAGES = 6
-"""Images before any cell is told to be covered."""
+MIN_IMAGES, MAX_IMAGES = 6, 128
+"""Images before any cell is told to be covered, and number of the last ones that count, about."""
 USUAL, COVERED_SHARE = 0.75, 0.35
 """Quantile of the cells' standard deviations, and the share of it below which a cell is covered: of a body in the light
 of the rooms 0.24 to 0.32, of uniform walls and floors 0.5 and more after a hundred images, 0.36 after forty."""
 
 
 class CoveredCells(Value):
-    """Mean grey and summed squared deviations of the cells of all `images` so far: (rows, columns) each."""
+    """Mean grey and variance of the cells of the last `images`: (rows, columns) each."""
 
     images: Annotated[int, Bounds(ge=0)] = 0
     mean: Annotated[Array, Shape("R", "C")] = field(default_factory=lambda: np.zeros((0, 0)))
-    squares: Annotated[Array, Shape("R", "C")] = field(default_factory=lambda: np.zeros((0, 0)))
+    variance: Annotated[Array, Shape("R", "C")] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def seen(self, strip: Floats) -> "CoveredCells":
         """Add a strip (rows, columns); one of another size begins anew."""
         if strip.shape != self.mean.shape:
             return CoveredCells(1, strip.astype(np.float64), np.zeros(strip.shape))
-        images, away = self.images + 1, strip - self.mean
-        mean = self.mean + away / images
-        return CoveredCells(images, mean, self.squares + away * (strip - mean))
+        images, away = min(self.images + 1, MAX_IMAGES), strip - self.mean
+        kept = 1.0 - 1.0 / images
+        return CoveredCells(images, self.mean + away / images, kept * (self.variance + away**2 / images))
 
     def cells(self) -> Bools:
         """Which cells (rows, columns) change much less than most."""
         if self.images < MIN_IMAGES:
             return np.zeros(self.mean.shape, np.bool_)
-        spread = np.sqrt(self.squares)
+        spread = np.sqrt(self.variance)
         return np.asarray(spread < COVERED_SHARE * np.quantile(spread, USUAL), np.bool_)
 
     def uncovered(self, strips: Floats) -> Floats:

@@ -143,7 +143,7 @@ class InputConflicts(Stage):
         of_map = () if map_conflicts is None else map_conflicts.sentences
         if ctx.tick.first_of_log or restart is not None:
             recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
-            recent.suspected, recent.standing = "", {}
+            recent.suspected, recent.standing, recent.covered = "", {}, CoveredCells()
         if sentence := leap(recent, ctx.tick, odometry):
             self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)

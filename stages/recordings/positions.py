@@ -20,8 +20,8 @@ MAX_STEEP_DEG = 60.0
 """Slope of what points ahead of a robot, in the median (degrees)."""
 MAX_FITTED = 1000
 """Positions that the direction at a point is fitted to: of eight seconds at 125 Hz."""
-MIN_WAY_M, SURE = 0.05, 4.0
-"""Way over two windows below which a robot stands (m), and in standard deviations that the noise of positions makes."""
+MIN_WAY, SURE = 10.0, 4.0
+"""Way over two windows below which a robot stands, in standard deviations of a position, and in those of the way."""
 
 
 def frame_poses(
@@ -135,7 +135,7 @@ def track_directions(along: Array, positions: Array, window: float, lag: float =
     `along` (N,): time or way at each of the `positions` (N, 2), never falling. At each point a straight line
     p(s) = p0 + v (s - s0), s0 = `along` - `lag`, is fitted to the positions within four windows with weights
     exp(-((s - s0) / window)^2 / 2), at even steps where there are more than `MAX_FITTED`; the direction is v's. Where
-    nothing moves within the window by `MIN_WAY_M` and more than noise does, it is the last one known.
+    nothing moves within the window by more than noise does, it is the last one known.
     """
     directions, noise = np.full(len(along), np.nan), _noise(along, positions)
     centres = np.clip(along - lag, along[0], along[-1])
@@ -148,7 +148,7 @@ def track_directions(along: Array, positions: Array, window: float, lag: float =
         weights = np.exp(-0.5 * (s / window) ** 2) + 1e-12
         s = s - (weights @ s) / weights.sum()
         velocity = (weights * s) @ (positions[near] - positions[near].mean(axis=0))
-        least = MIN_WAY_M / (2 * window) * (weights @ s**2)
+        least = MIN_WAY * np.sqrt(noise[near].max()) / (2 * window) * (weights @ s**2)
         if np.hypot(*velocity) > max(1e-12, least, SURE * np.sqrt((weights * s) ** 2 @ noise[near])):
             directions[point] = np.arctan2(velocity[1], velocity[0])
     known = np.flatnonzero(np.isfinite(directions))
@@ -165,4 +165,6 @@ def _noise(along: Array, positions: Array) -> Array:
     whole = along[2:] - along[:-2]
     share = np.divide(along[1:-1] - along[:-2], whole, out=np.full(len(whole), 0.5), where=whole > 0.0)[:, None]
     off = positions[1:-1] - (1.0 - share) * positions[:-2] - share * positions[2:]
-    return np.pad((off**2 / (1.0 + share**2 + (1.0 - share) ** 2)).mean(axis=1), 1, mode="edge")
+    found = (off**2 / (1.0 + share**2 + (1.0 - share) ** 2)).mean(axis=1)
+    found = np.minimum(found, np.median(found))  # in curves there is more than noise
+    return np.pad(found, 1, mode="edge")

@@ -79,7 +79,8 @@ class MakeVideo(Tool):
             end = f"{self.end:g} s" if self.end else "the end"
             raise BadInput(f"{self.run_folder}: no poses between {self.begin:g} s and {end}; see its frames.csv")
         steps = np.diff([scene["seconds"] for scene in scenes])  # their median: between logs are hours
-        rate = min(max(self.speed / float(np.median(steps)) if len(steps) else self.speed, MIN_RATE), MAX_RATE)
+        step = max(float(np.median(steps)), 1e-9) if len(steps) else 1.0
+        rate = min(max(self.speed / step, MIN_RATE), MAX_RATE)
         floor = Floor(scenes)
         with _writer(out, rate, (WIDTH, floor.seen_height + BAND + floor.height)) as writer:
             for number in range(len(scenes)):

@@ -15,10 +15,19 @@ from .maps import ReferenceEvent
 
 
 class OwnBody(Value):
-    """Parts of an image in which a robot sees itself: `cells` (R, C), of `side` pixels each."""
+    """Parts of an image in which a robot sees itself: `cells` (R, C), of `side` pixels each.
+
+    `size`: columns and rows of the image (pixels); `log`: the log that it is of.
+    """
 
     cells: Annotated[Bools, Shape("R", "C")] = field(default_factory=lambda: np.zeros((1, 1), np.bool_))
     side: float = math.inf
+    size: tuple[int, int] = (0, 0)
+    log: int = 0
+
+    def found_in(self, width: int, height: int) -> bool:
+        """Tells whether there is any, in images of this size (pixels)."""
+        return self.size == (width, height) and bool(self.cells.any())
 
     def hides(self, pixels: Array) -> Bools:
         """Which pixels (..., 2) are of it: (...,)."""
@@ -45,13 +54,14 @@ def references_without_body(
     features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None], body: Sequence[OwnBody | None]
 ) -> list[LocalFeatures | None]:
     """Features of a tour's images that became references, but for those of the robot's `body` as found by its end."""
-    kept = [each for each, event in zip(features, events, strict=True) if event is not None]
-    return without_body(kept, body)
+    kept = without_body(features, body)
+    return [each for each, event in zip(kept, events, strict=True) if event is not None]
 
 
 def without_body(
     features: Sequence[LocalFeatures | None], body: Sequence[OwnBody | None]
 ) -> list[LocalFeatures | None]:
-    """Features of images but for those of the robot's `body` as it was found by the last one."""
-    found = next((each for each in reversed(body) if each is not None), OwnBody())
-    return [None if each is None else found.without(each) for each in features]
+    """Features of images but for those of the robot's `body` as the last image of the same log shows it."""
+    last = {each.log: each for each in body if each is not None}
+    whose = [OwnBody() if each is None else last[each.log] for each in body or [None] * len(features)]
+    return [None if each is None else own.without(each) for each, own in zip(features, whose, strict=True)]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.features.without_body import OwnBodyState, WithoutBody
@@ -82,10 +82,52 @@ def test_another_camera_begins_anew() -> None:
     assert not out.body.cells.any()
 
 
+def test_things_near_that_pass_by_on_one_side_are_no_turn() -> None:
+    stage, state, rng = WithoutBody(), OwnBodyState(), np.random.default_rng(2)
+    looks = rng.integers(0, 256, (4 * NUMBER, 128), dtype=np.uint8)
+    wall = np.column_stack([rng.uniform(-10.0, 40.0, 3 * NUMBER), np.full(3 * NUMBER, 2.0)])
+    far = np.deg2rad(rng.uniform(-170.0, -10.0, NUMBER))
+    rows = rng.uniform(100.0, 220.0, 4 * NUMBER)
+    for number in range(60):
+        near = wall - (0.3 * number, 0.0)
+        azimuths = np.concatenate([np.arctan2(near[:, 1], near[:, 0]), far])
+        flat = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(4 * NUMBER)])
+        points = np.column_stack([np.clip(CAMERA.project(flat)[0][:, 0], 0.0, 639.0), rows])
+        assert not stage.step(Context("body"), features(points, looks), CAMERA, state).body.cells.any()
+
+
+def test_each_log_has_a_body_of_its_own() -> None:
+    drive, context = Drive(), Context("body")
+    for number in range(30):
+        drive.out(math.radians(12.0) * number)
+    first = drive.state.body
+    context.tick = Tick(30, 0, 1, 0, True)
+    second = drive.stage.step(context, drive.image(0.0), CAMERA, drive.state).body
+    assert first.cells.any()
+    assert (second.cells.any(), first.log, second.log) == (False, 0, 1)
+    seen = drive.image(0.0)
+    kept = references_without_body([seen, seen], ["", ""], [OwnBody(), second])  # type: ignore[list-item]
+    assert [len(each or ()) for each in kept] == [2 * NUMBER, 2 * NUMBER]
+    kept = references_without_body([seen, seen, seen], ["", "", ""], [OwnBody(), first, second])  # type: ignore[list-item]
+    assert len(kept[0] or ()) < 1.1 * NUMBER
+    assert len(kept[2] or ()) == 2 * NUMBER
+
+
+def test_a_body_that_is_put_on_late_is_found() -> None:
+    drive = Drive()
+    own, drive.body = drive.body, drive.body[:0]
+    for number in range(100):
+        drive.out(math.radians(12.0) * number)
+    drive.body = own
+    for number in range(100, 130):
+        seen, _ = drive.out(math.radians(12.0) * number)
+    assert len(seen) < 1.1 * NUMBER
+
+
 def test_all_of_a_tour_is_without_the_body_that_its_end_knows() -> None:
     cells = np.zeros((40, 80), np.bool_)
     cells[20:, :40] = True
-    body = OwnBody(cells, 8.0)
+    body = OwnBody(cells, 8.0, (640, 320))
     points = np.array([[100.0, 200.0], [100.0, 100.0], [400.0, 200.0]])
     segments = VerticalSegments(
         np.zeros(3), np.zeros((3, 2)), np.zeros((3, 10), np.float32), np.ones(3, np.float32),
@@ -93,7 +135,7 @@ def test_all_of_a_tour_is_without_the_body_that_its_end_knows() -> None:
     )  # fmt: skip
     seen = features(points, np.zeros((3, 128), np.uint8))
     seen = LocalFeatures(seen.bearings, points, seen.descriptors, seen.colours, seen.sizes, segments)
-    kept = references_without_body([seen, seen, None], ["", None, ""], [OwnBody(), None, body, None])  # type: ignore[list-item]
+    kept = references_without_body([seen, seen, None], ["", None, ""], [OwnBody(), body, None])  # type: ignore[list-item]
     assert kept[1] is None
     assert kept[0] is not None
     assert len(kept) == 2
@@ -115,6 +157,6 @@ def test_a_body_takes_no_features_from_the_world(orientation: str) -> None:
     stage.setup(Context("features"))
     alone = stage.step(Context("features"), Image(pixels), CAMERA).features
     assert (alone.points[:, 0] < 328.0).mean() > 0.8
-    beside = stage.step(Context("features"), Image(pixels), CAMERA, OwnBody(cells, 8.0)).features
+    beside = stage.step(Context("features"), Image(pixels), CAMERA, OwnBody(cells, 8.0, (640, 320))).features
     assert len(beside) == 60
     assert (beside.points[:, 0] >= 327.0).all()
