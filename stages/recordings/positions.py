@@ -20,8 +20,11 @@ MAX_STEEP_DEG = 60.0
 """Slope of what points ahead of a robot, in the median (degrees)."""
 MAX_FITTED = 1000
 """Positions that the direction at a point is fitted to: of eight seconds at 125 Hz."""
-MIN_WAY, SURE = 10.0, 4.0
-"""Way over two windows below which a robot stands, in standard deviations of a position, and in those of the way."""
+MIN_WAY, MIN_WAY_M, SURE = 10.0, 0.05, 4.0
+"""Way over two windows below which a robot stands: in standard deviations of a position, but no more than so many
+metres, and in standard deviations of the way."""
+QUIET, QUIET_OF_MEAN = 0.25, 0.288
+"""Quantile of the noise at all positions, which straight and standing parts show, and what it is of the mean there."""
 
 
 def frame_poses(
@@ -148,7 +151,7 @@ def track_directions(along: Array, positions: Array, window: float, lag: float =
         weights = np.exp(-0.5 * (s / window) ** 2) + 1e-12
         s = s - (weights @ s) / weights.sum()
         velocity = (weights * s) @ (positions[near] - positions[near].mean(axis=0))
-        least = MIN_WAY * np.sqrt(noise[near].max()) / (2 * window) * (weights @ s**2)
+        least = min(MIN_WAY_M, MIN_WAY * np.sqrt(noise[near].max())) / (2 * window) * (weights @ s**2)
         if np.hypot(*velocity) > max(1e-12, least, SURE * np.sqrt((weights * s) ** 2 @ noise[near])):
             directions[point] = np.arctan2(velocity[1], velocity[0])
     known = np.flatnonzero(np.isfinite(directions))
@@ -166,5 +169,5 @@ def _noise(along: Array, positions: Array) -> Array:
     share = np.divide(along[1:-1] - along[:-2], whole, out=np.full(len(whole), 0.5), where=whole > 0.0)[:, None]
     off = positions[1:-1] - (1.0 - share) * positions[:-2] - share * positions[2:]
     found = (off**2 / (1.0 + share**2 + (1.0 - share) ** 2)).mean(axis=1)
-    found = np.minimum(found, np.median(found))  # in curves there is more than noise
+    found = np.minimum(found, np.quantile(found, QUIET) / QUIET_OF_MEAN)  # in curves there is more than noise
     return np.pad(found, 1, mode="edge")
