@@ -1,5 +1,7 @@
 """Size of a map of views, and how densely it covers what was visited."""
 
+import dataclasses
+
 import numpy as np
 
 from omninav.pipeline import Context, Metrics, MetricSpec, MetricStage
@@ -30,7 +32,7 @@ class ViewMapSize(MetricStage):
         ctx.fact("map_poses", map.pose_source)
         poses = drive.truth if drive.has_truth else drive.estimate
         path = poses[known(poses)][:, :2]
-        size, area = map_size.stored_bytes(map), visited_area(path, NEAR_M)
+        size, area = stored_bytes(map), visited_area(path, NEAR_M)
         figures = {
             "size_bytes": size,
             "references": len(map),
@@ -41,6 +43,12 @@ class ViewMapSize(MetricStage):
             "references_per_m2": len(map) / area if area else None,
         }
         return self.Out(metrics=Metrics({"map": figures}, SPECS, ("map.references", "map.size_bytes")))
+
+
+def stored_bytes(map: ViewMixtures) -> int:
+    """Bytes of a map's arrays."""
+    fields = (getattr(map, field.name) for field in dataclasses.fields(map))
+    return sum(field.nbytes for field in fields if isinstance(field, np.ndarray))
 
 
 def visited_area(path: Array, near_m: float) -> float:
