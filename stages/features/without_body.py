@@ -12,6 +12,7 @@ from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Floats
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.own_body import OwnBody
+from omninav.stages.values.pose import AssumedMotion, Motion
 
 CELLS = 80
 """Cells along the longer side of an image."""
@@ -21,9 +22,11 @@ MIN_TURN = math.radians(10.0)
 """Turn of the robot after which nothing but its body is seen where it was (rad)."""
 MIN_MATCHES, MIN_AGREEMENT = 15, 0.8
 """Matches elsewhere in the image that tell a turn, and the mean cosine of their turns to their mean."""
-SECTORS, MIN_SECTORS, SAME_TURN = 12, 7, math.radians(5.0)
-"""Sectors around the robot, those of them that must hold such a match, and by how much its turn differs from the mean
-(rad): things near that pass by on one side move alike too, in half of the sectors at most."""
+MIN_MEASURED = math.radians(5.0)
+"""Turn that odometry must have measured as well (rad): things near that pass by on one side look like a turn."""
+SECTORS, MIN_SECTORS, SAME_TURN = 12, 7, math.radians(10.0)
+"""Without odometry: sectors around the robot, those of them that must hold such a match, and by how much its turn
+differs from the mean (rad). Things on one side are in half of the sectors at most."""
 MAX_LOOKED = 20.0
 """Features of a cell that count: a body that is put on or off later is told then."""
 RATIO = 0.8
@@ -35,9 +38,13 @@ MIN_CELLS = 24
 
 
 class OwnBodyState(State):
-    """An earlier image, and how often a cell's features were found again in their place, of how many: (R, C) each."""
+    """An earlier image, and how often a cell's features were found again in their place, of how many: (R, C) each.
+
+    `turned`: what odometry has measured since (rad), NaN where it did not.
+    """
 
     features: LocalFeatures | None = None
+    turned: float = 0.0
     looks: Floats = field(default_factory=lambda: np.empty((0, 128), np.float32))
     returns: Array = field(default_factory=lambda: np.zeros((1, 1)))
     looked: Array = field(default_factory=lambda: np.zeros((1, 1)))
@@ -56,12 +63,21 @@ class WithoutBody(Stage):
         features: LocalFeatures
         body: OwnBody
 
-    def step(self, ctx: Context, features: LocalFeatures, camera: Camera, state: OwnBodyState) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        features: LocalFeatures,
+        camera: Camera,
+        state: OwnBodyState,
+        motion: Motion | None = None,
+    ) -> Out:
         looks = root_descriptors(features.descriptors)
         if ctx.tick.first_of_log or (camera.width, camera.height_px) != state.body.size:
             _begin(state, camera, ctx.tick.log)
+        measured = motion is not None and not isinstance(motion, AssumedMotion)
+        state.turned += motion.turn if motion is not None and measured else math.nan
         if state.features is None or looks.shape[1] != state.looks.shape[1]:
-            state.features, state.looks = features, looks
+            _keep(state, features, looks)
         elif self._compared(state, state.features, features, looks, camera.wraps):
             share = np.count_nonzero(state.body.cells) / state.body.cells.size
             ctx.fact("own_body", f"covers {share:.0%} of the image, whose features are left out")
@@ -76,7 +92,7 @@ class WithoutBody(Stage):
         stays = np.hypot(*(now - was).T) < SAME_CELLS * state.body.side
         first, second = before.bearings[pairs.first[~stays]], features.bearings[pairs.second[~stays]]
         if len(first) < MIN_MATCHES:
-            state.features, state.looks = features, looks
+            _keep(state, features, looks)
             return False
         azimuths = np.arctan2(first[:, 1], first[:, 0])
         turns = np.exp(1j * (np.arctan2(second[:, 1], second[:, 0]) - azimuths))
@@ -84,9 +100,10 @@ class WithoutBody(Stage):
         if abs(turn) < MIN_AGREEMENT or abs(np.angle(turn)) < MIN_TURN:
             return False
         alike = np.abs(np.angle(turns / turn)) < SAME_TURN
-        if len(np.unique((azimuths[alike] // (math.tau / SECTORS)).astype(np.int64))) < MIN_SECTORS:
+        sectors = np.unique((azimuths[alike] // (math.tau / SECTORS)).astype(np.int64))
+        if abs(state.turned) < MIN_MEASURED or (math.isnan(state.turned) and len(sectors) < MIN_SECTORS):
             return False
-        state.features, state.looks = features, looks
+        _keep(state, features, looks)
         for counts, pixels in ((state.returns, now[stays]), (state.looked, features.points)):
             np.add.at(counts, state.body.rows_and_columns(pixels), 1.0)
         kept = MAX_LOOKED / np.maximum(state.looked, MAX_LOOKED)
@@ -100,11 +117,16 @@ class WithoutBody(Stage):
         return True
 
 
+def _keep(state: OwnBodyState, features: LocalFeatures, looks: Floats) -> None:
+    """Compares later images with this one."""
+    state.features, state.looks, state.turned = features, looks, 0.0
+
+
 def _begin(state: OwnBodyState, camera: Camera, log: int) -> None:
     """Nothing is known of the body in another camera's images, or another log's."""
     side = max(camera.width, camera.height_px) / CELLS
     shape = math.ceil(camera.height_px / side), math.ceil(camera.width / side)
-    state.features = None
+    state.features, state.turned = None, 0.0
     state.body = OwnBody(np.zeros(shape, np.bool_), side, (camera.width, camera.height_px), log)
     state.returns, state.looked = np.zeros(shape), np.zeros(shape)
 

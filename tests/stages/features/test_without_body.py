@@ -12,6 +12,7 @@ from omninav.stages.features.without_body import OwnBodyState, WithoutBody
 from omninav.stages.values.image import Image
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.own_body import OwnBody, references_without_body
+from omninav.stages.values.pose import Motion
 
 CAMERA = Equirectangular(640, 320, column_of_forward=320.0)
 NUMBER = 120
@@ -94,6 +95,15 @@ def test_things_near_that_pass_by_on_one_side_are_no_turn() -> None:
         flat = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(4 * NUMBER)])
         points = np.column_stack([np.clip(CAMERA.project(flat)[0][:, 0], 0.0, 639.0), rows])
         assert not stage.step(Context("body"), features(points, looks), CAMERA, state).body.cells.any()
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.02, 0.21, -0.21])
+def test_the_turn_must_have_been_measured_where_there_is_odometry(turn: float) -> None:
+    drive = Drive()
+    for number in range(30):
+        image = drive.image(0.21 * number)
+        body = drive.stage.step(Context("body"), image, CAMERA, drive.state, Motion(0.0, 0.0, turn)).body
+    assert body.cells.any() == (abs(turn) > 0.015)
 
 
 def test_each_log_has_a_body_of_its_own() -> None:
