@@ -31,10 +31,10 @@ MAX_LOOKED = 20.0
 """Features of a cell that count: a body that is put on or off later is told then."""
 RATIO = 0.8
 """Largest ratio of the distances to the nearest and the second nearest descriptor of a match."""
-MIN_RETURNS, MIN_SHARE = 5, 0.2
+MIN_RETURNS, MIN_SHARE = 3, 0.2
 """Times that features of a body have to be found again in one place after a turn, and their share of all there."""
-MIN_CELLS = 24
-"""Fewest cells of a body: by chance 7 were found at once in one of twelve drives without one, in the others none."""
+MIN_CELLS = 48
+"""Fewest cells of a body: by chance 20 were found at once in one of twelve drives without one, 5 in another."""
 
 
 class OwnBodyState(State):
