@@ -37,6 +37,8 @@ BLIND_SIGMA = 0.5
 compass."""
 VISUAL_ODOMETRY = "visual_odometry"
 """Node that sees the motion in the images, so that none has to be guessed for what reads it."""
+SCENE = "scene"
+"""Node that looks for the robot's own body, and does without motion."""
 
 
 class VisualCompass:
@@ -107,7 +109,7 @@ def assumed_speed(ctx: Context, name: str, camera: Camera | None, speed: float |
     """
     maps = [] if has_truth else ctx.readers.get("odometry", [])  # with it, positions are true
     everyone = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
-    maps, readers = ([each for each in some if each != VISUAL_ODOMETRY] for some in (maps, everyone))
+    maps, readers = ([each for each in some if each not in (VISUAL_ODOMETRY, SCENE)] for some in (maps, everyone))
     if speed is None and readers:
         raise UnreadableRecording(
             f"{name} has neither odometry nor a position for every image, needed by {_listed(readers)}; type "

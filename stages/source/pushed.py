@@ -24,6 +24,7 @@ from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
+from .dead_reckoning import SCENE
 from .outputs import DriveOutputs, motion_of, pose_of
 
 INTERVAL_NS = 100_000_000
@@ -179,8 +180,8 @@ class PushedSource(Source):
         measured = rows["motion"] is not None or rows["odometry"] is not None
         if measured:
             ctx.fact("odometry", "measured")
-        elif not first and ctx.readers.get("motion"):
-            reader = ctx.readers["motion"][0]
+        elif not first and (readers := [each for each in ctx.readers.get("motion", ()) if each != SCENE]):
+            reader = readers[0]
             ctx.count("no_motion", detail=f"frame {position.ticks} came without motion, which '{reader}' reads")
             ctx.warn(f"frames came without motion, which '{reader}' reads: push motion=(x, y, turn), or odometry=")
         tick = Tick(position.ticks, stamp, position.log, position.frame, first)
