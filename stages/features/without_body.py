@@ -54,7 +54,8 @@ class OwnBodyState(State):
 class WithoutBody(Stage):
     """Leaves out features of the robot's own body: what looks the same in the same place of images, however it turns.
 
-    Not in the papers. An image is compared with an earlier one once most features that are elsewhere in it show a turn.
+    Not in the papers. An image is compared with an earlier one once the features that moved in it show a turn, which
+    odometry must have measured as well; without odometry they must lie on more than one side of the robot.
     """
 
     class Out(Outputs):

@@ -11,12 +11,14 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.features.without_body import OwnBodyState, WithoutBody
 from omninav.stages.values.image import Image
 from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
+from omninav.stages.values.maps import ReferenceEvent
 from omninav.stages.values.own_body import OwnBody, references_without_body
 from omninav.stages.values.pose import Motion
 
 CAMERA = Equirectangular(640, 320, column_of_forward=320.0)
 NUMBER = 120
 """Features of the world, and of the body."""
+REFERENCE = ReferenceEvent(0, "far")
 
 
 def features(points: np.ndarray, descriptors: np.ndarray) -> LocalFeatures:
@@ -116,9 +118,9 @@ def test_each_log_has_a_body_of_its_own() -> None:
     assert first.cells.any()
     assert (second.cells.any(), first.log, second.log) == (False, 0, 1)
     seen = drive.image(0.0)
-    kept = references_without_body([seen, seen], ["", ""], [OwnBody(), second])  # type: ignore[list-item]
+    kept = references_without_body([seen, seen], [REFERENCE] * 2, [OwnBody(), second])
     assert [len(each or ()) for each in kept] == [2 * NUMBER, 2 * NUMBER]
-    kept = references_without_body([seen, seen, seen], ["", "", ""], [OwnBody(), first, second])  # type: ignore[list-item]
+    kept = references_without_body([seen, seen, seen], [REFERENCE] * 3, [OwnBody(), first, second])
     assert len(kept[0] or ()) < 1.1 * NUMBER
     assert len(kept[2] or ()) == 2 * NUMBER
 
@@ -145,14 +147,14 @@ def test_all_of_a_tour_is_without_the_body_that_its_end_knows() -> None:
     )  # fmt: skip
     seen = features(points, np.zeros((3, 128), np.uint8))
     seen = LocalFeatures(seen.bearings, points, seen.descriptors, seen.colours, seen.sizes, segments)
-    kept = references_without_body([seen, seen, None], ["", None, ""], [OwnBody(), body, None])  # type: ignore[list-item]
+    kept = references_without_body([seen, seen, None], [REFERENCE, None, REFERENCE], [OwnBody(), body, None])
     assert kept[1] is None
     assert kept[0] is not None
     assert len(kept) == 2
     np.testing.assert_array_equal(kept[0].points, points[1:])
     assert kept[0].columns is not None
     np.testing.assert_array_equal(kept[0].columns.points, segments.points[1:])
-    assert references_without_body([seen], ["reference"], []) == [seen]  # type: ignore[list-item]
+    assert references_without_body([seen], [REFERENCE], []) == [seen]
 
 
 @pytest.mark.parametrize("orientation", ["reduced", "own"])
