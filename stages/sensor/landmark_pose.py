@@ -29,6 +29,7 @@ from omninav.stages.values.visual_words import VisualWords
 
 from .axis_beside import AxisBeside
 from .landmarks_shown import LandmarksShown, landmarks_to_expect
+from .late_images import LateImages
 from .stamp_jitter import StampJitter
 
 WORD_REFERENCES = (10, 80)
@@ -67,8 +68,8 @@ WITHOUT_LANDMARKS = (
 
 
 class LandmarkPoseState(State):
-    """Stamp of the last image (ns), landmarks that the drive shows, and likelihoods of how much stamps jitter; `told`:
-    whether the run reported it."""
+    """Stamp of the last image (ns), landmarks that the drive shows, likelihoods of how much stamps jitter, the axis and
+    the delay of its images; `told…`: whether the run reported each."""
 
     stamp: int = 0
     shown: LandmarksShown = field(default_factory=LandmarksShown)
@@ -76,6 +77,8 @@ class LandmarkPoseState(State):
     told: bool = False
     axis: AxisBeside = field(default_factory=AxisBeside)
     told_axis: bool = False
+    late: LateImages = field(default_factory=LateImages)
+    told_late: bool = False
 
 
 class LandmarkPose(Stage):
@@ -88,9 +91,9 @@ class LandmarkPose(Stage):
     elsewhere, since wrong matches agree with each other in places that repeat themselves. A pose is the surer, the more
     sectors of the view its inliers are in, and the less sure, the fewer they are than references near it see: furniture
     that looks alike shows a tenth. An image with too few inliers gives no pose, and so does a map without
-    landmarks. Where the tour showed that images are stamped late, the pose is moved on by the robot's motion over that
-    time; where stamps jitter, its covariance allows for the motion over their standard deviation. Raises BadInput for
-    features of another kind than the map's.
+    landmarks. Where the tour, or the drive itself, showed that images are stamped late, the pose is moved on by the
+    robot's motion over that time; where stamps jitter, its covariance allows for the motion over their standard
+    deviation. Raises BadInput for features of another kind than the map's.
     """
 
     min_inliers: Annotated[int, Bounds(ge=4)] = 8
@@ -118,7 +121,10 @@ class LandmarkPose(Stage):
         if ctx.tick.first_of_log:
             state.jitter, state.told, state.shown = StampJitter.unknown(), False, LandmarksShown()
             state.axis, state.told_axis = AxisBeside(), False
+            state.late, state.told_late = LateImages(), False
         jitter, state.jitter = state.jitter, state.jitter.interrupted()
+        measured = motion is not None and seconds > 0.0 and not isinstance(motion, AssumedMotion)
+        state.late = state.late.driven(motion.turn, seconds) if motion is not None and measured else LateImages()
         landmarks = map.landmarks
         if landmarks is None:
             ctx.warn(WITHOUT_LANDMARKS)
@@ -165,9 +171,9 @@ class LandmarkPose(Stage):
                 camera, features.points[at], features.bearings[at], points[agreed], best.poses[0], variance
             )
             self._say_axis(ctx, state, camera)
-        late = landmarks.late_by(camera.delay)
         covariances = robot_covariances(best.covariances, best.poses, mount)
         poses = robot_poses(best.poses, mount)
+        late = self._late_by(ctx, state, landmarks.late_by(camera.delay), camera, best, float(poses[0, 2]))
         if motion is None or seconds <= 0.0:
             return self.Out(fix=replace(best, poses=poses, covariances=covariances))
         moved = np.array([motion.x, motion.y, motion.turn])
@@ -194,6 +200,23 @@ class LandmarkPose(Stage):
             f"the camera's axis is {math.hypot(*beside):.1f} px beside where camera.yaml has it, at {at}, as the map's "
             "landmarks show: their poses allow for it, colours do not; put it into camera.yaml"
         )
+
+    def _late_by(
+        self, ctx: Context, state: LandmarkPoseState, by_map: float, camera: Camera, fix: LandmarkFix, heading: float
+    ) -> float:
+        # By the drive itself as soon as it shows another delay than the map.
+        so_far = by_map if math.isnan(state.late.delay_s) else state.late.delay_s
+        if fix.probabilities[0] >= SURE:
+            state.late = state.late.seen(heading, so_far)
+        late = so_far if math.isnan(state.late.delay_s) else state.late.delay_s
+        if late != so_far and not state.told_late:
+            state.told_late = True
+            ctx.warn(
+                f"images are stamped about {late:+.2f} s after they are taken, as turns by the map's landmarks and by "
+                "odometry show: their poses allow for it, colours do not; put "
+                f"`delay: {(camera.delay or 0.0) + late:.2f}` into camera.yaml"
+            )
+        return late
 
     def _say_jitter(self, ctx: Context, state: LandmarkPoseState, sigma: float) -> None:
         if sigma < SAID_JITTER_S or state.told or state.jitter.probability() < SAID_PROBABILITY:

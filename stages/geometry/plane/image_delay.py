@@ -47,14 +47,20 @@ class RobotPath:
 
 
 def found_delay(camera: Array, robot: RobotPath) -> float:
-    """The delay (s, positive: images are late) that turns of a camera with poses (R, 3), in order, show; 0 for none.
+    """The delay (s, positive: images are late) that turns of a camera with poses (R, 3), in order, show; 0 for none."""
+    delay, sigma = measured_delay(camera, robot)
+    return delay if abs(delay) > max(MIN_DELAY_S, MIN_SIGMAS * sigma) else 0.0
+
+
+def measured_delay(camera: Array, robot: RobotPath) -> tuple[float, float]:
+    """The delay (s) and its standard deviation, infinite where few turns or a delay beyond `MAX_DELAY_S` show none.
 
     The robot's turns are those of the camera where the delay is right, wherever the camera sits. Least squares find it
     with slopes over whole intervals between images, long ones first: these are independent of the noise of poses,
     while poses between two that were measured have less noise and would fit better whatever the delay is.
     """
     if len(camera) <= MIN_TURNS or len(robot.times) <= MIN_TURNS:
-        return 0.0
+        return 0.0, math.inf
     seen, interval = np.diff(camera[:, 2]), float(np.median(np.diff(robot.times)))
 
     def missed(delay: float) -> Array:
@@ -70,8 +76,8 @@ def found_delay(camera: Array, robot: RobotPath) -> float:
         square = max(float(weights @ slopes**2), 1e-9)
         delay -= float(weights @ (there * slopes)) / square
         if abs(delay) > MAX_DELAY_S:
-            return 0.0
+            return 0.0, math.inf
         # Odometry that slips is wrong in turns alone: the mean error of all steps, mostly straight ones, would hide it.
         of_all, of_turns = weights @ there**2 / weights.sum(), (weights * slopes) ** 2 @ there**2 / square
         spread = math.sqrt(max(float(of_all), float(of_turns), MIN_SIGMA**2) / square)
-    return delay if abs(delay) > max(MIN_DELAY_S, MIN_SIGMAS * spread) else 0.0
+    return delay, spread

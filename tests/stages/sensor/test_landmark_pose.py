@@ -15,7 +15,7 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.mirrored_patches import mirrored_sift
 from omninav.stages.geometry.landmarks.bearing_pose import BearingPose
 from omninav.stages.geometry.plane.mount import robot_covariances, robot_poses
-from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.sensor.landmark_pose import (
     LandmarkPose,
     LandmarkPoseState,
@@ -289,6 +289,32 @@ def test_the_pose_of_a_late_image_is_carried_on_by_its_part_of_the_last_motion()
     assert at(10**9) == pytest.approx(compose(FIRST, arc(0.05)), abs=1e-3)
     assert at(3 * 10**9) == pytest.approx(compose(FIRST, arc(0.025)), abs=1e-3)
     assert at(4 * 10**9, replace(camera, delay=0.35)) == pytest.approx(FIRST, abs=1e-3)
+
+
+def test_images_that_turn_later_than_odometry_are_found_late_and_their_poses_carried_on() -> None:
+    camera = Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5, delay=0.05)
+
+    def at(second: float) -> np.ndarray:
+        return FIRST + np.array([0.3 * math.sin(0.3 * second), 0.3 * math.cos(0.3 * second), math.sin(0.5 * second)])
+
+    state, ctx, away, late = LandmarkPoseState(), Context("landmark_pose"), [], 0.2
+    for number, second in enumerate(np.arange(0.5, 60.0, 0.5)):
+        ctx.tick = Tick(number, int(second * 1e9), first_of_log=number == 0)
+        x, y, turn = between(at(second - 0.5), at(second))
+        found = LandmarkPose().step(
+            ctx, state, seen_from(room(), at(second - late)), mapped_room(), camera=camera, motion=Motion(x, y, turn)
+        )
+        away.append(math.hypot(*(found.fix.poses[0] - at(second))[:2]))
+    assert np.median(away[:40]) > 0.015
+    assert np.median(away[-30:]) < 0.2 * np.median(away[:40])
+    assert [each for each in ctx.warnings if "stamped" in each] == [ctx.warnings[0]]
+    assert "+0.2" in ctx.warnings[0]
+    assert float(ctx.warnings[0].split("`delay: ")[1].split("`")[0]) == pytest.approx(0.25, abs=0.03)
+    before = state.late.rows
+    ctx.tick = Tick(200, int(200e9))
+    LandmarkPose().step(ctx, state, seen_from(room(), FIRST), mapped_room(), camera=camera)  # no motion is known
+    assert len(before) > 100
+    assert not len(state.late.rows)
 
 
 @pytest.mark.parametrize(("seen", "probability"), [(False, 0.96), (False, 0.94), (True, 0.96)])
