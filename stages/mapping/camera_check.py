@@ -52,12 +52,14 @@ class CameraCheck(NamedTuple):
 
     `camera`: None where nothing of it can be, as by few references, of bearings that are not those of its pixels
     (images that were unwarped before, logs of several cameras) and of one that does not see the full circle.
+    `levelling` (F, 3, 3): what levels the bearings of images that lean each by themselves; None where none does.
     """
 
     camera: Camera | None
     fields: dict[str, float]
     pixels: Array
     bearings: Array
+    levelling: Array | None = None
 
     @classmethod
     def of(
@@ -77,16 +79,24 @@ class CameraCheck(NamedTuple):
         """The lens of the adjustment."""
         if self.camera is None:
             bearings = self.bearings[features]
-            return Lens(lambda _: bearings, np.empty(0))
-        return with_tilt(adjustable(self.camera, self.pixels[features], self.fields))
+            lens = Lens(lambda _: bearings, np.empty(0))
+        else:
+            lens = with_tilt(adjustable(self.camera, self.pixels[features], self.fields))
+        if self.levelling is None:
+            return lens
+        by = self.levelling[features]
+        return Lens(lambda corrections: np.einsum("fij,fj->fi", by, lens.bearings(corrections)), lens.sigmas)
 
     def levelled(self, views: LocalViews, corrections: Array) -> LocalViews:
         """The views of the camera with its axis where it is, and level; its yaw is as it is described."""
         if self.camera is None or not len(corrections):
             return views
         by, yaw, moved = self._named(corrections), self.yaw_beside(corrections), self._moved(corrections)
-        bearings = views.bearings if moved is self.camera else self._seen_by(moved)
-        return views.looking_along(turned(leaning(turned(bearings, yaw), by["roll"], by["pitch"]), -yaw))
+        bearings = self.bearings if moved is self.camera else self._seen_by(moved)
+        bearings = turned(leaning(turned(bearings, yaw), by["roll"], by["pitch"]), -yaw)
+        if self.levelling is not None:
+            bearings = np.einsum("fij,fj->fi", self.levelling, bearings)
+        return views.looking_along(bearings)
 
     def yaw_beside(self, corrections: Array) -> float:
         """Angle (rad) by which the camera is turned against its description, 0 where it is small."""

@@ -10,6 +10,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks import map_making
+from omninav.stages.geometry.landmarks.leaning_images import leaning_deg, leaning_images, levelled
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
     CONTRADICTED,
@@ -53,7 +54,8 @@ class LearnLandmarks(Stage):
     between both join to tracks, and tracks become points with a mean descriptor (RootSIFT). Poses, points and, with
     `camera` wired, the camera's axis, tilt and mount are adjusted together: given poses may be exact or off by
     decimetres and degrees; those of odometry alone are straightened first by the places that the tour came back to, and
-    scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Where too
+    scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Images that
+    lean each by themselves, as of a camera that is carried, are levelled first (fact `leaning_images`). Where too
     little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as described is reported, and
     kept with the landmarks; points are those of a level camera, and poses those of the robot under it.
     There are none where images are too small for local features, and the map is used without them.
@@ -91,6 +93,13 @@ class LearnLandmarks(Stage):
         tour = _Tour(views, map, words, check.seen, None if camera is None else camera.height, ctx.rng)
         adjust = tour.as_given if given else tour.as_a_drive
         measured = map.poses if given or as_driven is None else as_driven.poses
+        about = camera_poses(measured, mounted)
+        levelling = leaning_images(views, tour.matched(about), about, given, check.camera is not None)
+        if levelling is not None:
+            check = check._replace(levelling=levelling[views.owners])
+            views = tour.views = levelled(views, levelling)
+            tour.seen = check.seen
+            ctx.fact("leaning_images", f"by {leaning_deg(levelling):.1f} degrees in the median: landmarks allow for it")
         if camera is None:
             adjusted, mount, late = adjust(measured), mounted, 0.0
         else:
@@ -101,7 +110,7 @@ class LearnLandmarks(Stage):
         turn = np.array([0.0, 0.0, check.yaw_beside(adjusted.camera)])
         mount = compose(mount, turn)
         poses = camera_poses(map.poses, mount) if adjusted.problem else camera_poses(adjusted.poses, turn)
-        matches = tour.matched(poses) if tour.matches is None else tour.matches
+        matches = tour.matched(poses) if tour.matches is None or not given else tour.matches
         views = check.levelled(views, adjusted.camera)
         tracks = map_making.tracks_of(views, matches, map_making.fitting_matches(views, matches, poses))
         sightings = map_making.widely_seen(views, map_making.triangulated(views, tracks, poses))
@@ -171,17 +180,19 @@ class _Tour:
     height: float | None
     rng: np.random.Generator
     matches: PairMatches | None = None
-    """Matches of neighbours by the poses that were given last."""
+    """Matches of neighbours by the poses that were last asked for."""
 
     def matched(self, poses: Array) -> PairMatches:
         """Matches of references that are neighbours by their poses (R, 3)."""
         unit = length_scale(poses, self.map.features, self.map.kind) or DEFAULT_M
-        return map_making.pair_matches(self.views, map_making.neighbouring_pairs(poses, _rows(self.words), unit))
+        pairs = map_making.neighbouring_pairs(poses, _rows(self.words), unit)
+        if self.matches is None or not np.array_equal(pairs, self.matches.pairs):
+            self.matches = map_making.pair_matches(self.views, pairs)
+        return self.matches
 
     def as_given(self, poses: Array) -> AdjustedMap:
         """Adjust poses (R, 3) that may be exact."""
-        self.matches = self.matched(poses)
-        return adjusted_to_given(self.views, self.matches, poses, self.seen)
+        return adjusted_to_given(self.views, self.matched(poses), poses, self.seen)
 
     def as_a_drive(self, poses: Array) -> AdjustedMap:
         """Adjust poses (R, 3) that odometry has measured."""

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.geometry.landmarks.adjustment import rotations_about
 from omninav.stages.geometry.plane.mount import camera_poses, robot_poses
 from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 from omninav.stages.mapping.learned_landmarks import LearnLandmarks
@@ -113,6 +114,25 @@ def test_references_of_wrong_poses_come_to_where_they_were_with_their_landmarks(
     assert out.map.landmarks.pose_sigmas.shape == (len(poses), 3)
     assert (out.map.landmarks.pose_sigmas > 0.0).all()
     assert 0.0005 < out.metrics.values["landmarks"]["pose_sigma_m"] < 0.1
+
+
+@pytest.mark.parametrize("source", ["truth", "odometry"])
+@pytest.mark.parametrize("with_camera", [False, True])
+def test_images_that_lean_each_by_themselves_give_a_map_as_exact(source: str, with_camera: bool) -> None:
+    poses, camera = tour_poses(0.3), Equirectangular(1024, 512, 512.0, elevation_top=1.5, elevation_bottom=-1.5)
+    tilts = np.random.default_rng(4).normal(0.0, math.radians(4.0), (len(poses), 2))
+    turns = rotations_about(tilts[:, 1], 1) @ rotations_about(tilts[:, 0], 0)
+    features = []
+    for each, turn in zip(seen_along(poses), turns, strict=True):
+        pixels, shown = camera.project(each.bearings @ turn)
+        features.append(replace(each, points=pixels, bearings=camera.unproject(pixels)[0]).chosen(shown))
+    ctx, out = learned(poses, source, features, **({"camera": camera} if with_camera else {}))
+    gap, _ = KDTree(room().where - (0.0, 0.0, HEIGHT_M)).query(out.map.landmarks.points)
+    assert len(out.map.landmarks) > 400
+    assert np.median(gap) < 0.01
+    assert np.hypot(*(out.map.poses - poses)[:, :2].T).max() < 0.01
+    assert ctx.facts["leaning_images"].startswith("by 4.") or ctx.facts["leaning_images"].startswith("by 5.")
+    assert "leaning_images" not in learned(poses, source, seen_along(poses))[0].facts
 
 
 def test_a_tour_by_odometry_is_straightened_from_how_it_was_driven() -> None:

@@ -1,0 +1,89 @@
+"""Images of a tour that lean each by themselves, by landmarks of a room that they share."""
+
+import math
+
+import numpy as np
+import pytest
+from landmark_tour import room, seen_from, tour_poses
+
+from omninav.stages.geometry.landmarks.adjustment import rotations_about
+from omninav.stages.geometry.landmarks.leaning_images import leaning_deg, leaning_images, levelled
+from omninav.stages.geometry.landmarks.map_making import LocalViews, local_views, neighbouring_pairs, pair_matches
+from omninav.stages.geometry.plane.se2 import between, chain, compose
+
+POSES = tour_poses(0.3)
+
+
+def leaning(tilts: np.ndarray) -> tuple[LocalViews, np.ndarray]:
+    """The views of cameras with roll and pitch (R, 2), rad, and the rotations (R, 3, 3) that level them."""
+    features = [seen_from(room(), pose) for pose in POSES]
+    turns = rotations_about(tilts[:, 1], 1) @ rotations_about(tilts[:, 0], 0)
+    bearings = [each.bearings @ turn for each, turn in zip(features, turns, strict=True)]
+    return local_views(bearings, [each.descriptors for each in features]), turns
+
+
+def found(
+    views: LocalViews, poses: np.ndarray = POSES, are_given: bool = True, leave_shared: bool = False
+) -> np.ndarray | None:
+    similarity = np.exp(-np.hypot(*(POSES[:, None] - POSES)[:, :, :2].transpose(2, 0, 1)))
+    matches = pair_matches(views, neighbouring_pairs(poses, iter(similarity), 0.5))
+    return leaning_images(views, matches, poses, are_given, leave_shared)
+
+
+def carried(sigma_deg: float, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0.0, math.radians(sigma_deg), (len(POSES), 2))
+
+
+def off(one: np.ndarray, other: np.ndarray) -> float:
+    """The largest angle (rad) between what rotations (R, 3, 3) and others make of the vertical."""
+    return float(np.linalg.norm((one - other)[:, :, 2], axis=1).max())
+
+
+@pytest.mark.parametrize("sigma_deg", [1.0, 6.0])
+def test_the_tilt_of_each_image_is_found_although_poses_are_off(sigma_deg: float) -> None:
+    views, turns = leaning(carried(sigma_deg))
+    wrong = POSES + np.random.default_rng(1).normal(size=POSES.shape) * [0.03, 0.03, math.radians(0.5)]
+    levelling = found(views, wrong)
+    assert off(levelling, turns) < math.radians(0.15)
+    assert leaning_deg(levelling) == pytest.approx(1.18 * sigma_deg, rel=0.3)
+    level = levelled(views, levelling)
+    exact = np.concatenate([seen_from(room(), pose).bearings for pose in POSES])
+    before, after = (np.median(np.abs(each.bearings - exact)) for each in (views, level))
+    assert after < 0.25 * before
+
+
+def test_the_tilt_of_each_image_is_found_on_a_tour_by_odometry() -> None:
+    motions = between(POSES[:-1], POSES[1:])
+    motions[:, 2] += 0.003
+    odometry = compose(POSES[0], np.concatenate([np.zeros((1, 3)), chain(motions)]))
+    assert np.hypot(*(odometry - POSES)[:, :2].T).max() > 0.5
+    views, turns = leaning(carried(3.0))
+    assert off(found(views, odometry, are_given=False), turns) < math.radians(0.3)
+
+
+def test_the_tilt_that_all_images_share_may_be_left_in() -> None:
+    shared = np.radians([2.0, -3.0])
+    views, _ = leaning(carried(3.0) + shared)
+    mean = np.median(carried(3.0) + shared, axis=0)
+    whole, left = (found(views, leave_shared=leave) for leave in (False, True))
+    assert np.median(left[:, 2, :2], axis=0) == pytest.approx([0.0, 0.0], abs=math.radians(0.2))
+    assert np.median(whole[:, 2, :2], axis=0) == pytest.approx([-mean[1], mean[0]], abs=math.radians(0.2))
+
+
+def test_level_images_a_camera_that_leans_on_its_robot_and_images_without_matches_are_left_as_they_are() -> None:
+    for tilts in (carried(0.0), carried(0.1), np.tile(np.radians([2.0, -3.0]), (len(POSES), 1))):
+        assert found(leaning(tilts)[0]) is None
+    nothing = local_views([np.empty((0, 3))] * len(POSES), [np.empty((0, 128), np.uint8)] * len(POSES))
+    assert found(nothing) is None
+
+
+def test_a_reference_that_sees_too_little_is_left_as_it_is() -> None:
+    tilts = carried(3.0)
+    features = [seen_from(room(), pose) for pose in POSES]
+    turns = rotations_about(tilts[:, 1], 1) @ rotations_about(tilts[:, 0], 0)
+    bearings = [each.bearings @ turn for each, turn in zip(features, turns, strict=True)]
+    bearings[7], features[7] = bearings[7][:10], features[7].chosen(np.arange(10))
+    levelling = found(local_views(bearings, [each.descriptors for each in features]))
+    assert (levelling[7] == np.eye(3)).all()
+    rest = np.arange(len(POSES)) != 7
+    assert off(levelling[rest], turns[rest]) < math.radians(0.15)
