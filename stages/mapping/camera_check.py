@@ -23,6 +23,7 @@ from omninav.stages.camera.self_calibration import (
 )
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
+from omninav.stages.geometry.landmarks.leaning_images import levelled_bearings
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.local_features import LocalFeatures
@@ -52,7 +53,7 @@ class CameraCheck(NamedTuple):
 
     `camera`: None where nothing of it can be, as by few references, of bearings that are not those of its pixels
     (images that were unwarped before, logs of several cameras) and of one that does not see the full circle.
-    `levelling` (F, 3, 3): what levels the bearings of images that lean each by themselves; None where none does.
+    `levelling` (F, 3, 3): rotation of each bearing that levels its image, where images tilt differently; else None.
     """
 
     camera: Camera | None
@@ -85,7 +86,7 @@ class CameraCheck(NamedTuple):
         if self.levelling is None:
             return lens
         by = self.levelling[features]
-        return Lens(lambda corrections: np.einsum("fij,fj->fi", by, lens.bearings(corrections)), lens.sigmas)
+        return Lens(lambda corrections: levelled_bearings(lens.bearings(corrections), by), lens.sigmas)
 
     def levelled(self, views: LocalViews, corrections: Array) -> LocalViews:
         """The views of the camera with its axis where it is, and level; its yaw is as it is described."""
@@ -95,7 +96,7 @@ class CameraCheck(NamedTuple):
         bearings = self.bearings if moved is self.camera else self._seen_by(moved)
         bearings = turned(leaning(turned(bearings, yaw), by["roll"], by["pitch"]), -yaw)
         if self.levelling is not None:
-            bearings = np.einsum("fij,fj->fi", self.levelling, bearings)
+            bearings = levelled_bearings(bearings, self.levelling)
         return views.looking_along(bearings)
 
     def yaw_beside(self, corrections: Array) -> float:

@@ -205,10 +205,10 @@ class LandmarkPose(Stage):
         self, ctx: Context, state: LandmarkPoseState, by_map: float, camera: Camera, fix: LandmarkFix, heading: float
     ) -> float:
         # By the drive itself as soon as it shows another delay than the map.
-        so_far = by_map if math.isnan(state.late.delay_s) else state.late.delay_s
+        so_far = state.late.allowed(by_map)
         if fix.probabilities[0] >= SURE:
             state.late = state.late.seen(heading, so_far)
-        late = so_far if math.isnan(state.late.delay_s) else state.late.delay_s
+        late = state.late.allowed(by_map)
         if late != so_far and not state.told_late:
             state.told_late = True
             ctx.warn(

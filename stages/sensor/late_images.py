@@ -26,13 +26,17 @@ class LateImages(Value):
 
     `rows` (N, 3): times (s), headings by odometry and by landmarks (rad), NaN where an image shows no sure pose.
     `now` (2,): time and heading by odometry at the last image. `delay_s`: how much later images are, NaN before it is
-    found.
+    found. `unsearched`: images that were kept since the last search.
     """
 
     rows: Annotated[Array, Shape("N", 3)] = field(default_factory=lambda: np.empty((0, 3)))
     now: Annotated[Array, Shape(2)] = field(default_factory=lambda: np.zeros(2))
     delay_s: float = math.nan
     unsearched: Annotated[int, Bounds(ge=0)] = 0
+
+    def allowed(self, by_map: float) -> float:
+        """The delay (s) to allow for: the one that was found, else the map's."""
+        return by_map if math.isnan(self.delay_s) else self.delay_s
 
     def driven(self, turn: float, seconds: float) -> "LateImages":
         """Adds an image, `turn` (rad) and `seconds` after the last one."""

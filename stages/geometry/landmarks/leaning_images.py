@@ -9,11 +9,19 @@ from omninav.stages.geometry.plane.drive_graph import odometry_sigmas
 from omninav.stages.geometry.plane.se2 import between
 
 from .adjustment import Motions, adjusted, rotations_about
-from .map_making import MAX_DISTANCE_M, MIN_PARALLAX, LocalViews, PairMatches, fitting_matches, in_map_frame, tracks_of
+from .map_adjustment import GIVEN_SIGMAS, SIGMA
+from .map_making import (
+    MAX_DISTANCE_M,
+    MIN_PARALLAX,
+    OFF_PLANE,
+    LocalViews,
+    PairMatches,
+    fitting_matches,
+    in_map_frame,
+    tracks_of,
+)
 from .triangulation import triangulated_tracks
 
-SIGMA = math.radians(0.1)
-"""Standard deviation of a bearing (rad)."""
 OFF_PLANES = (math.radians(15.0), math.radians(2.0))
 """Angle of a bearing to the plane through both cameras and the other bearing, above which a match is wrong (rad), round
 by round."""
@@ -21,15 +29,13 @@ MISSES = (math.radians(20.0), math.radians(4.0))
 """Angle between a bearing and its landmark above which it is left out (rad), round by round."""
 TILT_SIGMA = math.radians(5.0)
 """Standard deviation of roll and pitch (rad): of a camera that is carried by hand."""
-GIVEN_SIGMAS = (0.1, 0.1, math.radians(2.0))
-"""Standard deviations of poses that are given (m, m, rad)."""
 MIN_TILT = math.radians(0.3)
 """Median angle between an image and the median of all, below which they are taken to be level (rad)."""
 MIN_SIGHTINGS = 20
 """Fewest landmarks that tell how an image leans."""
-LEVEL_FIT, MAX_SHARE = math.radians(0.35), 0.7
-"""Angle to the plane (rad) that matches of level images keep to, and the part of those within the first of `OFF_PLANES`
-above which images are taken to be level: 0.47 where they lean by 0.6 degrees, 0.28 by 1.2."""
+MAX_SHARE = 0.7
+"""Share of the matches within the first of `OFF_PLANES` that are within `OFF_PLANE` too, from which on images are taken
+to be level: 0.47 where they lean by 0.6 degrees, 0.28 by 1.2."""
 
 
 def leaning_images(
@@ -41,7 +47,7 @@ def leaning_images(
     landmarks in the adjustment. `leave_shared`: the tilt that all images share is left in, as of a camera whose own is
     adjusted with its axis.
     """
-    level, about_level = (fitting_matches(views, matches, poses, angle).sum() for angle in (LEVEL_FIT, OFF_PLANES[0]))
+    level, about_level = (fitting_matches(views, matches, poses, angle).sum() for angle in (OFF_PLANE, OFF_PLANES[0]))
     if level >= MAX_SHARE * about_level:
         return None
     known, looking = np.zeros(len(poses), np.bool_), views
@@ -76,7 +82,12 @@ def leaning_images(
 
 def levelled(views: LocalViews, levelling: Array) -> LocalViews:
     """The views with the bearings of each reference turned by its rotation (R, 3, 3)."""
-    return views.looking_along(np.einsum("fij,fj->fi", levelling[views.owners], views.bearings))
+    return views.looking_along(levelled_bearings(views.bearings, levelling[views.owners]))
+
+
+def levelled_bearings(bearings: Array, levelling: Array) -> Array:
+    """Bearings (F, 3), each turned by a rotation (F, 3, 3) of its own."""
+    return np.asarray(np.einsum("fij,fj->fi", levelling, bearings))
 
 
 def leaning_deg(levelling: Array) -> float:

@@ -16,15 +16,15 @@ def heading(seconds: np.ndarray) -> np.ndarray:
 
 
 def driven(delay: float, seed: int = 0, images: int = 160, interval: float = 0.5, allowed: float = 0.0) -> LateImages:
-    """What so many images show that are stamped late by `delay`; of one in five no landmarks are seen."""
+    """Adds so many images, stamped late by `delay`; one in five shows no landmarks."""
     rng, late = np.random.default_rng(seed), LateImages()
     stamps = 100.0 + interval * np.arange(images)
     turns = np.diff(heading(stamps), prepend=heading(stamps[:1])) * (1.0 + rng.normal(0.0, ODOMETRY, images))
     for stamp, turn in zip(stamps, turns, strict=True):
         late = late.driven(float(turn), interval)
         if rng.uniform() > 0.2:
-            so_far = allowed if math.isnan(late.delay_s) else late.delay_s
-            late = late.seen(float(wrap(1.0 + heading(stamp - delay) + rng.normal(0.0, SIGMA))), so_far)
+            seen = float(wrap(1.0 + heading(stamp - delay) + rng.normal(0.0, SIGMA)))
+            late = late.seen(seen, late.allowed(allowed))
     return late
 
 

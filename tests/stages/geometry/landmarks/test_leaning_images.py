@@ -14,9 +14,14 @@ from omninav.stages.geometry.plane.se2 import between, chain, compose
 POSES = tour_poses(0.3)
 
 
-def leaning(tilts: np.ndarray) -> tuple[LocalViews, np.ndarray]:
-    """The views of cameras with roll and pitch (R, 2), rad, and the rotations (R, 3, 3) that level them."""
+def leaning(tilts: np.ndarray, few: int | None = None) -> tuple[LocalViews, np.ndarray]:
+    """The views of cameras with roll and pitch (R, 2), rad, and the rotations (R, 3, 3) that level them.
+
+    The reference `few` sees ten points alone.
+    """
     features = [seen_from(room(), pose) for pose in POSES]
+    if few is not None:
+        features[few] = features[few].chosen(np.arange(10))
     turns = rotations_about(tilts[:, 1], 1) @ rotations_about(tilts[:, 0], 0)
     bearings = [each.bearings @ turn for each, turn in zip(features, turns, strict=True)]
     return local_views(bearings, [each.descriptors for each in features]), turns
@@ -78,12 +83,8 @@ def test_level_images_a_camera_that_leans_on_its_robot_and_images_without_matche
 
 
 def test_a_reference_that_sees_too_little_is_left_as_it_is() -> None:
-    tilts = carried(3.0)
-    features = [seen_from(room(), pose) for pose in POSES]
-    turns = rotations_about(tilts[:, 1], 1) @ rotations_about(tilts[:, 0], 0)
-    bearings = [each.bearings @ turn for each, turn in zip(features, turns, strict=True)]
-    bearings[7], features[7] = bearings[7][:10], features[7].chosen(np.arange(10))
-    levelling = found(local_views(bearings, [each.descriptors for each in features]))
+    views, turns = leaning(carried(3.0), few=7)
+    levelling = found(views)
     assert (levelling[7] == np.eye(3)).all()
     rest = np.arange(len(POSES)) != 7
     assert off(levelling[rest], turns[rest]) < math.radians(0.15)
