@@ -22,6 +22,8 @@ from .stamps import TRUTH_MAX_GAP_S, max_step_s
 
 KEPT_S = 30.0
 """Longest time back for which a pose can be asked."""
+SMALL_STEP = 0.5
+"""Largest part of a jump by which poses go on after it: back from a single wrong pose leads the whole of it."""
 MAX_PAUSE_S = 10.0
 """A message that comes later than this after the last tells of a clock that leapt, until others follow it."""
 
@@ -65,7 +67,7 @@ class LiveTrack:
         if self._known and stamp == self._known[-1].stamp:
             self._drop("duplicate_stamp", f"of {stamp / 1e9:.3f} s has come before")
             return []
-        if not self._known or self._follows(self._known[-1], new, joined=True):
+        if not self._known or (self._follows(self._known[-1], new, joined=True) and not self._goes_on(new)):
             self._drop_doubted()
             self._append(new)
             return [item]
@@ -126,13 +128,31 @@ class LiveTrack:
         pose = self._join(after.pose) if joined else after.pose
         return possible_between(before.pose, pose, seconds, self._limits)
 
+    def _goes_on(self, new: _Pose) -> bool:
+        """Tells whether a pose goes on from the doubted ones, by a step that is small beside their jump.
+
+        With the time since the last believed pose far places become possible, and a reset would be taken for a drive.
+        """
+        if not self._doubted or not self._follows(self._doubted[-1], new, joined=False):
+            return False
+        if not 0 < self._doubted[0].stamp - self._known[-1].stamp <= MAX_PAUSE_S * 1e9:
+            return False  # doubted for its stamp and not for its place
+        jump = self._size(self._known[-1].pose, self._join(self._doubted[0].pose))
+        return self._size(self._doubted[-1].pose, new.pose) < SMALL_STEP * jump
+
+    def _size(self, start: Array, end: Array) -> float:
+        """Seconds that a robot needs at least from one pose to another."""
+        x, y, turn = np.abs(between(start, end))
+        return float(max(np.hypot(x, y) / self._limits.speed, turn / self._limits.turn))
+
     def _believe_doubted(self) -> list[Any]:
         believed, self._doubted = self._doubted, []
         first, last = believed[0], self._known[-1]
         if first.stamp < last.stamp:
             self._known.clear()
             self._gaps.clear()
-            self._origin = None
+            if self._origin is not None:  # the odometry of a clock that is set back goes on where it was
+                self._origin = first.pose, last.pose
         elif not self._jumps:
             seconds = (first.stamp - last.stamp) / 1e9
             if not possible_between(last.pose, self._join(first.pose), seconds, self._limits):

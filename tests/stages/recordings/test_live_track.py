@@ -57,6 +57,36 @@ def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known
     assert (track.last, track.at(6 * S), track.unmeasured_s2(8 * S)) == (3 * S, None, 0.0)
 
 
+@pytest.mark.parametrize("back_m", [1.0, 2.0, 8.0, 20.0])
+@pytest.mark.parametrize("turned", [0.0, 1.5])
+def test_a_counter_that_begins_again_nearby_or_turned_is_joined_too(back_m: float, turned: float):
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 10.0, 0.05))
+    for at in np.arange(10.0, 20.0, 0.05):
+        away = at - back_m
+        track.add(round(at * S), (away * np.cos(turned), away * np.sin(turned), turned))
+    assert track.at(track.last) == pytest.approx([19.95, 0.0, 0.0], abs=1e-6)
+    assert track.unmeasured_s2(track.last) == pytest.approx(0.05**2)
+
+
+def test_a_single_wrong_pose_is_dropped_though_messages_are_missing_after_it():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 10.0, 0.05))
+    track.add(10 * S, (15.0, 0.0, 0.0))
+    straight(track, np.arange(10.5, 12.0, 0.05))
+    assert track.at(track.last) == pytest.approx([11.95, 0.0, 0.0])
+    assert track.dropped == {"impossible_motion": 1}
+
+
+def test_odometry_that_was_joined_goes_on_where_a_clock_is_set_back():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 5.0, 0.05))
+    straight(track, np.arange(5.0, 8.0, 0.05), x0=-100.0)
+    for at in np.arange(8.0, 10.0, 0.05):  # stamped 1.3 s too early from now on
+        track.add(round((at - 1.3) * S), (at - 100.0, 0.0, 0.0))
+    assert track.at(track.last)[0] == pytest.approx(9.95, abs=0.1)
+
+
 def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_might_have():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.arange(0.0, 5.05, 0.1))
