@@ -55,8 +55,9 @@ class PushedFrame(NamedTuple):
 
 
 class PushedSourceState(State):
-    """Ticks made, the present log and its next frame, the last stamp (ns), the last pose by odometry, and what the
-    present log's images have shown of a camera that leaves something open (a camera.yaml)."""
+    """Ticks made, the present log and its next frame, the last stamp (ns), the last pose by odometry and whether
+    the present log's began with one (`placed`), and what its images have shown of a camera that leaves something open
+    (a camera.yaml)."""
 
     ticks: int = 0
     log: int = 0
@@ -65,6 +66,7 @@ class PushedSourceState(State):
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
+    placed: bool = False
     camera: str = ""
 
 
@@ -162,7 +164,7 @@ class PushedSource(Source):
         motion, odometry = rows["motion"], rows["odometry"]
         if odometry is None:
             odometry = compose(before, motion) if motion is not None else before
-        elif motion is None:
+        elif motion is None and position.placed and not new_log:
             motion = between(before, odometry)
         driven = 0.0 if motion is None or first else float(np.hypot(motion[0], motion[1]))
         if driven > MAX_MOTION_M:
@@ -187,6 +189,7 @@ class PushedSource(Source):
         tick = Tick(position.ticks, stamp, position.log, position.frame, first)
         position.ticks, position.frame, position.stamp = position.ticks + 1, position.frame + 1, stamp
         position.x, position.y, position.heading = (float(number) for number in odometry)
+        position.placed = measured or (position.placed and not new_log)
         return self.Out(
             tick=tick,
             image=image,

@@ -67,6 +67,16 @@ def same_files(one: omninav.Run, other: omninav.Run) -> list[str]:
     return [name for name in SAME if (one.folder / name).read_bytes() != (other.folder / name).read_bytes()]
 
 
+def test_odometry_that_begins_after_the_first_frame_is_no_motion(recording, camera, batch, tmp_path):
+    frames = list(frames_of(recording, 0, 5))
+    for late in (0, 3):
+        frames[late] = frames[late] | {"odometry": None}
+    with omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run") as session:
+        outs = [session.step(**frame, new_log=k == 3) for k, frame in enumerate(frames)]
+    assert [out["source.motion"] is None for out in outs] == [True, True, False, True, True]
+    assert outs[1]["source.odometry"].x == frames[1]["odometry"][0]
+
+
 def test_a_recording_pushed_frame_by_frame_gives_the_bytes_of_the_batch_run(recording, camera, batch, tmp_path):
     with omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run") as session:
         for frame in frames_of(recording):
