@@ -11,12 +11,13 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Source, Tick, counted, digest_file, user_path
 from omninav.pipeline.engine.code_version import module_version
-from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import AHEAD, Recording, UnreadableRecording
 from omninav.stages.recordings.stamps import TRUTH_MAX_GAP_S
 from omninav.stages.recordings.truth_file import truth_from
+from omninav.stages.values.commands import GoalPoint, Reinitialise
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 
@@ -147,7 +148,7 @@ class Playback(Source, ABC):
             first_of_log=first,
         )
         truth = None if part.truth is None else part.truth[frame]
-        live = recording.frame(frame) if isinstance(recording, LiveRecording) else None
+        restart, goal = _requests(part, -1 if first else int(frames[position.last]), frame)
         odometry, motion = self._motion(ctx, position, part, image)
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -158,8 +159,8 @@ class Playback(Source, ABC):
             motion=motion,
             truth=pose_of(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
-            restart=None if live is None else live.restart,
-            goal=None if live is None else live.goal,
+            restart=restart,
+            goal=goal,
         )
 
     def _few_used(self) -> str:
@@ -228,3 +229,18 @@ class Playback(Source, ABC):
             self._parts += parts_of(recording, truth, self.cuts, selected, self.rate_hz, self._guesses())
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
+
+
+def _requests(part: LogPart, last: int, frame: int) -> tuple[Reinitialise | None, GoalPoint | None]:
+    """What was asked of a live run after its frame `last`, up to this one; a pose is moved on by odometry to it."""
+    restart, goal = None, None
+    if isinstance(part.recording, LiveRecording):
+        for each in range(last + 1, frame + 1):
+            asked = part.recording.frame(each)
+            goal = asked.goal or goal
+            if asked.restart is not None:
+                restart, at = asked.restart, each
+    if restart is None or not isinstance(restart.at, tuple) or at == frame:
+        return restart, goal
+    x, y, heading = compose(restart.at[:3], between(part.driven[at], part.driven[frame])).tolist()
+    return Reinitialise((x, y, heading, *restart.at[3:])), goal

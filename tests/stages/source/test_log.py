@@ -29,6 +29,7 @@ from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.model import MODELS
 from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.live_record import HEADER, HEADER_TYPE, LiveHeader
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource, synthetic_increment
@@ -173,6 +174,26 @@ def test_made_up_odometry_errs_with_the_turn_and_not_when_nothing_moves() -> Non
     np.testing.assert_array_equal(still, np.zeros(3))
     turns = [synthetic_increment(np.array([0, 0, 1.0]), pair)[2] - 1 for pair in noise]
     assert np.degrees(np.std(turns)) == pytest.approx(3, rel=0.06)
+
+
+@pytest.mark.parametrize("selection", [{"stride": 2}, {"rate_hz": 0.7}, {"first": 6}])
+def test_what_a_live_run_was_asked_reaches_the_next_frame_that_is_used(tmp_path: Path, selection: dict) -> None:
+    topics: dict = {IMAGE: "image", ODOMETRY: "odometry", "/initialpose": "initial_pose", "/goal_pose": "goal"}
+    first = Made(HEADER, HEADER_TYPE, START, START, make_message(HEADER_TYPE, {"data": LiveHeader(topics).text()}))
+    late = sorted(without(TRUTH), key=lambda made: made.stamp + 40_000_000 * (made.topic == IMAGE))
+    sixth = [k for k, made in enumerate(late) if made.topic == IMAGE][5]
+    for topic, pose in (("/initialpose", "PoseWithCovarianceStamped"), ("/goal_pose", "PoseStamped")):
+        fields = {"pose": pose_fields(1.5, 2.5, 0.3)}
+        fields = {"pose": {**fields, "covariance": np.eye(6).ravel()}} if topic == "/initialpose" else fields
+        kind, at = f"geometry_msgs/msg/{pose}", late[sixth].stamp
+        late.insert(sixth, Made(topic, kind, at, at, make_message(kind, fields)))
+    record = str(write_mcap(tmp_path / "live.mcap", iter([first, *late])))
+    every, some = drive(LogSource(log=record)), drive(LogSource(log=record, **selection))
+    assert [out.tick.frame for out in every if out.goal and out.restart.at[:3] == pytest.approx((1.5, 2.5, 0.3))] == [5]
+    (asked,) = [out for out in some if out.goal or out.restart]
+    assert (asked.tick.frame, asked.goal.x) == (6, 1.5)
+    moved = compose(every[5].restart.at[:3], row(every[6].motion))
+    assert asked.restart.at == pytest.approx((*moved, *every[5].restart.at[3:]))
 
 
 def test_a_selection_without_frames_is_refused(log: str) -> None:
