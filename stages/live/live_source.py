@@ -61,7 +61,10 @@ class LiveSourceState(DeadReckoning):
     def turn(self, stamp: int) -> tuple[Tick, float | None]:
         """The tick of an image, and the seconds since the one before; None at the first of a log."""
         first = self.ticks == 0 or stamp <= self.stamp
-        self.log += first and self.ticks > 0
+        if first and self.ticks:
+            self.log += 1
+            self.first -= self.stamp - stamp
+            self.ended -= (self.stamp - stamp) * (self.ended > 0)
         seconds = None if first else (stamp - self.stamp) / 1e9
         tick = Tick(index=self.ticks, stamp=stamp, log=self.log, frame=self.ticks, first_of_log=first)
         self.ticks, self.stamp, self.first = self.ticks + 1, stamp, self.first or stamp

@@ -499,3 +499,10 @@ def test_scans_of_another_clock_than_the_cameras_are_noted(wire: Wire, tmp_path:
     assert drive.outs
     assert wire.status.troubles.keys() == {"/scan"}
     assert "/scan: nothing of it is stamped in the second before an image" in wire.status.troubles["/scan"]
+
+
+def test_the_time_of_a_run_goes_on_where_the_clock_is_set_back() -> None:
+    state = LiveSourceState()
+    for second in (1000, 1010, 20, 25):
+        tick, _ = state.turn(second * 10**9)
+    assert (tick.log, state.stamp - state.first) == (1, 15 * 10**9)
