@@ -124,7 +124,10 @@ class LandmarkPose(Stage):
             state.late, state.told_late = LateImages(), False
         jitter, state.jitter = state.jitter, state.jitter.interrupted()
         measured = motion is not None and seconds > 0.0 and not isinstance(motion, AssumedMotion)
-        state.late = state.late.driven(motion.turn, seconds) if motion is not None and measured else LateImages()
+        if motion is not None and measured:
+            state.late = state.late.driven(motion.turn, seconds)
+        else:
+            state.late = state.late.interrupted()
         landmarks = map.landmarks
         if landmarks is None:
             ctx.warn(WITHOUT_LANDMARKS)

@@ -19,6 +19,9 @@ EVERY = 16
 MIN_CHANGE_S, MIN_SIGMAS = 0.03, 6.0
 """Smallest difference from the delay that is allowed for which counts, in seconds and in standard deviations: in six
 drives without a delay it is at most 3.6 of these (docs/experiments/landmarks.md)."""
+FINE_SIGMA_S = 0.01
+"""Largest standard deviation (s) at which a search refines a delay that was found: where the robot stands or drives
+straight its headings tell less."""
 
 
 class LateImages(Value):
@@ -38,6 +41,10 @@ class LateImages(Value):
         """The delay (s) to allow for: the one that was found, else the map's."""
         return by_map if math.isnan(self.delay_s) else self.delay_s
 
+    def interrupted(self) -> "LateImages":
+        """Begins anew where no motion was measured; a delay that was found stays."""
+        return LateImages(delay_s=self.delay_s)
+
     def driven(self, turn: float, seconds: float) -> "LateImages":
         """Adds an image, `turn` (rad) and `seconds` after the last one."""
         now = np.add(self.now, [seconds, turn])
@@ -49,7 +56,7 @@ class LateImages(Value):
     def seen(self, heading: float, allowed_s: float) -> "LateImages":
         """Adds that landmarks show the last image's heading (rad); `allowed_s`: the delay that is allowed for so far.
 
-        Nothing is searched in the first `EVERY` images, and a delay that was found once follows each further search.
+        Nothing is searched in the first `EVERY` images.
         """
         if not len(self.rows) or self.rows[-1, 0] < self.now[0]:
             return self
@@ -62,6 +69,6 @@ class LateImages(Value):
         driven, camera = np.zeros((2, *rows.shape))
         driven[:, 2], camera[:, 2] = rows[:, 1:].T
         delay, sigma = measured_delay(camera[shown], RobotPath(driven[shown], rows[shown, 0], driven, rows[:, 0]))
-        if math.isnan(self.delay_s) and abs(delay - allowed_s) < max(MIN_CHANGE_S, MIN_SIGMAS * sigma):
-            return replace(new, unsearched=0)
-        return replace(new, unsearched=0, delay_s=delay if sigma < math.inf else self.delay_s)
+        changed = abs(delay - allowed_s) >= max(MIN_CHANGE_S, MIN_SIGMAS * sigma)
+        finer = not math.isnan(self.delay_s) and sigma <= FINE_SIGMA_S
+        return replace(new, unsearched=0, delay_s=delay if changed or finer else self.delay_s)

@@ -21,6 +21,9 @@ MIN_TURNS = 40
 """Steps between images that a delay is found from, at least."""
 MIN_SIGMA = math.radians(0.05)
 """Standard deviation of the difference of two turns, at least (rad)."""
+MAX_UNEXPLAINED = 0.25
+"""Largest part of the camera's squared turns that odometry leaves unexplained: of a robot that drives straight both
+have their errors alone, whose slopes mean nothing."""
 LOOSE = math.radians(1.0)
 """Difference of two turns at which they count by half (Cauchy), at least (rad)."""
 
@@ -53,7 +56,7 @@ def found_delay(camera: Array, robot: RobotPath) -> float:
 
 
 def measured_delay(camera: Array, robot: RobotPath) -> tuple[float, float]:
-    """The delay (s) and its standard deviation, infinite where few turns or a delay beyond `MAX_DELAY_S` show none.
+    """The delay (s) and its standard deviation, infinite where few turns, errors or a long delay show none.
 
     The robot's turns are those of the camera where the delay is right, wherever the camera sits. Least squares find it
     with slopes over whole intervals between images, long ones first: these are independent of the noise of poses,
@@ -80,4 +83,6 @@ def measured_delay(camera: Array, robot: RobotPath) -> tuple[float, float]:
         # Odometry that slips is wrong in turns alone: the mean error of all steps, mostly straight ones, would hide it.
         of_all, of_turns = weights @ there**2 / weights.sum(), (weights * slopes) ** 2 @ there**2 / square
         spread = math.sqrt(max(float(of_all), float(of_turns), MIN_SIGMA**2) / square)
+    if weights @ there**2 > MAX_UNEXPLAINED * (weights @ wrap(seen) ** 2):
+        return 0.0, math.inf
     return delay, spread

@@ -66,3 +66,21 @@ def test_a_search_waits_for_further_images_and_follows_once_it_has_found_a_delay
         again = again.driven(float(turn[1] - turn[0]), 0.5)
         again = again.seen(float(wrap(1.0 + heading(stamp - 0.1 - MIN_CHANGE_S))), again.delay_s)
     assert again.delay_s > late.delay_s + 0.3 * MIN_CHANGE_S
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0005])
+@pytest.mark.parametrize("interval", [0.5, 0.2])
+def test_a_robot_that_stands_or_drives_straight_keeps_the_delay_that_its_turns_showed(
+    noise: float, interval: float
+) -> None:
+    late, rng = driven(0.1, images=int(80.0 / interval), interval=interval), np.random.default_rng(0)
+    found = late.delay_s
+    for _ in range(int(300.0 / interval)):
+        late = late.driven(float(rng.normal(0.0, noise)), interval)
+        late = late.seen(float(wrap(1.0 + heading(80.0) + rng.normal(0.0, SIGMA))), late.allowed(0.0))
+        assert late.delay_s == pytest.approx(found, abs=0.02)
+
+
+def test_a_delay_that_was_found_outlasts_an_image_without_motion() -> None:
+    late = driven(0.1).interrupted()
+    assert (late.delay_s, len(late.rows)) == (pytest.approx(0.1, abs=0.015), 0)
