@@ -23,7 +23,7 @@ from omninav.stages.camera.self_calibration import (
 )
 from omninav.stages.geometry.arrays import Array, Ints
 from omninav.stages.geometry.landmarks.adjustment import Lens
-from omninav.stages.geometry.landmarks.leaning_images import levelled_bearings
+from omninav.stages.geometry.landmarks.leaning_images import Levelling
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.local_features import LocalFeatures
@@ -53,14 +53,14 @@ class CameraCheck(NamedTuple):
 
     `camera`: None where nothing of it can be, as by few references, of bearings that are not those of its pixels
     (images that were unwarped before, logs of several cameras) and of one that does not see the full circle.
-    `levelling` (F, 3, 3): rotation of each bearing that levels its image, where images tilt differently; else None.
+    `levelling`: of each bearing as it is described, where images tilt differently; else None.
     """
 
     camera: Camera | None
     fields: dict[str, float]
     pixels: Array
     bearings: Array
-    levelling: Array | None = None
+    levelling: Levelling | None = None
 
     @classmethod
     def of(
@@ -85,8 +85,13 @@ class CameraCheck(NamedTuple):
             lens = with_tilt(adjustable(self.camera, self.pixels[features], self.fields))
         if self.levelling is None:
             return lens
-        by = self.levelling[features]
-        return Lens(lambda corrections: levelled_bearings(lens.bearings(corrections), by), lens.sigmas)
+        by = self.levelling.of(features)
+
+        def level(corrections: Array) -> Array:
+            yaw = 0.0 if self.camera is None else self._named(corrections).get("yaw", 0.0)
+            return turned(by.level(turned(lens.bearings(corrections), -yaw)), yaw)
+
+        return Lens(level, lens.sigmas)
 
     def levelled(self, views: LocalViews, corrections: Array) -> LocalViews:
         """The views of the camera with its axis where it is, and level; its yaw is as it is described."""
@@ -96,7 +101,7 @@ class CameraCheck(NamedTuple):
         bearings = self.bearings if moved is self.camera else self._seen_by(moved)
         bearings = turned(leaning(turned(bearings, yaw), by["roll"], by["pitch"]), -yaw)
         if self.levelling is not None:
-            bearings = levelled_bearings(bearings, self.levelling)
+            bearings = self.levelling.level(bearings)
         return views.looking_along(bearings)
 
     def yaw_beside(self, corrections: Array) -> float:

@@ -10,7 +10,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks import map_making
-from omninav.stages.geometry.landmarks.leaning_images import leaning_deg, leaning_images, levelled
+from omninav.stages.geometry.landmarks.leaning_images import leaning_images, levelled
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
     CONTRADICTED,
@@ -19,6 +19,7 @@ from omninav.stages.geometry.landmarks.map_adjustment import (
     adjusted_drive,
     adjusted_to_given,
     found_with_mount,
+    odometry_motions,
 )
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
 from omninav.stages.geometry.plane.image_delay import RobotPath, found_delay
@@ -55,7 +56,8 @@ class LearnLandmarks(Stage):
     `camera` wired, the camera's axis, tilt and mount are adjusted together: given poses may be exact or off by
     decimetres and degrees; those of odometry alone are straightened first by the places that the tour came back to, and
     scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Images that
-    lean each by themselves, as of a camera that is carried, are levelled first (fact `leaning_images`). Where too
+    lean each by themselves, as of a camera that is carried, are levelled and brought to one height first (fact
+    `leaning_images`). Where too
     little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as described is reported, and
     kept with the landmarks; points are those of a level camera, and poses those of the robot under it.
     There are none where images are too small for local features, and the map is used without them.
@@ -94,12 +96,13 @@ class LearnLandmarks(Stage):
         adjust = tour.as_given if given else tour.as_a_drive
         measured = map.poses if given or as_driven is None else as_driven.poses
         about = camera_poses(measured, mounted)
-        levelling = leaning_images(views, tour.matched(about), about, given, check.camera is not None)
+        motions = None if given else odometry_motions(about, tour.saw_motion)
+        levelling = leaning_images(views, tour.matched(about), about, motions, check.camera is not None)
         if levelling is not None:
-            check = check._replace(levelling=levelling[views.owners])
+            check = check._replace(levelling=levelling)
             views = tour.views = levelled(views, levelling)
             tour.seen = check.seen
-            ctx.fact("leaning_images", f"by {leaning_deg(levelling):.1f} degrees in the median: landmarks allow for it")
+            ctx.fact("leaning_images", f"by {levelling.leaning_deg:.1f} degrees in the median: landmarks allow for it")
         if camera is None:
             adjusted, mount, late = adjust(measured), mounted, 0.0
         else:
@@ -182,6 +185,11 @@ class _Tour:
     matches: PairMatches | None = None
     """Matches of neighbours by the poses that were last asked for."""
 
+    @property
+    def saw_motion(self) -> bool:
+        """Tells whether odometry is what the images showed."""
+        return self.map.pose_source == "guess"
+
     def matched(self, poses: Array) -> PairMatches:
         """Matches of references that are neighbours by their poses (R, 3)."""
         unit = length_scale(poses, self.map.features, self.map.kind) or DEFAULT_M
@@ -196,8 +204,7 @@ class _Tour:
 
     def as_a_drive(self, poses: Array) -> AdjustedMap:
         """Adjust poses (R, 3) that odometry has measured."""
-        seen_motion = self.map.pose_source == "guess"
-        return adjusted_drive(self.views, _rows(self.words), poses, self.seen, self.height, self.rng, seen_motion)
+        return adjusted_drive(self.views, _rows(self.words), poses, self.seen, self.height, self.rng, self.saw_motion)
 
 
 def _robot(

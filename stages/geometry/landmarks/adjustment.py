@@ -55,7 +55,7 @@ class Lens(NamedTuple):
 
 
 class Adjusted(NamedTuple):
-    """Poses (R, 3 or 5), points (L, 3), and what the camera's parameters are corrected by (K,).
+    """Poses (R, 3 or 6), points (L, 3), and what the camera's parameters are corrected by (K,).
 
     `inliers` (O,): sightings that agree; `rms`: the root of their mean squared angle (rad). `covariances`: a
     function that gives those of x, y and heading (R, 3, 3), infinite where nothing was adjusted. Its argument is the
@@ -85,13 +85,14 @@ def adjusted(
 ) -> Adjusted:
     """Adjust poses and landmarks, and a camera's parameters, to all bearings at once, of which some are wrong.
 
-    `poses` (R, 3): x, y, heading (m, rad) of robots on a floor, or (R, 5) with roll and pitch; the rotation is that
-    about z by the heading, then about y by the pitch, then about x by the roll. `points` (L, 3): m, with z = 0 at the
-    height of the projection centre. `references`, `landmarks` (O,): of each sighting; `bearings` (O, 3): unit vectors
-    in the robot's frame, or the camera that they come from; `sigma`: their standard deviation (rad). `pose_sigmas`
-    (R, 3 or 5): standard deviations of the poses as they are `given`, 0 for one that stays and infinite for one that is
-    free; None: the first stays, and all others are free. `given` (R, 3 or 5): None for `poses`, where it begins.
-    Bearings alone do not show the scale: it is that of `motions`, or of poses of finite sigma.
+    `poses` (R, 3): x, y, heading (m, rad) of robots on a floor, or (R, 6) with roll, pitch (rad) and height (m); the
+    rotation is that about z by the heading, then about y by the pitch, then about x by the roll. `points` (L, 3): m,
+    with z = 0 at the height of the projection centre. `references`, `landmarks` (O,): of each sighting; `bearings`
+    (O, 3): unit vectors in the robot's frame, or the camera that they come from; `sigma`: their standard deviation
+    (rad). `pose_sigmas` (R, 3 or 6): standard deviations of the poses as they are `given`, 0 for one that stays and
+    infinite for one that is free; None: the first stays, and all others are free. `given` (R, 3 or 6): None for
+    `poses`, where it begins. Bearings alone do not show the scale: it is that of `motions`, or of poses of finite
+    sigma.
 
     Levenberg and Marquardt's method with the landmarks eliminated, in our own code: pyceres would be one more
     dependency with binaries, for two hundred lines. A sighting counts by Geman and McClure's function, whose scale
@@ -263,7 +264,7 @@ class _Problem:
 
     def squares(self, state: _State) -> Array:
         """Squared angles (O,) in sigmas."""
-        positions, rotations, _ = _frames(state.poses)
+        positions, rotations, _, _ = _frames(state.poses)
         bearings = self.lens.bearings(state.camera)[self.used]
         missed = residuals(positions, rotations, state.points, *self.sightings, bearings)
         return np.asarray(np.einsum("oi,oi->o", missed, missed) / self.sigma**2)
@@ -294,13 +295,15 @@ class _Problem:
 
 
 def _frames(poses: Array) -> Poses:
-    turns = rotations_about(poses[:, 2], 2)
-    axes = [turns[:, :, 2]]
-    if poses.shape[1] == 5:
+    turns, places = rotations_about(poses[:, 2], 2), np.zeros((len(poses), 3))
+    places[:, :2] = poses[:, :2]
+    axes, leans = [turns[:, :, 2]], poses.shape[1] == 6
+    if leans:
+        places[:, 2] = poses[:, 5]
         tilted = turns @ rotations_about(poses[:, 4], 1)
         axes += [tilted[:, :, 0], turns[:, :, 1]]
         turns = tilted @ rotations_about(poses[:, 3], 0)
-    return Poses(np.ascontiguousarray(poses[:, :2]), np.ascontiguousarray(turns), np.stack(axes, axis=1))
+    return Poses(places, np.ascontiguousarray(turns), np.stack(axes, axis=1), leans)
 
 
 def _rigid_motions(poses: Array) -> tuple[Array, Array]:

@@ -161,6 +161,13 @@ def _fitting(views: LocalViews, matches: PairMatches, poses: Array) -> Ints:
     return np.bincount(views.owners[both], minlength=len(views))
 
 
+def odometry_motions(poses: Array, seen_motion: bool) -> Motions:
+    """Motions between poses (R, 3) that odometry measured, or that were seen in the images (`seen_motion`)."""
+    along, steps = np.arange(len(poses)), between(poses[:-1], poses[1:])
+    looseness = np.array(SEEN_LOOSENESS) if seen_motion else np.ones(3)
+    return Motions(np.column_stack([along[:-1], along[1:]]), steps, looseness * odometry_sigmas(steps))
+
+
 def adjusted_drive(
     views: LocalViews,
     similarity: Iterable[Floats],

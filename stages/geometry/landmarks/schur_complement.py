@@ -29,14 +29,16 @@ class Sightings(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """The references in the map's frame: `positions` (R, 2), `rotations` (R, 3, 3) from their own frames.
+    """The references in the map's frame: `positions` (R, 3), `rotations` (R, 3, 3) from their own frames.
 
-    `axes` (R, A, 3): unit axes about which each may turn.
+    `axes` (R, A, 3): unit axes about which each may turn. `rises`: whether each may move up and down too, the last of
+    its freedoms.
     """
 
     positions: Array
     rotations: Array
     axes: Array
+    rises: bool
 
 
 class Eliminated(NamedTuple):
@@ -84,7 +86,7 @@ def residuals(
         for n in range(starts[landmark], starts[landmark + 1]):
             r = references[n]
             x, y = points[landmark, 0] - positions[r, 0], points[landmark, 1] - positions[r, 1]
-            z = points[landmark, 2]
+            z = points[landmark, 2] - positions[r, 2]
             far = math.sqrt(x * x + y * y + z * z) + 1e-300
             out[n, 0], out[n, 1], out[n, 2] = x / far, y / far, z / far
             for i in range(3):
@@ -102,7 +104,7 @@ def eliminate(
     `points` (L, 3); `bearings` (O, 3), `lens` (O, 3, K): their derivatives by the camera's parameters, both in the
     reference's frame; `weights` (O,).
     """
-    number, freedoms = len(frames.positions), 2 + frames.axes.shape[1]
+    number, freedoms = len(frames.positions), 2 + frames.axes.shape[1] + frames.rises
     shared = lens.shape[2]
     out = Eliminated(
         np.zeros((number, freedoms, freedoms)),
@@ -118,7 +120,7 @@ def eliminate(
         np.zeros((len(points), 3, shared)),
         np.zeros((len(bearings), freedoms, 3)),
     )
-    _eliminate(*frames, points, *sightings, bearings, lens, weights, damping, *pattern, *out)
+    _eliminate(*frames[:3], points, *sightings, bearings, lens, weights, damping, *pattern, *out)
     return out
 
 
@@ -150,7 +152,7 @@ def _eliminate(
     curvature_camera: Array, inverse: Array, slope: Array, shared: Array, mixed: Array,
 ) -> None:  # fmt: skip
     turns, cameras = axes.shape[1], lens.shape[2]
-    freedoms = 2 + turns
+    freedoms = mixed.shape[1]
     slide, block = np.empty((3, 3)), np.empty((3, 3))
     ray, seen, miss = np.empty(3), np.empty(3), np.empty(3)
     row, look = np.empty((3, freedoms)), np.empty((3, cameras))
@@ -161,7 +163,7 @@ def _eliminate(
             r, weight = references[n], weights[n]
             far = 0.0
             for i in range(3):
-                ray[i] = points[landmark, i] - (positions[r, i] if i < 2 else 0.0)
+                ray[i] = points[landmark, i] - positions[r, i]
                 far += ray[i] * ray[i]
             far = math.sqrt(far) + 1e-300
             for i in range(3):
@@ -174,6 +176,8 @@ def _eliminate(
                 for k in range(3):
                     slide[i, k] = ((1.0 if i == k else 0.0) - ray[i] * ray[k]) / far
                 row[i, 0], row[i, 1] = -slide[i, 0], -slide[i, 1]
+                if freedoms > 2 + turns:
+                    row[i, 2 + turns] = -slide[i, 2]
             for k in range(turns):
                 x, y, z = axes[r, k, 0], axes[r, k, 1], axes[r, k, 2]
                 row[0, 2 + k] = z * seen[1] - y * seen[2]

@@ -12,8 +12,10 @@ from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.self_calibration import adjustable
-from omninav.stages.geometry.landmarks.adjustment import adjusted
+from omninav.stages.geometry.landmarks.adjustment import adjusted, rotations_about
+from omninav.stages.geometry.landmarks.leaning_images import Levelling
 from omninav.stages.geometry.landmarks.map_making import LocalViews, PairMatches
+from omninav.stages.geometry.plane.se2 import turned
 from omninav.stages.mapping.camera_check import MIN_VIEWS, CameraCheck
 from omninav.stages.recordings.camera_yaml import parse_camera
 
@@ -43,6 +45,18 @@ def corrections(check, world):
 
 def told(ctx, check, found):
     return check.told(ctx, check.camera, found, np.array([0.0, 0.0, check.yaw_beside(found)]), 0.0)
+
+
+def test_bearings_of_the_adjustment_are_those_of_the_map_where_images_lean_and_the_yaw_is_wrong(seen):
+    pixels, _ = seen
+    rng, described = np.random.default_rng(1), check_of(TRUE, pixels)
+    tilts = rng.normal(0.0, math.radians(3.0), (2, len(pixels)))
+    levelling = Levelling(rotations_about(tilts[0], 1) @ rotations_about(tilts[1], 0), np.full(len(pixels), 0.01))
+    check, wrong = described._replace(levelling=levelling), np.zeros(len(described.fields) + 2)
+    wrong[list(check.fields).index("yaw")] = 0.5
+    views = LocalViews(np.array([0, len(pixels)]), check.bearings, np.empty((0, 128), np.uint8))
+    adjusted_to = check.seen(np.arange(len(pixels))).bearings(wrong)
+    assert turned(check.levelled(views, wrong).bearings, 0.5) == pytest.approx(adjusted_to, abs=1e-9)
 
 
 def test_an_axis_beside_is_said_and_the_right_camera_is_given(seen):

@@ -88,12 +88,12 @@ def test_roll_and_pitch_are_found_where_they_are_free():
     tilts = rng.normal(0.0, math.radians(1.0), (120, 2))
     world = house(rng, tilts=tilts)
     poses = displaced(world.poses, rng)
-    sigmas = np.tile([*POSE_SIGMAS, math.radians(1.0), math.radians(1.0)], (120, 1))
+    sigmas = np.tile([*POSE_SIGMAS, math.radians(1.0), math.radians(1.0), 0.02], (120, 1))
     flat = seen(world, poses, pose_sigmas=sigmas[:, :3])
-    found = seen(world, np.column_stack([poses, np.zeros((120, 2))]), pose_sigmas=sigmas)
+    found = seen(world, np.column_stack([poses, np.zeros((120, 3))]), pose_sigmas=sigmas)
     assert misplaced(flat.poses, world.poses)[0] > 0.01
     assert misplaced(found.poses, world.poses)[0] < 0.005
-    assert np.degrees(np.sqrt(((found.poses[:, 3:] - tilts) ** 2).mean())) < 0.1
+    assert np.degrees(np.sqrt(((found.poses[:, 3:5] - tilts) ** 2).mean())) < 0.1
 
 
 def test_a_parameter_of_the_camera_is_found_with_wrong_poses(world, wrong_poses):

@@ -29,13 +29,24 @@ def problem():
     return poses, points, bearings / np.linalg.norm(bearings, axis=1)[:, None], rng.normal(size=(10, 3, 2)), rng
 
 
+def placed(poses):
+    """The positions (R, 3) of poses (R, 3), or (R, 4) with a height."""
+    places = np.zeros((len(poses), 3))
+    places[:, :2], places[:, 2:] = poses[:, :2], poses[:, 3:] if poses.shape[1] > 3 else 0.0
+    return places
+
+
 def missed(values, bearings, lens):
-    poses, camera, points = values[:12].reshape(4, 3), values[12:14], values[14:].reshape(3, 3)
-    return residuals(poses[:, :2].copy(), rotations(poses), points, *SIGHTINGS, bearings + lens @ camera).ravel()
+    poses, camera, points = values[:-11].reshape(4, -1), values[-11:-9], values[-9:].reshape(3, 3)
+    return residuals(placed(poses), rotations(poses), points, *SIGHTINGS, bearings + lens @ camera).ravel()
 
 
-def test_a_step_is_that_of_the_whole_system(problem):
+@pytest.mark.parametrize("rises", [False, True])
+def test_a_step_is_that_of_the_whole_system(problem, rises):
     poses, points, bearings, lens, rng = problem
+    if rises:
+        poses = np.column_stack([poses, rng.normal(0.0, 0.1, 4)])
+    freedoms, size = poses.shape[1], poses.size
     weights = rng.uniform(0.5, 2.0, 10)
     values = np.concatenate([poses.ravel(), np.zeros(2), points.ravel()])
     jacobian = np.stack([
@@ -47,25 +58,25 @@ def test_a_step_is_that_of_the_whole_system(problem):
     damped = square + DAMPING * np.diag(np.diag(square))
     expected = -np.linalg.solve(damped, gradient)
 
-    frames = Poses(poses[:, :2].copy(), rotations(poses), np.tile([[[0.0, 0.0, 1.0]]], (4, 1, 1)))
+    frames = Poses(placed(poses), rotations(poses), np.tile([[[0.0, 0.0, 1.0]]], (4, 1, 1)), rises)
     pattern = covisibility(SIGHTINGS, 4)
     system = eliminate(frames, points, SIGHTINGS, bearings, lens, weights, DAMPING, pattern)
-    whole = np.zeros((14, 14))
+    whole = np.zeros((size + 2, size + 2))
     for one in range(4):
-        whole[3 * one : 3 * one + 3, 3 * one : 3 * one + 3] = system.diagonal[one] + DAMPING * np.diag(
-            system.curvature[one]
-        )
+        here = slice(freedoms * one, freedoms * (one + 1))
+        whole[here, here] = system.diagonal[one] + DAMPING * np.diag(system.curvature[one])
         for at in range(pattern[0][one], pattern[0][one + 1]):
             other = pattern[1][at]
-            whole[3 * one : 3 * one + 3, 3 * other : 3 * other + 3] = system.upper[at]
-            whole[3 * other : 3 * other + 3, 3 * one : 3 * one + 3] = system.upper[at].T
-    whole[:12, 12:] = system.border.reshape(12, 2)
-    whole[12:, :12] = whole[:12, 12:].T
-    whole[12:, 12:] = system.corner + DAMPING * np.diag(system.curvature_camera)
+            there = slice(freedoms * other, freedoms * (other + 1))
+            whole[here, there] = system.upper[at]
+            whole[there, here] = system.upper[at].T
+    whole[:size, size:] = system.border.reshape(size, 2)
+    whole[size:, :size] = whole[:size, size:].T
+    whole[size:, size:] = system.corner + DAMPING * np.diag(system.curvature_camera)
     step = -np.linalg.solve(whole, np.concatenate([system.right.ravel(), system.right_camera]))
-    assert step == pytest.approx(expected[:14], rel=1e-5, abs=1e-8)
-    back = landmark_steps(system, SIGHTINGS, step[:12].reshape(4, 3), step[12:])
-    assert back.ravel() == pytest.approx(expected[14:], rel=1e-5, abs=1e-8)
+    assert step == pytest.approx(expected[:-9], rel=1e-5, abs=1e-8)
+    back = landmark_steps(system, SIGHTINGS, step[:size].reshape(4, -1), step[size:])
+    assert back.ravel() == pytest.approx(expected[-9:], rel=1e-5, abs=1e-8)
 
 
 def test_references_that_share_a_landmark_are_listed_once():
