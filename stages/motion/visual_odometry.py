@@ -65,7 +65,8 @@ class VisualOdometry(Stage):
 
     Not in the papers. An image's pose follows from points that the last keyframes have triangulated, so that lengths
     are kept from image to image, and where the camera stops or turns on the spot no motion is invented. Once the points
-    have moved by a few degrees the image becomes a keyframe, and the last ones are adjusted with all that they see.
+    have moved by a few degrees the image becomes a keyframe, and the last ones are adjusted with all that they see,
+    levelled first where they lean each by themselves, as of a camera that is carried.
     The true length comes from the distance of two poses by the map's landmarks (`fix`), else from the camera's height
     over a floor that is seen; else from the guess of the source at the first motion, and the run reports it. Images
     whose motion is not seen are counted (`motion_not_seen`) and continue by the usual step with the guessed turn, as

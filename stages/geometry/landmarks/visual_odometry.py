@@ -10,13 +10,15 @@ from omninav.pipeline import Value
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest_units
 from omninav.stages.geometry.appearance.visual_words import root_descriptors
 from omninav.stages.geometry.arrays import Array, Bytes, Floats, Ints
-from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
-from omninav.stages.geometry.two_views.relative_pose_ransac import false_alarms, relative_pose
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
+from omninav.stages.geometry.two_views.ransac import AgreedPose
+from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
 
 from .adjustment import adjusted
 from .bearing_pose import TOLERANCE, matched, pose_of_bearings
 from .closures import MAX_FALSE_ALARMS, MIN_INLIERS
 from .floor import lowest_plane
+from .leaning_images import MAX_SHARE, leaning_images, levelled
 from .map_adjustment import SIGMA
 from .map_making import RATIO, LocalViews, fitting_matches, mean_descriptors, pair_matches, tracks_of, triangulated
 
@@ -30,6 +32,8 @@ RELATIVE_SIGMA = 0.1
 """Standard deviation of that length, as a part of it."""
 MIN_PARALLAX = math.radians(1.0)
 """Median angle between matched bearings, both turned the same way, from which two images tell a direction (rad)."""
+MAX_SAMPLES = 1000
+"""Samples of five matches that are drawn at most where an image leans."""
 STILL = math.radians(0.3)
 """The same below which the camera is taken to be where the keyframe was (rad)."""
 KEYFRAME_PARALLAX = math.radians(3.0)
@@ -39,11 +43,12 @@ KEYFRAME_PARALLAX = math.radians(3.0)
 class Keyframes(Value):
     """The last keyframes of a drive: `poses` (K, 3) in a frame of their own (m, m, rad), and their features.
 
-    `starts` (K + 1,), `bearings` (F, 3), `patches` (F, D): fields of `views`. `points` (L, 3): that they have
-    triangulated, in that frame, with their mean `descriptors` (L, D).
+    `starts` (K + 1,), `bearings` (F, 3), `patches` (F, D): fields of `views`. `level` (F, 3): bearings of level
+    cameras. `points` (L, 3): that they have triangulated, in that frame, with their mean `descriptors` (L, D).
     """
 
     poses: Array
+    level: Array
     starts: Ints
     bearings: Array
     patches: Bytes
@@ -77,7 +82,7 @@ class Tracked(NamedTuple):
 def begun(pose: Array, bearings: Array, descriptors: Bytes) -> Keyframes:
     """One keyframe, of whose points nothing is known."""
     starts, unknown = np.array([0, len(bearings)]), np.empty((0, descriptors.shape[1]), np.float32)
-    return Keyframes(pose[None], starts, bearings, descriptors, np.empty((0, 3)), unknown)
+    return Keyframes(pose[None], bearings, starts, bearings, descriptors, np.empty((0, 3)), unknown)
 
 
 def tracked(keyframes: Keyframes, bearings: Array, descriptors: Bytes, rng: np.random.Generator) -> Tracked | None:
@@ -103,21 +108,34 @@ def _from_last(
     """Finds it by matches with the last keyframe, and the length by points (M, 3) `seen` (M, 3), if only a few."""
     last, rows = keyframes.poses[-1], keyframes.views.rows(len(keyframes.poses) - 1)
     pairs = mutual_nearest_units(keyframes.views.compared(rows), looks, RATIO)
-    first, second = keyframes.views.bearings[rows][pairs.first], bearings[pairs.second]
-    pose = relative_pose(first, second, rng, threshold=TOLERANCE) if len(first) >= MIN_INLIERS else None
-    if pose is None or np.count_nonzero(pose.inliers) < MIN_INLIERS:
+    first, second = keyframes.level[rows][pairs.first], bearings[pairs.second]
+    found = _relative_pose(first, second, rng) if len(first) >= MIN_INLIERS else None
+    if found is None or np.count_nonzero(found[0].inliers) < MIN_INLIERS:
         return None
-    turn = yaw_of(pose.rotation)
-    moved = _parallax(first[pose.inliers], second[pose.inliers], turn)
+    pose, solver = found
+    turn = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
+    level = turn_about_vertical(turn).T @ pose.rotation
+    moved = _parallax(first[pose.inliers], second[pose.inliers] @ level.T, turn)
     out = np.array([last[0], last[1], last[2] + turn])
     if moved < MIN_PARALLAX:
         return Tracked(out, (moved / KEYFRAME_PARALLAX, SIGMA), moved, False)
-    if false_alarms(pose, first, second, TOLERANCE) > MAX_FALSE_ALARMS:
+    if false_alarms(pose, first, second, TOLERANCE, solver) > MAX_FALSE_ALARMS:
         return None
     towards = _turned(pose.translation, last[2])
-    length = _length(towards, _turned(seen, float(out[2])), points - np.append(last[:2], 0.0))
+    length = _length(towards, _turned(seen @ level.T, float(out[2])), points - np.append(last[:2], 0.0))
     out[:2] += (length or 1.0) * towards[:2] / np.hypot(*towards[:2])
     return Tracked(out, (RELATIVE_SIGMA * (length or 1.0), SIGMA), moved, length is not None)
+
+
+def _relative_pose(first: Array, second: Array, rng: np.random.Generator) -> tuple[AgreedPose, Solver] | None:
+    """The pose of an image beside a level one, and its solver: that of level images, unless it leans."""
+    level = relative_pose(first, second, rng, threshold=TOLERANCE)
+    agreeing = 0 if level is None else np.count_nonzero(level.inliers)
+    if agreeing < MAX_SHARE * len(first):
+        leaning = relative_pose(first, second, rng, "five_point", TOLERANCE, max_samples=MAX_SAMPLES)
+        if leaning is not None and agreeing < MAX_SHARE * np.count_nonzero(leaning.inliers):
+            return leaning, "five_point"
+    return None if level is None else (level, "planar")
 
 
 def _length(towards: Array, bearings: Array, points: Array) -> float | None:
@@ -160,11 +178,15 @@ def extended(keyframes: Keyframes, pose: Array, bearings: Array, descriptors: By
     poses = np.concatenate([keyframes.poses[first:], pose[None]])
     pairs = np.column_stack(np.triu_indices(len(poses), 1))
     matches = pair_matches(views, pairs)
-    seen = triangulated(views, tracks_of(views, matches, fitting_matches(views, matches, poses)), poses)
+    levelling = leaning_images(views, matches, poses, None, leave_shared=False)
+    level = views if levelling is None else levelled(views, levelling)
+    seen = triangulated(level, tracks_of(level, matches, fitting_matches(level, matches, poses)), poses)
     owners = views.owners[seen.features]
     held = np.full(poses.shape, math.inf)
     held[:2] = 0.0
-    found = adjusted(poses, seen.points, owners, seen.landmarks, views.bearings[seen.features], SIGMA, held)
+    found = adjusted(poses, seen.points, owners, seen.landmarks, level.bearings[seen.features], SIGMA, held)
     right = np.bincount(seen.landmarks[found.inliers], minlength=len(seen.points)) > 1
     depth = lowest_plane(found.points, found.poses, owners, seen.landmarks)
-    return Keyframes(found.poses, *views, found.points[right], mean_descriptors(views, seen)[right]), depth
+    return Keyframes(
+        found.poses, level.bearings, *views, found.points[right], mean_descriptors(views, seen)[right]
+    ), depth

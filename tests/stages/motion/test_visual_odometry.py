@@ -12,6 +12,7 @@ from made_tour import Landmarks as Points
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.geometry.landmarks.adjustment import rotations_about
 from omninav.stages.geometry.plane.mount import robot_poses
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.motion.visual_odometry import VisualOdometry, VisualOdometryState, _scale_by_map
@@ -55,14 +56,21 @@ def run(
     kept=False,
     log=0,
     mount=NONE,
+    tilt_deg=0.0,
     **options,
 ):
-    """The stage's output for each image; `hidden` ones show nothing. `kept`: its state goes through bytes."""
+    """The stage's output for each image; `hidden` ones show nothing. `kept`: its state goes through bytes.
+
+    `tilt_deg`: standard deviation of the camera's roll and pitch, in each image others.
+    """
     stage, state, ctx = VisualOdometry(**options), VisualOdometryState(), Context("seen", np.random.default_rng(0))
     rng, outs, ctx.tick = np.random.default_rng(1), [], Tick(0, 0, log)
     for number, pose in enumerate(poses):
         features = points.seen(Pose(*pose.tolist()), 3.0)
         bearings = features.bearings + rng.normal(0.0, math.radians(0.05), features.bearings.shape)
+        if tilt_deg:
+            roll, pitch = np.radians(rng.normal(0.0, tilt_deg, (2, 1)))
+            bearings = bearings @ (rotations_about(pitch, 1) @ rotations_about(roll, 0))[0]
         features = replace(features, bearings=bearings / np.linalg.norm(bearings, axis=1, keepdims=True))
         if number in hidden:
             features = none_found()
@@ -119,6 +127,15 @@ def test_the_cameras_height_over_the_floor_gives_metres() -> None:
     assert lengths[10:] == pytest.approx(STEP_M, abs=0.012)
     assert "floor" in ctx.facts["scale"]
     assert not ctx.warnings
+
+
+def test_the_motion_is_seen_by_a_camera_whose_tilt_changes() -> None:
+    poses = walk(30)
+    outs, ctx = run(room(floor=True), poses, FLOOR_M, tilt_deg=4.0)
+    true, moved = between(poses[0], poses), np.array([(out.motion.x, out.motion.y) for out in outs[1:]])
+    assert np.hypot(*moved[10:].T) == pytest.approx(STEP_M, abs=0.025)
+    assert path(outs)[:, 2] == pytest.approx(true[:, 2], abs=math.radians(1.0))
+    assert not ctx.counts
 
 
 def test_the_motion_is_that_of_the_robot_under_a_camera_in_front_of_its_axis() -> None:
