@@ -124,7 +124,7 @@ class Landmarks(Value):
 
     def moved(self, before: Array, after: Array) -> "Landmarks":
         """Each point moved as the references that see it are, from their poses `before` (R, 3) to those `after` (R, 3):
-        to the mean of where they see it then."""
+        to the mean of where they see it then. Deviations of the poses turn with them."""
         owners = np.repeat(np.arange(self.references), np.diff(self.starts))
         x, y = (self.points[self.seen, :2] - before[owners, :2]).T
         cos, sin = np.cos((after - before)[owners, 2]), np.sin((after - before)[owners, 2])
@@ -133,7 +133,12 @@ class Landmarks(Value):
         for axis, turned in enumerate((cos * x - sin * y, sin * x + cos * y)):
             total = np.bincount(self.seen, after[owners, axis] + turned, len(self))
             points[seen, axis] = total[seen] / counts[seen]
-        return replace(self, points=points)
+        sigmas = self.pose_sigmas
+        if sigmas is not None:
+            (x, y, turn), share = sigmas.T**2, np.cos((after - before)[:, 2]) ** 2
+            turned_squares = (share * x + (1.0 - share) * y, (1.0 - share) * x + share * y, turn)
+            sigmas = np.sqrt(np.column_stack(turned_squares))
+        return replace(self, points=points, pose_sigmas=sigmas)
 
 
 def mirrored_alike(given: Sequence[Landmarks]) -> list[Landmarks]:

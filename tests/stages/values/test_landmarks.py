@@ -94,6 +94,15 @@ def test_a_map_that_is_moved_takes_its_landmarks_along() -> None:
     assert (moved.poses == poses).all()
 
 
+def test_deviations_of_poses_turn_with_a_map() -> None:
+    map = mapped_room()
+    sigmas = np.tile([0.1, 0.02, 0.01], (len(map.poses), 1))
+    map = replace(map, landmarks=replace(map.landmarks, pose_sigmas=sigmas))
+    turned = map.moved(compose(np.array([3.0, 1.0, np.pi / 2]), map.poses)).landmarks.pose_sigmas
+    assert turned == pytest.approx(sigmas[:, [1, 0, 2]])
+    assert map.moved(map.poses + np.array([1.0, 2.0, 0.0])).landmarks.pose_sigmas == pytest.approx(sigmas)
+
+
 def test_a_landmark_moves_with_the_references_that_see_it() -> None:
     map = mapped_room()
     poses = map.poses.copy()
