@@ -40,6 +40,8 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
     descriptors = np.concatenate([each.descriptors for each in parts if len(each)] or [parts[0].descriptors])
     seen = np.concatenate([each.seen + first for each, first in zip(parts, points, strict=False)]).astype(np.int32)
     ends = np.concatenate([[0], *(each.starts[1:] + first for each, first in zip(parts, starts, strict=False))])
+    # A camera that is described rightly needs no correction: that of another description is kept for drives with it.
+    corrected = next((each for each in given if _is_corrected(each)), given[0])
     variances = [each.sigma_rad**2 for each in given]
     return Landmarks(
         np.concatenate([each.points for each in parts]),
@@ -50,15 +52,20 @@ def joined_landmarks(maps: Sequence[ReferenceGraph]) -> Landmarks | None:
         _joined_words([each.words for each in parts]) or _words_of_landmarks(given, descriptors, ends, seen),
         min(each.found_rate for each in given),
         variance_factor=max(each.variance_factor for each in given),
-        described=given[0].described,
-        mount=given[0].mount,
-        described_delay_s=given[0].described_delay_s,
-        delay_s=given[0].delay_s,
+        described=corrected.described,
+        mount=corrected.mount,
+        described_delay_s=corrected.described_delay_s,
+        delay_s=corrected.delay_s,
         pose_sigmas=np.concatenate(
             [np.zeros((len(each.starts) - 1, 3)) if each.pose_sigmas is None else each.pose_sigmas for each in parts]
         ),
         mirrored=parts[0].mirrored,
     )
+
+
+def _is_corrected(landmarks: Landmarks) -> bool:
+    """Tells whether a tour's camera sat, or lagged, otherwise than described."""
+    return bool((landmarks.mount != landmarks.described).any()) or landmarks.delay_s != landmarks.described_delay_s
 
 
 def _of_all(map: ReferenceGraph, other: Landmarks) -> Landmarks:

@@ -61,6 +61,17 @@ def test_two_rooms_that_were_mapped_apart_are_one_map() -> None:
     assert found_in(both, seed=1) == pytest.approx(POSE + AWAY, abs=1e-3)
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_what_a_tour_showed_of_its_camera_stays_whichever_map_is_first(first: bool) -> None:
+    right, wrong = np.array([0.0, 0.0, 0.3]), np.array([0.0, 0.0, 0.2])
+    one, other = mapped_room(), other_room()
+    described = replace(one, landmarks=replace(one.landmarks, described=right, mount=right))
+    found = replace(other, landmarks=replace(other.landmarks, described=wrong, mount=right, delay_s=0.1))
+    both = joined_references([described, found] if first else [found, described], "truth").landmarks
+    assert [both.mounted(each, True)[2] for each in (right, wrong)] == pytest.approx([0.0, 0.1])
+    assert both.delay_s == 0.1
+
+
 def test_maps_of_a_mirror_and_of_a_panorama_are_one_map() -> None:
     one, other = mapped_room(), other_room()
     reflected = replace(other, landmarks=other.landmarks.as_mirrored(True))
