@@ -232,7 +232,7 @@ class Playback(Source, ABC):
 
 
 def _requests(part: LogPart, last: int, frame: int) -> tuple[Reinitialise | None, GoalPoint | None]:
-    """What was asked of a live run after its frame `last`, up to this one; a pose is moved on by odometry to it."""
+    """Finds the last requests to a live run after its frame `last`, up to this one; a pose is moved on by odometry."""
     restart, goal = None, None
     if isinstance(part.recording, LiveRecording):
         for each in range(last + 1, frame + 1):
