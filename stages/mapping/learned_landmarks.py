@@ -1,5 +1,6 @@
 """Learns the landmarks of a map from the local features of its references."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.length_scale import length_scale
 from omninav.stages.geometry.arrays import Array, Floats, Ints
 from omninav.stages.geometry.landmarks import map_making
-from omninav.stages.geometry.landmarks.leaning_images import leaning_images, levelled
+from omninav.stages.geometry.landmarks.leaning_images import MIN_TILT, leaning_images, levelled
 from omninav.stages.geometry.landmarks.left_out import left_out_poses, other_references, samples_of
 from omninav.stages.geometry.landmarks.map_adjustment import (
     CONTRADICTED,
@@ -35,8 +36,6 @@ from omninav.stages.values.visual_words import VisualWords
 
 from .camera_check import CAMERA_SPECS, CameraCheck
 
-MIN_TILT_DEG = 0.3
-"""Median tilt (degrees) from which a tour's images are levelled."""
 SPECS = {
     "landmarks.number": MetricSpec(title="Landmarks", context=True),
     "landmarks.sightings": MetricSpec(title="References that see a landmark, mean", context=True),
@@ -59,9 +58,9 @@ class LearnLandmarks(Stage):
     decimetres and degrees; those of odometry alone are straightened first by the places that the tour came back to, and
     scaled by the camera's height over the floor, which then replaces what was straightened by appearance. Images that
     lean each by themselves, as of a camera that is carried, are levelled and brought to one height first (fact
-    `leaning_images`). Where too
-    little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as described is reported, and
-    kept with the landmarks; points are those of a level camera, and poses those of the robot under it.
+    `leaning_images`). Where too little is seen the poses stay. Manifest fact `map_adjusted`. A camera that is not as
+    described is reported, and kept with the landmarks; points are those of a level camera, and poses those of the robot
+    under it.
     There are none where images are too small for local features, and the map is used without them.
     """
 
@@ -101,7 +100,7 @@ class LearnLandmarks(Stage):
         motions = None if given else odometry_motions(about, tour.saw_motion)
         levelling = leaning_images(views, tour.matched(about), about, motions, check.camera is not None)
         # Images from other heights alone stay: levelled, a map of images alone was worse (252 mm in place of 99).
-        if levelling is not None and levelling.leaning_deg >= MIN_TILT_DEG:
+        if levelling is not None and levelling.leaning_deg >= math.degrees(MIN_TILT):
             check = check._replace(levelling=levelling)
             views = tour.views = levelled(views, levelling)
             tour.seen = check.seen

@@ -148,7 +148,7 @@ class Playback(Source, ABC):
             first_of_log=first,
         )
         truth = None if part.truth is None else part.truth[frame]
-        restart, goal = _requests(part, -1 if first else int(frames[position.last]), frame)
+        restart, goal = _requests(part, self._last_used(position), frame)
         odometry, motion = self._motion(ctx, position, part, image)
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -162,6 +162,14 @@ class Playback(Source, ABC):
             restart=restart,
             goal=goal,
         )
+
+    def _last_used(self, position: PlaybackState) -> int:
+        """The last frame of the recording that was used, also in an earlier part of it; -1: none."""
+        if position.last >= 0:
+            return int(self._parts[position.log].frames[position.last])
+        before = self._parts[position.log - 1] if position.log else None
+        same = before is not None and before.recording is self._parts[position.log].recording
+        return int(before.frames[-1]) if before is not None and same else -1
 
     def _few_used(self) -> str:
         """Sentence on a rate by which hardly any image is used; "" otherwise."""

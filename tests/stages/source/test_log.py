@@ -196,6 +196,14 @@ def test_what_a_live_run_was_asked_reaches_the_next_frame_that_is_used(tmp_path:
     assert asked.restart.at == pytest.approx((*moved, *every[5].restart.at[3:]))
 
 
+def test_a_later_part_of_a_recording_asks_again_for_nothing_that_an_earlier_part_was_asked() -> None:
+    source, one, other = LogSource(log="live.mcap"), object(), object()
+    source._parts = [SimpleNamespace(recording=each, frames=np.array(rows)) for each, rows in
+                     ((one, [2, 5]), (one, [8, 11]), (other, [1, 4]))]  # fmt: skip
+    begun, further = [PlaybackState(log=log) for log in range(3)], PlaybackState(log=1, next=1, last=0)
+    assert [source._last_used(position) for position in (*begun, further)] == [-1, 5, -1, 8]
+
+
 def test_a_selection_without_frames_is_refused(log: str) -> None:
     with pytest.raises(UnreadableRecording, match="leaves none of its frames"):
         LogSource(log=log, first=500).setup(context())
